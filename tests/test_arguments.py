@@ -91,7 +91,6 @@ def usual() -> dict[str, dict[str, Any]]:
         "simulate": {**walked, "duration": 0.1},
         "simulate_batch": {**walked, "duration": 0.1},
         "solve_contact": {"delassus": ONE, "free": FLAT, "friction": 0.5},
-        "solve_lcp": {"M": ONE, "q": FLAT},
         "solve_quadratic_program": {"hessian": ONE, "gradient": FLAT},
         "zero_dynamics": {"gait": PhasedGait()},
     }

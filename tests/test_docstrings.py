@@ -25,6 +25,7 @@ from public_names import public_names
 
 import heelstrike
 from heelstrike import errors
+from heelstrike.field_texts import described
 from heelstrike.robot import read_mjcf
 
 SECTIONS = {
@@ -140,6 +141,13 @@ def test_a_class_describes_what_it_is_made_of(name: str) -> None:
     known = {*taken, *inspect.get_annotations(kind), *dir(kind), *_set_by(kind)}
     assert [name for name in described if name not in known] == []
     assert len(described) == len(set(described))
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_every_field_has_a_text_or_a_type_that_says_it_all(name: str) -> None:
+    types = {kind.rpartition(".")[2] for kind in CLASSES} | {"Path", "BaseException", "Exception"}
+    silent = [each for each in described(CLASSES[name]) if not each.text]
+    assert [each.names for each in silent if not types & set(re.findall(r"\w+", each.kind))] == []
 
 
 def _set_by(kind: type) -> set[str]:

@@ -67,7 +67,6 @@ if TYPE_CHECKING:
     from heelstrike.contact import linearize_impact as linearize_impact
     from heelstrike.contact import saltation_matrix as saltation_matrix
     from heelstrike.contact import solve_contact as solve_contact
-    from heelstrike.contact import solve_lcp as solve_lcp
     from heelstrike.control import Actuated as Actuated
     from heelstrike.control import ComputedTorque as ComputedTorque
     from heelstrike.control import Encoder as Encoder
@@ -239,7 +238,6 @@ _HOME = {
     "simulate": "heelstrike.sim",
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",
-    "solve_lcp": "heelstrike.contact",
     "solve_quadratic_program": "heelstrike.control",
     "watch": "heelstrike.view.live",
     "zero_dynamics": "heelstrike.analysis.stability.zero_dynamics",

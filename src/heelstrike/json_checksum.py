@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from os import PathLike
 from pathlib import Path
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import HeelstrikeError
+from heelstrike.field_texts import dataclass
 
 KEY = "sha256"
 LARGEST_FILE = 2**20
@@ -27,24 +28,16 @@ Some = TypeVar("Some")
 
 @dataclass(frozen=True)
 class Entries:
-    """Entries of a file, or of an object in it, each checked for its kind before use.
-
-    Attributes
-    ----------
-    data : Any
-        What stands there.
-    kind : str
-        What the file holds.
-    largest : float
-        Size that no number of it exceeds.
-    error : type
-        What is raised, in words, if an entry is missing or of another kind.
-    """
+    """Entries of a file, or of an object in it, each checked for its kind before use."""
 
     data: Any
+    """What stands there."""
     kind: str
+    """What the file holds."""
     largest: float
+    """Size that no number of it exceeds."""
     error: type[HeelstrikeError]
+    """What is raised, in words, if an entry is missing or of another kind."""
 
     def entry(self, key: str) -> Any:
         """Return anything."""

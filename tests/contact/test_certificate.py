@@ -15,8 +15,9 @@ from contact_oracle import effort, exact_velocity, residual
 from contact_problems import hard_problem, random_problem
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
-from heelstrike.contact import SolveStatus, solve_contact, solve_lcp
+from heelstrike.contact import ContactSolution, SolveStatus, solve_contact
 from heelstrike.contact.certificate import certify, velocity_error
 from heelstrike.contact.sets import CONE, LINE
 from heelstrike.contact.solvers.certified_solve import contact_workspace
@@ -170,6 +171,12 @@ def test_data_that_are_no_numbers_are_never_certified(bad: float, place: int) ->
     assert not verdict(*data).worst <= 1e-9
 
 
+def without_friction(M: ArrayLike, q: list[float], solver: str) -> ContactSolution:
+    """Solve w = M z + q, 0 ≤ w ⟂ z ≥ 0: contacts without friction, in their normal rows."""
+    normal = np.array([1.0, 0.0])
+    return solve_contact(np.kron(M, np.diag(normal)), np.kron(q, normal), 0.0, solver=solver)
+
+
 class TestGeneralMatrices:
     """Of a general complementarity problem the diagonal may say little."""
 
@@ -178,7 +185,7 @@ class TestGeneralMatrices:
         for diagonal in (1e-20, 1e-30, 0.0):
             M = [[1.0, -1.0], [-1.0, diagonal]]
             for solver in SOLVERS:
-                assert not solve_lcp(M, [-1.0, 0.5], solver=solver).certificate.valid
+                assert not without_friction(M, [-1.0, 0.5], solver).certificate.valid
 
     def test_weight_is_the_largest_entry_that_the_diagonal_does_not_explain(self) -> None:
         """w = (−3, 0), and both rows weigh 4: β = 3/2, so that the first misses by one unit."""
@@ -191,7 +198,7 @@ class TestGeneralMatrices:
     def test_numbers_whose_products_overflow(self) -> None:
         M = [[1e305, -1e305], [-1e305, 1e305]]
         for solver in SOLVERS:
-            assert not solve_lcp(M, [-1.0, -1.0], solver=solver).certificate.valid
+            assert not without_friction(M, [-1.0, -1.0], solver).certificate.valid
 
 
 @pytest.mark.parametrize("mass", [1e-300, 1e-150, 1.0, 1e150, 1e300])
@@ -266,7 +273,7 @@ def test_linear_complementarity_without_a_solution() -> None:
     """w₁ + w₂ = −1 whatever z is."""
     M = np.array([[1.0, -1.0], [-1.0, 1.0]])
     for solver in SOLVERS:
-        assert not solve_lcp(M, [-1.0, 0.0], solver=solver).certificate.valid
+        assert not without_friction(M, [-1.0, 0.0], solver).certificate.valid
 
 
 def test_what_rounding_decides_is_called_undecidable() -> None:
@@ -365,5 +372,3 @@ def test_tolerance_and_floor_must_make_sense() -> None:
     for options in ({"tolerance": 0.0}, {"tolerance": np.inf}, {"floor": -1.0}, {"floor": np.nan}):
         with pytest.raises(ContactProblemError, match=next(iter(options))):
             solve_contact(BLOCK, [-1.0, 0.0], 0.5, **options)
-        with pytest.raises(ContactProblemError, match=next(iter(options))):
-            solve_lcp([[1.0]], [-1.0], **options)

@@ -8,7 +8,13 @@ from scipy.linalg import null_space
 from scipy.optimize import nnls
 
 from heelstrike.compiler.compilation import uncompiled
-from heelstrike.dynamics.dense import raise_to_zero, shorten, solve_to_rank
+from heelstrike.dynamics.dense import (
+    raise_to_zero,
+    shorten,
+    solve_to_rank,
+    substitute,
+    triangulate,
+)
 
 SIZE, RANK = 7, 4
 
@@ -64,3 +70,35 @@ def test_lengths_count_what_forces_bring_along() -> None:
     lean = np.array([3.0, 0.0])
     uncompiled(shorten)(0, 2, rank, np.ones(2), lean, column, system, unknown)
     np.testing.assert_allclose(unknown, [1.0, 10.0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("complete", [False, True])
+def test_factors_make_the_matrix_again(complete: bool) -> None:
+    """U above, L beneath; rows or columns where the exchanges have brought them."""
+    matrix = np.random.default_rng(3).normal(size=(SIZE, SIZE))
+    matrix[0, 0] = 0.0
+    factors, order = matrix.copy(), np.zeros(SIZE, dtype=np.int64)
+    assert uncompiled(triangulate)(SIZE, SIZE, complete, factors, order) == SIZE
+    lower, upper = np.tril(factors, -1) + np.eye(SIZE), np.triu(factors)
+    assert np.abs(lower).max() <= 1.0
+    if complete:
+        assert sorted(order) == list(range(SIZE))
+        made = (lower @ upper)[:, np.argsort(order)]
+        rows = [int(np.argmin(np.abs(made - row).max(axis=1))) for row in matrix]
+        np.testing.assert_allclose(made[rows], matrix, rtol=0.0, atol=1e-13)
+        return
+    exchanged = matrix.copy()
+    for k, other in enumerate(order):
+        exchanged[[k, other]] = exchanged[[other, k]]
+    np.testing.assert_allclose(lower @ upper, exchanged, rtol=0.0, atol=1e-13)
+    x = matrix @ np.arange(1.0, SIZE + 1.0)
+    uncompiled(substitute)(SIZE, factors, order, x)
+    np.testing.assert_allclose(x, np.arange(1.0, SIZE + 1.0), rtol=0.0, atol=1e-11)
+
+
+def test_what_is_no_number_stays_none() -> None:
+    """A step that went wrong is seen by its answer."""
+    factors, order, x = np.full((2, 2), np.nan), np.zeros(2, dtype=np.int64), np.ones(2)
+    uncompiled(triangulate)(2, 2, False, factors, order)
+    uncompiled(substitute)(2, factors, order, x)
+    assert np.all(np.isnan(x))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.motion import Motion, run_motion
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
 
 Floats = NDArray[np.float64]
@@ -89,21 +88,14 @@ def torque_bounds(run: Run) -> tuple[Floats, Floats, NDArray[np.bool_]]:
 
 @dataclass(frozen=True)
 class CostOfTransport:
-    """Energy spent a unit of weight and distance, without dimension.
-
-    Attributes
-    ----------
-    absolute : float
-        ∫ Σ |τ ω| dt / (m g d): braking costs as much as driving.
-    positive : float
-        ∫ Σ max(τ ω, 0) dt / (m g d): braking is free.
-    distance : float
-        d, how far the centre of mass moved along x, in m.
-    """
+    """Energy spent a unit of weight and distance, without dimension."""
 
     absolute: float
+    """∫ Σ |τ ω| dt / (m g d): braking costs as much as driving."""
     positive: float
+    """∫ Σ max(τ ω, 0) dt / (m g d): braking is free."""
     distance: float
+    """d, how far the centre of mass moved along x, in m."""
 
 
 def cost_of_transport(run: Run, *, motion: Motion | None = None) -> CostOfTransport:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +16,7 @@ from heelstrike.analysis.intervals import (
 )
 from heelstrike.analysis.motion import motion, run_motion
 from heelstrike.dynamics import point_jacobian
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
 
 Floats = NDArray[np.float64]
@@ -25,40 +24,28 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class EnergyBalance:
-    """Energy of the robot and the work done on it since the first row, row by row, in J.
-
-    Attributes
-    ----------
-    time : (nt,) float
-        Seconds.
-    kinetic, potential : (nt,) float
-        Energy of links, rotors and joint springs; zero height is z = 0.
-    actuators : (nt,) float
-        Work of the actuators.
-    dampers : (nt,) float
-        Work of the joint dampers, never positive in exact motion.
-    contacts : (nt,) float
-        Work of the ground: impacts and sliding friction. An exact contact never adds energy.
-    stops : (nt,) float
-        Work of the joint stops, of which the same is true.
-    dry_friction : (nt,) float
-        Work of dry friction in the joints, never positive in exact motion.
-    brakes : (nt,) float
-        Work of the brakes, never positive in exact motion.
-    pushes : (nt,) float
-        Work of the pushes.
-    """
+    """Energy of the robot and the work done on it since the first row, row by row, in J."""
 
     time: Floats
+    """(nt,) Seconds."""
     kinetic: Floats
     potential: Floats
+    """kinetic, potential: (nt,) Energy of links, rotors and joint springs; zero height is z = 0."""
     actuators: Floats
+    """(nt,) Work of the actuators."""
     dampers: Floats
+    """(nt,) Work of the joint dampers, never positive in exact motion."""
     contacts: Floats
+    """(nt,) Work of the ground: impacts and sliding friction. An exact contact never adds
+    energy."""
     stops: Floats
+    """(nt,) Work of the joint stops, of which the same is true."""
     dry_friction: Floats
+    """(nt,) Work of dry friction in the joints, never positive in exact motion."""
     brakes: Floats
+    """(nt,) Work of the brakes, never positive in exact motion."""
     pushes: Floats
+    """(nt,) Work of the pushes."""
 
     @property
     def total(self) -> Floats:

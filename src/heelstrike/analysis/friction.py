@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.support import NOTHING, foot_sums
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
 
 Floats = NDArray[np.float64]
@@ -18,21 +17,15 @@ class FrictionUse:
     """Tangential force over what friction allows, |f_t| / (μ f_n), row by row.
 
     1 is the edge of the friction cone; NaN where nothing presses.
-
-    Attributes
-    ----------
-    contact : (nt, nc) float
-        Of each contact point. Two points of one flat sole share their tangential force in a way
-        that mechanics does not decide: the run holds the split of least norm.
-    foot : (nt, nf) float
-        Of each foot, from the sums over its contact points; unique.
-    total : (nt,) float
-        Of all contact points together.
     """
 
     contact: Floats
+    """(nt, nc) Of each contact point. Two points of one flat sole share their tangential force in a
+    way that mechanics does not decide: the run holds the split of least norm."""
     foot: Floats
+    """(nt, nf) Of each foot, from the sums over its contact points; unique."""
     total: Floats
+    """(nt,) Of all contact points together."""
 
     @property
     def max(self) -> float:

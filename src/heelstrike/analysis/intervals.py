@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Event, Run
+from heelstrike.tolerances import SAME_ROW
 
 Floats = NDArray[np.float64]
 
 IMPULSIVE = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.ZENO, EventKind.PAINLEVE)
 """Events whose impulses are not in the forces of an event-driven run."""
-
-SAME_INSTANT = 1e-9
-"""Rows and events closer than this (s) belong together."""
 
 
 def impulses_in_events(run: Run) -> bool:
@@ -99,8 +97,8 @@ def _interval_of(instant: float, time: Floats) -> int:
 
     Rows of the output period may lie as near as 1e-12 s beside it.
     """
-    first = int(np.searchsorted(time, instant - SAME_INSTANT))
-    last = int(np.searchsorted(time, instant + SAME_INSTANT, side="right"))
+    first = int(np.searchsorted(time, instant - SAME_ROW))
+    last = int(np.searchsorted(time, instant + SAME_ROW, side="right"))
     if last - first < 2:
         return min(first, len(time) - 2)
     away = np.abs(time[first:last] - instant)

@@ -8,7 +8,7 @@ to step (Goswami, Thuilot, Espiau 1998; Strogatz, *Nonlinear Dynamics and Chaos*
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,8 @@ from heelstrike.analysis.stability.repeating import Repeating, repeating_walk
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.field_texts import dataclass
+from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
@@ -39,57 +41,40 @@ HALVINGS = 6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LimitCycle:
-    """A walk that repeats from step to step.
-
-    Attributes
-    ----------
-    state : State
-        State just after touchdown, relabelled so that the same foot stands at every step; the
-        first contact point that stands is level with the world's origin. In the middle of a step,
-        and where the walk was found, if the controller goes on from step to step.
-    period : float
-        Duration of a step in s.
-    step_length : float
-        Distance along the ground (m) by which a step moves the robot on.
-    multipliers : (m,) complex
-        Floquet multipliers of `steps` steps, largest first: factors by which small disturbances of
-        the state grow from one touchdown to the next. m is the number of disturbances that the feet
-        on the ground allow; shifts along the ground are not among them.
-    residual : float
-        Largest difference between `state` and its image one step later (m, rad, m/s, rad/s), and
-        between what the controller remembers then.
-    iterations : int
-        Newton steps taken.
-    memory : (k,) float
-        What the controller remembers just after touchdown, of what is carried from step to step.
-    steps : int
-        Steps after which the walk repeats: one, as its legs are relabelled; two on two legs, of a
-        controller that goes on from step to step.
-    snapshot : Snapshot or None
-        Such a walk with all that its controller remembers, to be taken up as the `state` of a
-        simulation.
-    """
+class LimitCycle(ShownInNotebooks):
+    """A walk that repeats from step to step."""
 
     state: State
+    """State just after touchdown, relabelled so that the same foot stands at every step; the first
+    contact point that stands is level with the world's origin. In the middle of a step, and where
+    the walk was found, if the controller goes on from step to step."""
     period: float
+    """Duration of a step in s."""
     step_length: float
+    """Distance along the ground (m) by which a step moves the robot on."""
     multipliers: NDArray[np.complex128]
+    """(m,) Floquet multipliers of `steps` steps, largest first: factors by which small disturbances
+    of the state grow from one touchdown to the next. m is the number of disturbances that the feet
+    on the ground allow; shifts along the ground are not among them."""
     residual: float
+    """Largest difference between `state` and its image one step later (m, rad, m/s, rad/s), and
+    between what the controller remembers then."""
     iterations: int
+    """Newton steps taken."""
     memory: Floats = field(default_factory=lambda: np.zeros(0))
+    """(k,) What the controller remembers just after touchdown, of what is carried from step to
+    step."""
     steps: int = 1
+    """Steps after which the walk repeats: one, as its legs are relabelled; two on two legs, of a
+    controller that goes on from step to step."""
     snapshot: Snapshot | None = None
+    """Such a walk with all that its controller remembers, to be taken up as the `state` of a
+    simulation."""
 
     @property
     def stable(self) -> bool:
         """Whether every small disturbance dies out."""
         return bool(np.all(np.abs(self.multipliers) < 1.0))
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import limit_cycle_card
-
-        return limit_cycle_card(self)
 
     def __repr__(self) -> str:
         largest = np.abs(self.multipliers).max(initial=0.0)

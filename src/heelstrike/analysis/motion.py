@@ -24,28 +24,20 @@ Floats = NDArray[np.float64]
 
 
 class Motion(Bundle):
-    """Motion of a robot in world axes, row by row.
-
-    Attributes
-    ----------
-    link_origin : (nt, nl, 2) float
-        Position (x, z) of every link frame, in m.
-    link_angle : (nt, nl) float
-        Rotation of every link about +y from the reference configuration, in rad.
-    center_of_mass : (nt, 2) float
-        Position (x, z) of the robot's centre of mass, in m.
-    contact_velocity : (nt, nc, 2) float
-        Velocity (x, z) of the material point at every contact point, in m/s.
-    kinetic, potential : (nt,) float
-        Energies in J; the kinetic one includes rotors, the potential one joint springs.
-    """
+    """Motion of a robot in world axes, row by row."""
 
     link_origin: Floats = array("nt", "nl", "axes")
+    """Position (x, z) of every link frame, in m."""
     link_angle: Floats = array("nt", "nl")
+    """Rotation of every link about +y from the reference configuration, in rad."""
     center_of_mass: Floats = array("nt", "axes")
+    """Position (x, z) of the robot's centre of mass, in m."""
     contact_velocity: Floats = array("nt", "nc", "axes")
+    """Velocity (x, z) of the material point at every contact point, in m/s."""
     kinetic: Floats = array("nt")
     potential: Floats = array("nt")
+    """kinetic, potential: Energies in J; the kinetic one includes rotors, the potential one joint
+    springs."""
 
 
 @kernel

@@ -12,7 +12,7 @@ joints are where latches have them. A :class:`Chart` numbers what these leave fr
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.dynamics import loop_displacement, loop_jacobian
 from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
@@ -207,19 +208,13 @@ class Landing:
 
 @dataclass(frozen=True)
 class Carried:
-    """What a controller remembers from step to step.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Members of its memory.
-    relabelled : callable, optional
-        ``relabelled(memory, time)`` makes of the memory at the end of a step, which took a time,
-        that at the beginning of the next: legs exchanged, times counted anew.
-    """
+    """What a controller remembers from step to step."""
 
     names: tuple[str, ...] = ()
+    """Members of its memory."""
     relabelled: Callable[[Any, float], None] | None = None
+    """``relabelled(memory, time)`` makes of the memory at the end of a step, which took a time,
+    that at the beginning of the next: legs exchanged, times counted anew."""
 
     def of(self, simulation: Simulation) -> Floats:
         """Return the numbers that are carried, (m,)."""
@@ -277,7 +272,7 @@ class PoincareMap:
         symmetry: Callable[[State], State] | None,
         longest: float,
         control_period: float | None = None,
-        carried: Carried = Carried(),
+        carried: Carried = Carried(),  # noqa: B008 - it is frozen
     ) -> None:
         robot = section.robot
         self._section = section

@@ -5,8 +5,6 @@ A run that completes is no recovery by itself: a robot that kneels, or walks bac
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +12,7 @@ from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.support import walking_steps
 from heelstrike.dynamics import leg_joints
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
 
 Floats = NDArray[np.float64]
@@ -27,30 +26,21 @@ SLOW = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Recovery:
-    """What became of a robot after a push.
-
-    Attributes
-    ----------
-    recovered : bool
-        Whether it recovered, strictly.
-    reason : str
-        What it did not do; nothing if it recovered.
-    hip : float
-        Lowest height of the hip above the ground from the push on, as a part of that before it.
-    pitch : float
-        Largest angle of the trunk from the push on, from the mean before it, without its sign, in
-        rad.
-    speed, normal_speed : float
-        Forward speed of the centre of mass when it is judged, and before the push, in m/s; the
-        former is NaN of a run that does not last.
-    """
+    """What became of a robot after a push."""
 
     recovered: bool
+    """Whether it recovered, strictly."""
     reason: str
+    """What it did not do; nothing if it recovered."""
     hip: float
+    """Lowest height of the hip above the ground from the push on, as a part of that before it."""
     pitch: float
+    """Largest angle of the trunk from the push on, from the mean before it, without its sign, in
+    rad."""
     speed: float
     normal_speed: float
+    """speed, normal_speed: Forward speed of the centre of mass when it is judged, and before the
+    push, in m/s; the former is NaN of a run that does not last."""
 
     def __bool__(self) -> bool:
         return self.recovered

@@ -6,7 +6,7 @@ import enum
 import json
 import math
 import string
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,8 @@ from heelstrike.analysis.slip import max_slip
 from heelstrike.analysis.support import double_support_fraction, walking_steps
 from heelstrike.analysis.tracking import tracking_error
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
+from heelstrike.field_texts import dataclass
+from heelstrike.notebook import ShownInNotebooks
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.run import Run, SolverCount
 
@@ -32,105 +34,74 @@ UNKNOWN = float("nan")
 
 @dataclass(frozen=True)
 class GaitFigures:
-    """The gait that a run followed.
-
-    Attributes
-    ----------
-    step_length_m, step_duration_s : float
-        Length and duration of one step.
-    cost_N2m2s : float
-        ∫ ΓᵀΓ dt of one step of the gait as designed (paper eq. 40).
-    """
+    """The gait that a run followed."""
 
     step_length_m: float
     step_duration_s: float
+    """step_length_m, step_duration_s: Length and duration of one step."""
     cost_N2m2s: float  # noqa: N815 - units keep their capitals
+    """∫ ΓᵀΓ dt of one step of the gait as designed (paper eq. 40)."""
 
 
 @dataclass(frozen=True)
-class Summary:
-    """Figures of a run. Those that do not exist for it are NaN (null in JSON).
-
-    Attributes
-    ----------
-    robot : str
-        Name of the robot.
-    status, message : str
-        How the run ended.
-    first_cause : str
-        Why it did not go well, what came first in time first; nothing if it did.
-    steps : int
-        Walking steps taken: touchdowns of alternating feet.
-    distance_m : float
-        How far the centre of mass moved along x.
-    duration_s : float
-        Time simulated.
-    gait : GaitFigures or None
-        The gait that the run followed, if it was given.
-    tracking_rms_rad, tracking_max_rad : float
-        Error of the actuated joints against the gait.
-    zmp_min_m, zmp_max_m : float
-        Range of the zero moment point of the stance foot in single support, ahead of the ankle's
-        projection onto the sole.
-    zmp_limits_m : tuple of float
-        Heel and toe in the same frame.
-    zmp_margin_min_m : float
-        Least distance of that zero moment point to the ends of the sole's touching points.
-    friction_use_max : float
-        Largest |f_t| / (μ f_n) of a foot.
-    slip_max_m : float
-        Largest distance that a contact point slid while pressed, over the whole run.
-    penetration_max_m, complementarity_max : float
-        Worst values over all steps, from the certificates; the latter is relative.
-    energy_gain_J : float
-        Kinetic energy that restitution with friction made in impacts.
-    doubt : str
-        Why the run may mean little though it was completed; nothing if nothing is known.
-    solver : SolverCount
-        How the contact problems were solved.
-    torque_cost_N2m2s : float
-        ∫ ΓᵀΓ dt over the whole run.
-    cost_of_transport, cost_of_transport_positive : float
-        ∫ Σ |τ ω| dt / (m g d), and the same of positive work only.
-    double_support_fraction : float
-        Share of the time in which both feet push.
-    saturations : int
-        Times that a torque was clipped to its limit.
-    compile_s, wall_s : float
-        Time spent on compilation, and on the simulation.
-    real_time_factor : float
-        Time simulated over time spent on the simulation.
-    """
+class Summary(ShownInNotebooks):
+    """Figures of a run. Those that do not exist for it are NaN (null in JSON)."""
 
     robot: str
+    """Name of the robot."""
     status: str
     message: str
+    """status, message: How the run ended."""
     first_cause: str
+    """Why it did not go well, what came first in time first; nothing if it did."""
     steps: int
+    """Walking steps taken: touchdowns of alternating feet."""
     distance_m: float
+    """How far the centre of mass moved along x."""
     duration_s: float
+    """Time simulated."""
     gait: GaitFigures | None
+    """The gait that the run followed, if it was given."""
     tracking_rms_rad: float
     tracking_max_rad: float
+    """tracking_rms_rad, tracking_max_rad: Error of the actuated joints against the gait."""
     zmp_min_m: float
     zmp_max_m: float
+    """zmp_min_m, zmp_max_m: Range of the zero moment point of the stance foot in single support,
+    ahead of the ankle's projection onto the sole."""
     zmp_limits_m: tuple[float, float]
+    """Heel and toe in the same frame."""
     zmp_margin_min_m: float
+    """Least distance of that zero moment point to the ends of the sole's touching points."""
     friction_use_max: float
+    """Largest |f_t| / (μ f_n) of a foot."""
     slip_max_m: float
+    """Largest distance that a contact point slid while pressed, over the whole run."""
     penetration_max_m: float
     complementarity_max: float
+    """penetration_max_m, complementarity_max: Worst values over all steps, from the certificates;
+    the latter is relative."""
     solver: SolverCount
+    """How the contact problems were solved."""
     torque_cost_N2m2s: float  # noqa: N815 - units keep their capitals
+    """∫ ΓᵀΓ dt over the whole run."""
     cost_of_transport: float
     cost_of_transport_positive: float
+    """cost_of_transport, cost_of_transport_positive: ∫ Σ |τ ω| dt / (m g d), and the same of
+    positive work only."""
     double_support_fraction: float
+    """Share of the time in which both feet push."""
     saturations: int
+    """Times that a torque was clipped to its limit."""
     compile_s: float
     wall_s: float
+    """compile_s, wall_s: Time spent on compilation, and on the simulation."""
     real_time_factor: float
+    """Time simulated over time spent on the simulation."""
     energy_gain_J: float = 0.0  # noqa: N815 - units keep their capitals
+    """Kinetic energy that restitution with friction made in impacts."""
     doubt: str = ""
+    """Why the run may mean little though it was completed; nothing if nothing is known."""
 
     @property
     def speed(self) -> float:
@@ -174,11 +145,6 @@ class Summary:
         for label, value in lines(self):
             table.add_row(label, value)
         return table
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import summary_card
-
-        return summary_card(self)
 
     def _title(self) -> str:
         return f"{self.robot}: {self.message}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Event, Run
 
@@ -64,20 +65,14 @@ def single_support(run: Run) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class SupportPhase:
-    """Time during which the same feet carry the robot.
-
-    Attributes
-    ----------
-    start, end : float
-        Time in s.
-    feet : tuple of int
-        Indices of the feet that push: one in single support, two in double support, none in
-        flight.
-    """
+    """Time during which the same feet carry the robot."""
 
     start: float
     end: float
+    """start, end: Time in s."""
     feet: tuple[int, ...]
+    """Indices of the feet that push: one in single support, two in double support, none in
+    flight."""
 
     @property
     def duration(self) -> float:
@@ -136,24 +131,16 @@ def double_support_fraction(run: Run) -> float:
 
 @dataclass(frozen=True)
 class Stance:
-    """Stay of a foot on the ground, from its touchdown to its lift-off.
-
-    Attributes
-    ----------
-    foot : int
-        Index of the foot.
-    touchdown : float
-        When its first contact point met the ground, in s.
-    liftoff : float
-        When its last one left it, in s; infinite if it was still there at the end.
-    impulse : float
-        Normal impulse on the foot in the step of its touchdown, in N s.
-    """
+    """Stay of a foot on the ground, from its touchdown to its lift-off."""
 
     foot: int
+    """Index of the foot."""
     touchdown: float
+    """When its first contact point met the ground, in s."""
     liftoff: float
+    """When its last one left it, in s; infinite if it was still there at the end."""
     impulse: float
+    """Normal impulse on the foot in the step of its touchdown, in N s."""
 
 
 def stances(run: Run) -> tuple[Stance, ...]:

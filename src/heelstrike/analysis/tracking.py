@@ -8,7 +8,6 @@ duration and then holds still. All of it follows from the touchdowns of the run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -16,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.support import stances
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
+from heelstrike.tolerances import SAME_ROW
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
@@ -27,30 +28,22 @@ EARLIEST = 0.5
 """Touchdowns before this fraction of a step do not end it."""
 LATEST = 1.1
 """The reference of a late step rests after this fraction of its duration."""
-SAME_TIME = 1e-9  # seconds; times of rows and events agree but for rounding
 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceMotion:
-    """What a controller that follows a gait wanted the joints to do, row by row.
-
-    Attributes
-    ----------
-    position, velocity : (nt, nu) float
-        Reference of the actuated joints, in the order of the actuators (rad, rad/s).
-    stance : (nt,) int
-        Index of the foot taken for the stance foot.
-    phase : (nt,) float
-        Time since the step began, in s.
-    starts : tuple of float
-        Times at which steps began, in s.
-    """
+    """What a controller that follows a gait wanted the joints to do, row by row."""
 
     position: Floats
     velocity: Floats
+    """position, velocity: (nt, nu) Reference of the actuated joints, in the order of the actuators
+    (rad, rad/s)."""
     stance: NDArray[np.int64]
+    """(nt,) Index of the foot taken for the stance foot."""
     phase: Floats
+    """(nt,) Time since the step began, in s."""
     starts: tuple[float, ...]
+    """Times at which steps began, in s."""
 
 
 def reference_motion(run: Run, gait: Gait) -> ReferenceMotion:
@@ -75,7 +68,7 @@ def reference_motion(run: Run, gait: Gait) -> ReferenceMotion:
     """
     gait.check_joints(run.robot)
     starts = _step_starts(run, gait)
-    step = np.searchsorted(np.array(starts) - SAME_TIME, run.time, side="right") - 1
+    step = np.searchsorted(np.array(starts) - SAME_ROW, run.time, side="right") - 1
     step = np.maximum(step, 0)
     stance = (gait.stance_foot + step) % 2
     phase = run.time - np.array(starts)[step]
@@ -103,7 +96,7 @@ def _step_starts(run: Run, gait: Gait) -> list[float]:
             for stance in on_ground
             if stance.foot == swing and stance.liftoff > earliest
         ]
-        if not landed or landed[0] > run.time[-1] + SAME_TIME:
+        if not landed or landed[0] > run.time[-1] + SAME_ROW:
             return starts
         starts.append(landed[0])
         swing = 1 - swing
@@ -111,19 +104,13 @@ def _step_starts(run: Run, gait: Gait) -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class TrackingError:
-    """Measured minus reference motion of the actuated joints.
-
-    Attributes
-    ----------
-    reference : ReferenceMotion
-        The reference.
-    position, velocity : (nt, nu) float
-        Errors in rad and rad/s.
-    """
+    """Measured minus reference motion of the actuated joints."""
 
     reference: ReferenceMotion
+    """The reference."""
     position: Floats
     velocity: Floats
+    """position, velocity: (nt, nu) Errors in rad and rad/s."""
 
     @cached_property
     def joint_rms(self) -> Floats:

@@ -16,22 +16,19 @@ An impact is a large force over one step, and counts like any other force.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import Motion
 from heelstrike.analysis.support import NOTHING, pushing, single_support
 from heelstrike.analysis.wrenches import sole_points
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import soles
 from heelstrike.sim.run import Run
+from heelstrike.tolerances import STANDING_GAP
 
 Floats = NDArray[np.float64]
-
-TOUCHING = 1e-6
-"""Contact points less than this above the ground (m) belong to the support polygon."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,31 +37,23 @@ class ZeroMomentPoint:
 
     Every number is NaN in rows where nothing pushes, per foot or in all. Distances are along the
     ground, positive forward.
-
-    Attributes
-    ----------
-    foot : (nt, nf) float
-        Zero moment point of each foot, ahead of the foot's reference point: the ankle projected
-        onto the sole, and from there onto the ground (m).
-    foot_margin : (nt, nf) float
-        Distance from it to the nearer end of the foot's touching contact points; positive inside
-        (m).
-    total : (nt, 2) float
-        Zero moment point of all contact forces, in the world (m). It takes the ground for flat
-        under the points that push.
-    margin : (nt,) float
-        Distance from it to the nearer end of the support polygon, all touching contact points;
-        positive inside (m).
-    single_support : (nt,) bool
-        Rows in which exactly one foot and nothing else pushes; see
-        :func:`heelstrike.analysis.support.single_support`.
     """
 
     foot: Floats
+    """(nt, nf) Zero moment point of each foot, ahead of the foot's reference point: the ankle
+    projected onto the sole, and from there onto the ground (m)."""
     foot_margin: Floats
+    """(nt, nf) Distance from it to the nearer end of the foot's touching contact points; positive
+    inside (m)."""
     total: Floats
+    """(nt, 2) Zero moment point of all contact forces, in the world (m). It takes the ground for
+    flat under the points that push."""
     margin: Floats
+    """(nt,) Distance from it to the nearer end of the support polygon, all touching contact points;
+    positive inside (m)."""
     single_support: NDArray[np.bool_]
+    """(nt,) Rows in which exactly one foot and nothing else pushes; see
+    :func:`heelstrike.analysis.support.single_support`."""
 
     @property
     def stance(self) -> Floats:
@@ -156,7 +145,7 @@ def _pressure(run: Run, contacts: list[int], reference: Floats) -> _Pressure:
     place = np.full(len(row), np.nan)
     place[loaded] = -moment[loaded] / pressing[loaded]
     along = np.einsum("tck,tk->tc", arm, tangent)
-    touching = (run.gap[:, contacts] <= TOUCHING) | pushing(run)[:, contacts]
+    touching = (run.gap[:, contacts] <= STANDING_GAP) | pushing(run)[:, contacts]
     heel = np.where(touching, along, np.inf).min(axis=1)
     toe = np.where(touching, along, -np.inf).max(axis=1)
     return _Pressure(origin, tangent, place, np.minimum(place - heel, toe - place))

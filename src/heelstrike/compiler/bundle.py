@@ -25,6 +25,7 @@ import numpy as np
 from numba.extending import typeof_impl
 
 from heelstrike.compiler.bundle_type import WORD_BYTES, BundleType, bundle_type
+from heelstrike.field_texts import FieldTexts
 
 _EXTENT = re.compile(r"(?:(\d+)\s*)?([A-Za-z]\w*)?(?:\s*\+\s*(\d+))?")
 
@@ -36,32 +37,27 @@ _Some = TypeVar("_Some", bound="Bundle")
 
 @dataclass(frozen=True)
 class Member:
-    """What a bundle says of one of its members.
-
-    Attributes
-    ----------
-    role : str
-        ``"array"``, ``"cell"`` (a number that changes), ``"number"`` (one that does not),
-        ``"part"`` (another bundle) or ``"extent"`` (how long arrays are).
-    kind : type
-        ``float`` or ``int``, or the class of a part.
-    shape : tuple of str and int
-        Extents of an array: ``"nv"``, ``"2 nc"``, ``"nc + 1"``, 3.
-    address : bool
-        Whether it holds places in this process, or a part what is another's: nothing to keep.
-    flat : bool
-        Whether what a part holds is stored under the names of its own members.
-    unit, label : str
-        Of its numbers, and what they are, for those who read them.
-    """
+    """What a bundle says of one of its members."""
 
     role: str
+    """``"array"``, ``"cell"`` (a number that changes), ``"number"`` (one that does not), ``"part"``
+    (another bundle) or ``"extent"`` (how long arrays are)."""
     kind: type
+    """``float`` or ``int``, or the class of a part."""
     shape: tuple[str | int, ...] = ()
+    """Extents of an array: ``"nv"``, ``"2 nc"``, ``"nc + 1"``, 3."""
     address: bool = False
+    """Whether it holds places in this process, or a part what is another's: nothing to keep."""
     flat: bool = False
+    """Whether what a part holds is stored under the names of its own members."""
     unit: str = ""
     label: str = ""
+    """unit, label: Of its numbers, and what they are, for those who read them."""
+
+    @property
+    def dimensions(self) -> tuple[str | int, ...]:
+        """What the documentation says of its shape."""
+        return self.shape
 
     def prefix(self, name: str) -> str:
         """What the names begin with under which the members of a part are stored."""
@@ -120,20 +116,22 @@ def cell(of: type, *, unit: str = "", label: str = "") -> Any:
     return Member("cell", of, unit=unit, label=label)
 
 
-def number(of: type) -> Any:
+def number(of: type, *, unit: str = "", label: str = "") -> Any:
     """Declare a number of a bundle that stays as it is.
 
     Parameters
     ----------
     of : type
         ``float`` or ``int``.
+    unit, label : str
+        Its unit, and what it is: what a log is recorded with.
 
     Returns
     -------
     Member
         What the class of the bundle makes a member of.
     """
-    return Member("number", of)
+    return Member("number", of, unit=unit, label=label)
 
 
 def part(kind: type[Bundle], *, address: bool = False, flat: bool = False) -> Any:
@@ -239,6 +237,8 @@ class Bundle:
                 delattr(cls, name)
         for place, name in enumerate(cells):
             setattr(cls, name, _cell_property(place, cls.declared[name]))
+        if cls.__doc__:
+            cls.__doc__ = FieldTexts(cls.__doc__, own)  # type: ignore[assignment]
 
     def __init__(self, **members: Any) -> None:
         for name, member in self.declared.items():

@@ -2,7 +2,6 @@
 
 from heelstrike.contact.certificate import Certificate
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.lcp import LcpSolution, solve_lcp
 from heelstrike.contact.modes import ContactMode, Solver, SolveStatus
 from heelstrike.contact.problem import ContactSolution, solve_contact
 from heelstrike.contact.queries.force_distribution import ForceDistribution
@@ -35,7 +34,6 @@ __all__ = [
     "ForceDistribution",
     "Ground",
     "ImpactLinearization",
-    "LcpSolution",
     "PhaseLinearization",
     "SolveStatus",
     "Solver",
@@ -46,5 +44,4 @@ __all__ = [
     "linearize_impact",
     "saltation_matrix",
     "solve_contact",
-    "solve_lcp",
 ]

@@ -16,7 +16,7 @@ errors kept, so that the residuals are those of the impulse as it is written dow
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from heelstrike.contact.workspace import (
     Settings,
     Yardstick,
 )
+from heelstrike.field_texts import dataclass
 
 REST_TOLERANCE = 1e-10
 """Velocities below this, relative to the data and to what cancels in them, count as zero."""
@@ -50,45 +51,31 @@ class Certificate:
     A certificate proves this much: there is an impulse close to the reported one that solves
     exactly, without any residual, the problem whose free velocities differ from the given ones by
     at most ``velocity_error``.
-
-    Attributes
-    ----------
-    status : SolveStatus
-        How the solve ended; ``status.text`` says it in words.
-    solver : Solver
-        The solver whose answer is reported.
-    iterations : int
-        Iterations (pivots, Newton steps or sweeps) of all solvers tried.
-    fallbacks : int
-        How many solvers failed before the one reported.
-    complementarity : float
-        Largest of min(velocity, impulse) over the complementary pairs: normal velocity and
-        normal impulse; slip to either side and the friction that still lacks to the cone's
-        opposing edge.
-    cone : float
-        Largest excess of the friction over the cone, or of a normal impulse below zero.
-    non_penetration : float
-        Largest negative normal velocity.
-    rounding : float
-        How far the true residuals of the impulse may exceed these.
-    tolerance : float
-        What the residuals, rounding included, had to meet.
-    velocity_error : (nc, 2) float
-        How far the contact velocities may be from a solution's, in the unit of the free velocity
-        (m/s, or m/s²): the bound above, for each row. Infinite if the residuals are no smaller
-        than the data.
     """
 
     status: SolveStatus
+    """How the solve ended; ``status.text`` says it in words."""
     solver: Solver
+    """The solver whose answer is reported."""
     iterations: int
+    """Iterations (pivots, Newton steps or sweeps) of all solvers tried."""
     fallbacks: int
+    """How many solvers failed before the one reported."""
     complementarity: float
+    """Largest of min(velocity, impulse) over the complementary pairs: normal velocity and normal
+    impulse; slip to either side and the friction that still lacks to the cone's opposing edge."""
     cone: float
+    """Largest excess of the friction over the cone, or of a normal impulse below zero."""
     non_penetration: float
+    """Largest negative normal velocity."""
     rounding: float
+    """How far the true residuals of the impulse may exceed these."""
     tolerance: float
+    """What the residuals, rounding included, had to meet."""
     velocity_error: Floats = field(compare=False, repr=False)
+    """(nc, 2) How far the contact velocities may be from a solution's, in the unit of the free
+    velocity (m/s, or m/s²): the bound above, for each row. Infinite if the residuals are no smaller
+    than the data."""
 
     @property
     def valid(self) -> bool:

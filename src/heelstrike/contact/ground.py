@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,9 @@ from heelstrike.arguments import check_fields, takes
 from heelstrike.compiler.bundle import Bundle, array, number
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
+from heelstrike.notebook import ShownInNotebooks
+from heelstrike.tolerances import STRAIGHT_GROUND
 
 Floats = NDArray[np.float64]
 
@@ -19,49 +22,33 @@ Floats = NDArray[np.float64]
 # every one of them is in free flight, and the distance to the ground below it will do.
 REACH = 0.25
 
-# Two faces whose normals turn by less (rad) are as good as one.
-FLAT = 1e-9
+
+UPRIGHT = 1e-3
+"""Least rise of the normal that counts in how far the nearest segment may be: steeper faces are
+looked for within `REACH` in any case."""
+
+AT_THE_CORNER = 1e-12
+"""Distance (m) of a centre from a corner up to which there is no way from one to the other."""
 
 
 class GroundModel(Bundle):
-    """The ground as the kernels see it.
-
-    Attributes
-    ----------
-    vertices : (ns + 1, 2) float
-        Corners of the profile (x, z) in metres, x never decreasing; the end segments go on for
-        ever.
-    normal : (ns, 2) float
-        Upward unit normal of each segment.
-    friction, restitution : (ns,) float
-        Coefficients of each segment.
-    concave : int
-        Whether there is a corner in which a point can touch two faces.
-    """
+    """The ground as the kernels see it."""
 
     vertices: Floats = array("ns + 1", "axes")
+    """Corners of the profile (x, z) in metres, x never decreasing; the end segments go on for
+    ever."""
     normal: Floats = array("ns", "axes")
+    """Upward unit normal of each segment."""
     friction: Floats = array("ns")
     restitution: Floats = array("ns")
+    """friction, restitution: Coefficients of each segment."""
     concave: int = number(int)
+    """Whether there is a corner in which a point can touch two faces."""
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class Ground(ShownInNotebooks):
     """Rigid ground.
-
-    Parameters
-    ----------
-    friction : float or (ns,) array
-        Coulomb friction coefficient μ ≥ 0, one for all or one a segment.
-    restitution : float or (ns,) array
-        Newton's coefficient of restitution, 0 (plastic, the paper's choice) to 1.
-    slope : float
-        Inclination in rad of ground without a profile; positive climbs along +x.
-    profile : (ns + 1, 2) array, optional
-        Corners (x, z) of the ground in metres, from left to right; two corners with the same x
-        make a vertical step. The first and last segments go on for ever. See also
-        :meth:`stairs` and :meth:`rough`.
 
     Raises
     ------
@@ -75,9 +62,16 @@ class Ground:
     """
 
     friction: ArrayLike = 0.75
+    """Float or (ns,) array. Coulomb friction coefficient μ ≥ 0, one for all or one a segment."""
     restitution: ArrayLike = 0.0
+    """Float or (ns,) array. Newton's coefficient of restitution, 0 (plastic, the paper's choice) to
+    1."""
     slope: float = 0.0
+    """Inclination in rad of ground without a profile; positive climbs along +x."""
     profile: ArrayLike | None = None
+    """(ns + 1, 2) Corners (x, z) of the ground in metres, from left to right; two corners with the
+    same x make a vertical step. The first and last segments go on for ever. See also :meth:`stairs`
+    and :meth:`rough`."""
     _model: GroundModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -97,7 +91,7 @@ class Ground:
         model = GroundModel(
             vertices=vertices,
             normal=normal,
-            concave=int(np.any(_turn(normal[:-1].T, normal[1:].T) > FLAT)),
+            concave=int(np.any(_turn(normal[:-1].T, normal[1:].T) > STRAIGHT_GROUND)),
             friction=friction,
             restitution=restitution,
         )
@@ -201,11 +195,6 @@ class Ground:
         z[0] = z[-1] = 0.0
         ends = [[start - 1.0, 0.0]], np.column_stack((x, z)), [[x[-1] + 1.0, 0.0]]
         return cls(friction=friction, restitution=restitution, profile=np.concatenate(ends))
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import ground_card
-
-        return ground_card(self)
 
     def numbers(self) -> dict[str, Floats]:
         """Return the ground as arrays that :meth:`of_numbers` makes it of."""
@@ -393,7 +382,7 @@ def nearest_segment(
     segments = ground.friction.shape[0]
     # Nothing nearer than the ground straight below or above can lie further away in x.
     inside = distance < 0.0
-    reach = min(abs(distance) / max(normal[1], 1e-3), REACH + radius)
+    reach = min(abs(distance) / max(normal[1], UPRIGHT), REACH + radius)
     first = below
     while first > 0 and ground.vertices[first, 0] >= x - reach:
         first -= 1
@@ -419,13 +408,13 @@ def nearest_segment(
             owner = segment
             corner = (segment if along == 0.0 else segment + 1) if on_corner else 0
             separation = np.sqrt(squared)
-            if on_corner and separation > 1e-12:
+            if on_corner and separation > AT_THE_CORNER:
                 sign = -1.0 if inside else 1.0
                 normal[0] = sign * dx / separation
                 normal[1] = sign * dz / separation
             else:
                 line_contact(ground, segment, x, z, normal)
-    if inside and corner > 0 and turn_at(ground, corner) > FLAT:
+    if inside and corner > 0 and turn_at(ground, corner) > STRAIGHT_GROUND:
         right = line_contact(ground, corner, x, z, normal)
         left = line_contact(ground, corner - 1, x, z, normal)
         if right < left:
@@ -451,7 +440,7 @@ def faces_it(ground: GroundModel, own: int, segment: int, x: float, z: float) ->
     below the own face, then. Others may from outside only, and within reach.
     """
     if abs(segment - own) == 1:
-        return turn_at(ground, max(own, segment)) > FLAT
+        return turn_at(ground, max(own, segment)) > STRAIGHT_GROUND
     begin, normal = ground.vertices[segment], ground.normal[segment]
     outside = (x - begin[0]) * normal[0] + (z - begin[1]) * normal[1] >= 0.0
     return outside and begin[0] <= x + REACH and ground.vertices[segment + 1, 0] >= x - REACH
@@ -496,7 +485,7 @@ def second_contact(
             corner = segment + 1 if behind else segment
             dx, dz = x - ground.vertices[corner, 0], z - ground.vertices[corner, 1]
             distance = np.sqrt(dx * dx + dz * dz)
-            if 1e-12 < distance < nearest and turn_at(ground, corner) < 0.0:
+            if AT_THE_CORNER < distance < nearest and turn_at(ground, corner) < 0.0:
                 nearest, owner = distance, segment
                 normal[0], normal[1] = dx / distance, dz / distance
         else:

@@ -8,7 +8,6 @@ impulse with ``w = G lambda + b`` and, at every contact, ``0 <= w_n _|_ lambda_n
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +28,7 @@ from heelstrike.contact.workspace import (
     Integers,
 )
 from heelstrike.errors import ContactProblemError
+from heelstrike.field_texts import dataclass
 
 
 @kernel
@@ -73,25 +73,17 @@ def solve_contact_kernel(
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """The solution of a contact problem, with the proof of what it is worth.
-
-    Attributes
-    ----------
-    impulse : (nc, 2) float
-        Normal and tangential impulse (or force) on the robot at each contact; where several
-        have the same effect, the one of least norm.
-    velocity : (nc, 2) float
-        Normal and tangential velocity (or acceleration) after it, ``G @ impulse + free``.
-    mode : tuple of ContactMode
-        What each contact does.
-    certificate : Certificate
-        Status and residuals; look at ``certificate.valid`` before using the impulse.
-    """
+    """The solution of a contact problem, with the proof of what it is worth."""
 
     impulse: Floats
+    """(nc, 2) Normal and tangential impulse (or force) on the robot at each contact; where several
+    have the same effect, the one of least norm."""
     velocity: Floats
+    """(nc, 2) Normal and tangential velocity (or acceleration) after it, ``G @ impulse + free``."""
     mode: tuple[ContactMode, ...]
+    """What each contact does."""
     certificate: Certificate
+    """Status and residuals; look at ``certificate.valid`` before using the impulse."""
 
 
 KEPT_CONTACTS = 16

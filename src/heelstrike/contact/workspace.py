@@ -17,340 +17,220 @@ Integers = NDArray[np.int64]
 
 
 class ContactProblem(Bundle):
-    """A contact problem of up to nc contacts.
-
-    Attributes
-    ----------
-    count : int
-        Number of contacts; the leading blocks of the arrays are used.
-    delassus : (2 nc, 2 nc) float
-        Delassus matrix, symmetric.
-    free : (2 nc,) float
-        Free velocity (or acceleration), the free term b.
-    friction : (nc,) float
-        Friction coefficient of each contact: 1 for an interval, zero for lines and half-lines.
-    bound : (nc,) float
-        Largest tangential impulse of each interval.
-    set : (nc,) int
-        Where its impulses may lie; see :mod:`heelstrike.contact.sets`.
-    """
+    """A contact problem of up to nc contacts."""
 
     count: int = cell(int)
+    """Number of contacts; the leading blocks of the arrays are used."""
     delassus: Floats = array("2 nc", "2 nc")
+    """Delassus matrix, symmetric."""
     free: Floats = array("2 nc")
+    """Free velocity (or acceleration), the free term b."""
     friction: Floats = array("nc")
+    """Friction coefficient of each contact: 1 for an interval, zero for lines and half-lines."""
     bound: Floats = array("nc")
+    """Largest tangential impulse of each interval."""
     set: Integers = array("nc", of=int)
+    """Where its impulses may lie; see :mod:`heelstrike.contact.sets`."""
 
 
 class ContactAnswer(Bundle):
-    """What contacts do, and the impulses that make them.
-
-    Attributes
-    ----------
-    mode : (nc,) int
-        Contact modes.
-    impulse, velocity : (2 nc,) float
-    residual : (3,) float
-        Complementarity, cone and penetration, relative (see ``Certificate``).
-    rest : float
-        Velocities below this times the yardstick's ``root`` count as zero.
-    """
+    """What contacts do, and the impulses that make them."""
 
     mode: Integers = array("nc", of=int)
+    """Contact modes."""
     impulse: Floats = array("2 nc")
     velocity: Floats = array("2 nc")
     residual: Floats = array(3)
+    """Complementarity, cone and penetration, relative (see ``Certificate``)."""
     rest: float = cell(float)
+    """Velocities below this times the yardstick's ``root`` count as zero."""
 
 
 class Settings(Bundle):
-    """What the caller may choose.
-
-    Attributes
-    ----------
-    tolerance : float
-        Largest residual that is certified, 1e-9 unless changed.
-    floor : float
-        Smallest size of the data that residuals are set against, zero unless changed.
-    amendments : int
-        How often the modes of the answer are amended before a solver is asked; zero where they are
-        no guess.
-    patient : int
-        Not zero if an answer that is certified, and not clean, is compared with those of all
-        solvers, as where contacts jam, and one that is a little sharper is quite another.
-    skewed : int
-        Not zero if the matrix may be asymmetric, as in a general complementarity problem.
-    """
+    """What the caller may choose."""
 
     tolerance: float = cell(float)
+    """Largest residual that is certified, 1e-9 unless changed."""
     floor: float = cell(float)
+    """Smallest size of the data that residuals are set against, zero unless changed."""
     amendments: int = cell(int)
+    """How often the modes of the answer are amended before a solver is asked; zero where they are
+    no guess."""
     patient: int = cell(int)
+    """Not zero if an answer that is certified, and not clean, is compared with those of all
+    solvers, as where contacts jam, and one that is a little sharper is quite another."""
     skewed: int = cell(int)
+    """Not zero if the matrix may be asymmetric, as in a general complementarity problem."""
 
 
 class Tally(Bundle):
-    """Counts: the first three of the last solve, the others of all until the caller clears them.
-
-    Attributes
-    ----------
-    iterations, solver, last_fallbacks : int
-        Iterations of all solvers; code of the one that succeeded; how many failed before it.
-    solves, shortcuts, fallbacks, failures, combinations, relaxed : int
-        ``shortcuts`` are the solves answered by the modes that were guessed; ``combinations`` those
-        that went on to the last resort; ``relaxed`` those that ask for less than a problem without
-        a solution did, which the caller counts.
-    """
+    """Counts: the first three of the last solve, the others of all until the caller clears them."""
 
     iterations: int = cell(int)
     solver: int = cell(int)
     last_fallbacks: int = cell(int)
+    """iterations, solver, last_fallbacks: Iterations of all solvers; code of the one that
+    succeeded; how many failed before it."""
     solves: int = cell(int)
     shortcuts: int = cell(int)
     fallbacks: int = cell(int)
     failures: int = cell(int)
     combinations: int = cell(int)
     relaxed: int = cell(int)
+    """solves, shortcuts, fallbacks, failures, combinations, relaxed: ``shortcuts`` are the solves
+    answered by the modes that were guessed; ``combinations`` those that went on to the last resort;
+    ``relaxed`` those that ask for less than a problem without a solution did, which the caller
+    counts."""
 
 
 class Yardstick(Bundle):
-    """What a certificate measures with, and found out about rounding.
-
-    Attributes
-    ----------
-    slope : (nc,) float
-        Tangential over normal impulse where sliding is prescribed, else zero.
-    root : (2 nc,) float
-        Root of the diagonal of each row: velocity per unit of scaled impulse.
-    unit : float
-        Size of the data.
-    effort : float
-        The velocities that cancel, in units of the data's.
-    rounding : float
-        What rounding may hide from it.
-    """
+    """What a certificate measures with, and found out about rounding."""
 
     slope: Floats = array("nc")
+    """Tangential over normal impulse where sliding is prescribed, else zero."""
     root: Floats = array("2 nc")
+    """Root of the diagonal of each row: velocity per unit of scaled impulse."""
     unit: float = cell(float)
+    """Size of the data."""
     effort: float = cell(float)
+    """The velocities that cancel, in units of the data's."""
     rounding: float = cell(float)
+    """What rounding may hide from it."""
 
 
 class StickingRows(Bundle):
-    """The rows that shall have no velocity, where all contacts stick or are open.
-
-    Attributes
-    ----------
-    row : (2 nc,) int
-        Row of the problem of each equation.
-    equation : (2 nc,) int
-        Equation of each row of the problem, -1 for none.
-    sharers : (2 nc,) float
-        How many rows share each equation.
-    pulled : (nc,) int
-        Whether each contact would have pulled in an attempt before.
-    x, pivot : (2 nc,) float
-        Solution; pivots, and a right side.
-    order : (2 nc,) int
-        The equation that has each place in the elimination.
-    span : (2 nc,) int
-        How many columns the row of the factor in each place has.
-    factor, square : (2 nc, 2 nc) float
-    lower_half : (any,) float
-        Matrix of a small system.
-    spare : (2 nc,) float
-        Solution in the order of the elimination.
-    programs : (any,) int
-        Addresses of the programs that solve small systems, by size; zero where there is none.
-    """
+    """The rows that shall have no velocity, where all contacts stick or are open."""
 
     row: Integers = array("2 nc", of=int)
+    """Row of the problem of each equation."""
     equation: Integers = array("2 nc", of=int)
+    """Equation of each row of the problem, -1 for none."""
     sharers: Floats = array("2 nc")
+    """How many rows share each equation."""
     pulled: Integers = array("nc", of=int)
+    """Whether each contact would have pulled in an attempt before."""
     x: Floats = array("2 nc")
     pivot: Floats = array("2 nc")
+    """x, pivot: Solution; pivots, and a right side."""
     order: Integers = array("2 nc", of=int)
+    """The equation that has each place in the elimination."""
     span: Integers = array("2 nc", of=int)
+    """How many columns the row of the factor in each place has."""
     factor: Floats = array("2 nc", "2 nc")
     square: Floats = array("2 nc", "2 nc")
     lower_half: Floats = array("half")
+    """Matrix of a small system."""
     spare: Floats = array("2 nc")
+    """Solution in the order of the elimination."""
     programs: Integers = array("sizes", of=int, address=True)
+    """Addresses of the programs that solve small systems, by size; zero where there is none."""
 
 
 class ReducedProblem(Bundle):
-    """The scaled problem that the solvers work on.
-
-    Attributes
-    ----------
-    unknowns : int
-    normal, tangent : (nc,) int
-        Unknowns of each contact; the tangential one is -1 where there is none.
-    prescribed : (nc,) int
-        The mode the caller prescribes, ``OPEN`` for none.
-    set : (nc,) int
-        Where the impulses of each contact may lie.
-    cone : (nc,) float
-        Friction coefficient of the scaled problem.
-    source : (2 nc,) int
-        Row of the problem of each unknown.
-    scale, offset : (2 nc,) float
-        Impulse per unit of each unknown; scaled free velocity.
-    matrix : (2 nc, 2 nc) float
-    """
+    """The scaled problem that the solvers work on."""
 
     unknowns: int = cell(int)
     normal: Integers = array("nc", of=int)
     tangent: Integers = array("nc", of=int)
+    """normal, tangent: Unknowns of each contact; the tangential one is -1 where there is none."""
     prescribed: Integers = array("nc", of=int)
+    """The mode the caller prescribes, ``OPEN`` for none."""
     set: Integers = array("nc", of=int)
+    """Where the impulses of each contact may lie."""
     cone: Floats = array("nc")
+    """Friction coefficient of the scaled problem."""
     source: Integers = array("2 nc", of=int)
+    """Row of the problem of each unknown."""
     scale: Floats = array("2 nc")
     offset: Floats = array("2 nc")
+    """scale, offset: Impulse per unit of each unknown; scaled free velocity."""
     matrix: Floats = array("2 nc", "2 nc")
 
 
 class Dictionary(Bundle):
-    """Basic variables in terms of the others, with whose names go to and fro.
-
-    Attributes
-    ----------
-    status : int
-        How the last pivots on it ended.
-    tableau : (pairs, pairs + 2) float
-        Constant and coefficients of each basic variable.
-    row_label, column_label : (pairs,), (pairs + 2,) int
-        The variable that each row and column holds.
-    place : (2 pairs + 1,) int
-        Row of each variable, or minus its column.
-    """
+    """Basic variables in terms of the others, with whose names go to and fro."""
 
     status: int = cell(int)
+    """How the last pivots on it ended."""
     tableau: Floats = array("pairs", "pairs + 2")
+    """Constant and coefficients of each basic variable."""
     row_label: Integers = array("pairs", of=int)
     column_label: Integers = array("pairs + 2", of=int)
+    """row_label, column_label: The variable that each row and column holds."""
     place: Integers = array("2 pairs + 1", of=int)
+    """Row of each variable, or minus its column."""
 
 
 class Equations(Bundle):
-    """The equations of the modes under trial, their solution, and along what it is free.
-
-    Attributes
-    ----------
-    size : int
-        Number of equations.
-    unknown : (2 nc,) int
-        The unknown that each belongs to.
-    lean : (2 nc,) float
-        Tangential over normal impulse at a slipping contact, else zero.
-    weight : (2 nc,) float
-        Length of the impulse per unit of its unknown.
-    point, before : (2 nc,) float
-        Its unknown, in units of impulse; the same before the last refinement.
-    tableau : (2 nc, 2 nc + 1) float
-        Constant and coefficients, which elimination turns into the solution.
-    pivot_row : (2 nc,) int
-        The row that holds the unknown of each equation, -1 for none: it is free.
-    taken : (2 nc,) int
-        Whether each row has been pivoted on.
-    basis : (2 nc, 2 nc) float
-        Free directions, one a row.
-    moves : (2 nc,) int
-        Whether each free direction changes a velocity.
-    image : (2 nc, 2 nc) float
-        The velocities it causes.
-    edge : (2 nc, 2 nc + 2) float
-        Edges of the cones in terms of the free directions.
-    step : (2 nc,) float
-        A step along them; also scaled velocities.
-    dual : Dictionary
-        Of the least-norm split.
-    """
+    """The equations of the modes under trial, their solution, and along what it is free."""
 
     size: int = cell(int)
+    """Number of equations."""
     unknown: Integers = array("2 nc", of=int)
+    """The unknown that each belongs to."""
     lean: Floats = array("2 nc")
+    """Tangential over normal impulse at a slipping contact, else zero."""
     weight: Floats = array("2 nc")
+    """Length of the impulse per unit of its unknown."""
     point: Floats = array("2 nc")
     before: Floats = array("2 nc")
+    """point, before: Its unknown, in units of impulse; the same before the last refinement."""
     tableau: Floats = array("2 nc", "2 nc + 1")
+    """Constant and coefficients, which elimination turns into the solution."""
     pivot_row: Integers = array("2 nc", of=int)
+    """The row that holds the unknown of each equation, -1 for none: it is free."""
     taken: Integers = array("2 nc", of=int)
+    """Whether each row has been pivoted on."""
     basis: Floats = array("2 nc", "2 nc")
+    """Free directions, one a row."""
     moves: Integers = array("2 nc", of=int)
+    """Whether each free direction changes a velocity."""
     image: Floats = array("2 nc", "2 nc")
+    """The velocities it causes."""
     edge: Floats = array("2 nc", "2 nc + 2")
+    """Edges of the cones in terms of the free directions."""
     step: Floats = array("2 nc")
+    """A step along them; also scaled velocities."""
     dual: Dictionary = part(Dictionary)
+    """Of the least-norm split."""
 
 
 class Iteration(Bundle):
-    """An iterate of the reduced problem.
-
-    Attributes
-    ----------
-    number : int
-        Iterations so far.
-    x, speed : (2 nc,) float
-        Unknowns and their scaled velocities.
-    value, slope : (2 nc,), (2 nc, 2 nc) float
-        What is left of the equations, and their Jacobian.
-    step, square : (2 nc,), (2 nc, 2 nc) float
-        Newton's step, and the matrix it is solved with.
-    """
+    """An iterate of the reduced problem."""
 
     number: int = cell(int)
+    """Iterations so far."""
     x: Floats = array("2 nc")
     speed: Floats = array("2 nc")
+    """x, speed: Unknowns and their scaled velocities."""
     value: Floats = array("2 nc")
     slope: Floats = array("2 nc", "2 nc")
+    """value, slope: What is left of the equations, and their Jacobian."""
     step: Floats = array("2 nc")
     square: Floats = array("2 nc", "2 nc")
+    """step, square: Newton's step, and the matrix it is solved with."""
 
 
 class Combinations(Bundle):
-    """How far the combinations of modes have been tried.
-
-    Attributes
-    ----------
-    base : (nc,) int
-        Modes of the combination that is varied.
-    place : int
-        Number of the next combination, or of the next change of the base.
-    tried, starts : int
-        Combinations tried; bases started from.
-    least : float
-        Residual of the base.
-    """
+    """How far the combinations of modes have been tried."""
 
     base: Integers = array("nc", of=int)
+    """Modes of the combination that is varied."""
     place: int = cell(int)
+    """Number of the next combination, or of the next change of the base."""
     tried: int = cell(int)
     starts: int = cell(int)
+    """tried, starts: Combinations tried; bases started from."""
     least: float = cell(float)
+    """Residual of the base."""
 
 
 class ContactWorkspace(Bundle):
-    """Buffers of the contact kernels for up to nc contacts (d = 2).
-
-    Attributes
-    ----------
-    settings, tally : Settings, Tally
-        What the caller may choose and read.
-    yardstick, sticking, reduced, equations, lemke, iteration, combinations
-        Memory of the certificate and of each way to solve.
-    trial : ContactAnswer
-        Modes under trial, and their answer.
-    solvers : (1,) int64
-        Address of the machine code that tries the solvers in turn, shared by all workspaces.
-    """
+    """Buffers of the contact kernels for up to nc contacts (d = 2)."""
 
     settings: Settings = part(Settings)
     tally: Tally = part(Tally)
+    """settings, tally: What the caller may choose and read."""
     yardstick: Yardstick = part(Yardstick)
     sticking: StickingRows = part(StickingRows)
     reduced: ReducedProblem = part(ReducedProblem)
@@ -358,5 +238,9 @@ class ContactWorkspace(Bundle):
     lemke: Dictionary = part(Dictionary)
     iteration: Iteration = part(Iteration)
     combinations: Combinations = part(Combinations)
+    """yardstick, sticking, reduced, equations, lemke, iteration, combinations: Memory of the
+    certificate and of each way to solve."""
     trial: ContactAnswer = part(ContactAnswer)
+    """Modes under trial, and their answer."""
     solvers: Integers = array(1, of=int, address=True)
+    """Address of the machine code that tries the solvers in turn, shared by all workspaces."""

@@ -21,41 +21,26 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
 
 class Parameters(Bundle):
-    """Numbers of the actuators.
-
-    Attributes
-    ----------
-    late : int
-        Calls by which torques come late.
-    share : float
-        Part of what is missing of a torque that is there after a period, at its mean.
-    left : float
-        Part of it that is still missing at the end of the period.
-    efficiency : float
-        Of the gears.
-    """
+    """Numbers of the actuators."""
 
     late: int = number(int)
+    """Calls by which torques come late."""
     share: float = number(float)
+    """Part of what is missing of a torque that is there after a period, at its mean."""
     left: float = number(float)
+    """Part of it that is still missing at the end of the period."""
     efficiency: float = number(float)
+    """Of the gears."""
 
 
 class Memory(Shown):
-    """What the actuators remember.
-
-    Attributes
-    ----------
-    calls : int
-    asked : (late + 1, nu) float
-        Torques of the last calls, a ring.
-    present : (nu,) float
-        Torque of the motors now.
-    """
+    """What the actuators remember."""
 
     calls: int = cell(int)
     asked: Floats = array("late + 1", "nu")
+    """Torques of the last calls, a ring."""
     present: Floats = array("nu")
+    """Torque of the motors now."""
 
 
 class Log(Bundle):

@@ -39,32 +39,20 @@ PERIOD = 1e-3
 
 
 class Turn(Bundle):
-    """When the controller inside is called.
-
-    Attributes
-    ----------
-    every : int
-        Calls of the shell for one of the controller inside.
-    period, inside : float
-        Seconds between two calls of either.
-    """
+    """When the controller inside is called."""
 
     every: int = number(int)
+    """Calls of the shell for one of the controller inside."""
     period: float = number(float)
     inside: float = number(float)
+    """period, inside: Seconds between two calls of either."""
 
 
 class Held(Bundle):
-    """What the controller inside asked for last.
-
-    Attributes
-    ----------
-    calls : int
-        Calls of the shell.
-    torque : (nu,) float
-    """
+    """What the controller inside asked for last."""
 
     calls: int = cell(int)
+    """Calls of the shell."""
     torque: Floats = array("nu")
 
 

@@ -34,46 +34,31 @@ ENDLESS = 1e9
 
 
 class Bounds(Bundle):
-    """What is to be kept to.
-
-    Attributes
-    ----------
-    friction, press : float
-        Friction that is counted on; normal force that is kept on the foot (N).
-    lower, upper : (nu,) float
-        Ranges of the joints (rad).
-    """
+    """What is to be kept to."""
 
     friction: float = number(float)
     press: float = number(float)
+    """friction, press: Friction that is counted on; normal force that is kept on the foot (N)."""
     lower: Floats = array("nu")
     upper: Floats = array("nu")
+    """lower, upper: Ranges of the joints (rad)."""
 
 
 class Bearable(Bundle):
-    """What is wanted, and the programme of what can be had.
-
-    Attributes
-    ----------
-    wanted, slope : (nu,) float
-        The joints are to be accelerated by wanted + θ̈ slope, θ the phase.
-    program : Program
-        Its unknowns are changes of `wanted`.
-    asked, share : (nv,) and (nv, nu) float
-        Generalised force that gives what is wanted, and how it changes.
-    turned : (nu,) float
-        How θ̈ changes.
-    torque : (nu,) float
-        Scratch.
-    """
+    """What is wanted, and the programme of what can be had."""
 
     wanted: Floats = array("nu")
     slope: Floats = array("nu")
+    """wanted, slope: The joints are to be accelerated by wanted + θ̈ slope, θ the phase."""
     program: Program = part(Program)
+    """Its unknowns are changes of `wanted`."""
     asked: Floats = array("nv")
     share: Floats = array("nv", "nu")
+    """asked, share: Generalised force that gives what is wanted, and how it changes."""
     turned: Floats = array("nu")
+    """How θ̈ changes."""
     torque: Floats = array("nu")
+    """Scratch."""
 
 
 @kernel

@@ -7,8 +7,6 @@ those that do this while the ground holds the stance foot; see
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
@@ -23,6 +21,7 @@ from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.queries.loops import loop_jacobian
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.polynomials import motion_in_piece, place_in_step
 from heelstrike.robot.loops import refuse_loops
@@ -44,101 +43,69 @@ READINGS = 4
 """Samples of an encoder that a velocity is estimated from."""
 
 
-class Landing(Bundle):
-    """When a foot that touches without coming flat counts as landed.
+ALMOST_DUE = 1e-6
+"""Part of an encoder's period by which rounding of times may make a reading early."""
 
-    Attributes
-    ----------
-    landing : float
-        After this time (s).
-    """
+
+class Landing(Bundle):
+    """When a foot that touches without coming flat counts as landed."""
 
     landing: float = number(float)
+    """After this time (s)."""
 
 
 class StepTiming(Landing):
-    """When a step may end.
-
-    Attributes
-    ----------
-    earliest : float
-        A touchdown counts only after this time in a step (s).
-    """
+    """When a step may end."""
 
     earliest: float = number(float)
+    """A touchdown counts only after this time in a step (s)."""
 
 
 class Stance(Bundle):
-    """The foot that stands.
-
-    Attributes
-    ----------
-    stance : int
-        Which it is.
-    start : float
-        When its step began (s).
-    landed : int
-        Whether it is past the impact that made it the stance foot.
-    samples : int
-        Encoder readings since then.
-    """
+    """The foot that stands."""
 
     stance: int = cell(int)
+    """Which it is."""
     start: float = cell(float)
+    """When its step began (s)."""
     landed: int = cell(int)
+    """Whether it is past the impact that made it the stance foot."""
     samples: int = cell(int)
+    """Encoder readings since then."""
 
 
 class Parameters(StepTiming):
-    """Numbers of the law.
-
-    Attributes
-    ----------
-    kp, kd : (nu,) float
-        Gains of eq. 38 (1/s², 1/s).
-    breakpoints : (pieces + 1,) float
-        Times in a step between which one polynomial holds (s).
-    coefficients : (2, pieces, terms, nu) float
-        For either stance foot the joints' polynomials, lowest power first.
-    latest : float
-        The reference goes on along its polynomials until this time in a step (s).
-    on_points : int
-        Whether the feet are points.
-    encoder_period, encoder_resolution : float
-        Time between encoder samples (s), negative for exact measurement; smallest difference of an
-        encoder's angles (rad), zero for exact.
-    pitch, pitch_sign : int and float
-        Coordinate and axis sign of the trunk's pitch.
-    """
+    """Numbers of the law."""
 
     kp: Floats = array("nu")
     kd: Floats = array("nu")
+    """kp, kd: Gains of eq. 38 (1/s², 1/s)."""
     breakpoints: Floats = array("pieces + 1")
+    """Times in a step between which one polynomial holds (s)."""
     coefficients: Floats = array(2, "pieces", "terms", "nu")
+    """For either stance foot the joints' polynomials, lowest power first."""
     latest: float = number(float)
+    """The reference goes on along its polynomials until this time in a step (s)."""
     on_points: int = number(int)
+    """Whether the feet are points."""
     encoder_period: float = number(float)
     encoder_resolution: float = number(float)
+    """encoder_period, encoder_resolution: Time between encoder samples (s), negative for exact
+    measurement; smallest difference of an encoder's angles (rad), zero for exact."""
     pitch: int = number(int)
     pitch_sign: float = number(float)
+    """pitch, pitch_sign: Coordinate and axis sign of the trunk's pitch."""
 
 
 class Memory(Stance):
-    """What the law remembers.
-
-    Attributes
-    ----------
-    sampled : float
-        When the newest encoder reading was taken (s).
-    readings : (4, nu) float
-        Readings, the newest first.
-    acceleration : (nu,) float
-        Wanted of the joints.
-    """
+    """What the law remembers."""
 
     sampled: float = cell(float)
+    """When the newest encoder reading was taken (s)."""
     readings: Floats = array(READINGS, "nu")
+    """Readings, the newest first."""
     acceleration: Floats = array("nu")
+    """Wanted of the joints."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,19 +116,14 @@ class Encoder:
     of the cubic through the last four. A touchdown makes velocities jump: samples before it are
     forgotten, and the reference velocity stands in until there are two again. The trunk follows
     from the stance foot, taken to be flat and at rest (eq. 28, 29).
-
-    Parameters
-    ----------
-    period : float
-        Time between samples in seconds; choose a whole number of control periods.
-    resolution : float
-        Smallest difference between two readings in rad; zero for exact readings. The default is
-        that of 4096 counts a turn on a motor behind a gear of 1024. Coarser readings make noisy
-        velocities, and gains that suit exact ones then tip the stance foot.
     """
 
     period: float = 1e-3
+    """Time between samples in seconds; choose a whole number of control periods."""
     resolution: float = 2.0 * np.pi / 2**22
+    """Smallest difference between two readings in rad; zero for exact readings. The default is that
+    of 4096 counts a turn on a motor behind a gear of 1024. Coarser readings make noisy velocities,
+    and gains that suit exact ones then tip the stance foot."""
 
     def __post_init__(self) -> None:
         check_fields(self, ControllerError)
@@ -228,7 +190,7 @@ def has_landed(
 def read_encoders(t: float, state: ControlState, parameters: Parameters, memory: Memory) -> None:
     """Take a sample of the rounded joint positions when one is due."""
     due = memory.sampled + parameters.encoder_period
-    if memory.samples > 0 and t < due - 1e-6 * parameters.encoder_period:
+    if memory.samples > 0 and t < due - ALMOST_DUE * parameters.encoder_period:
         return
     resolution = parameters.encoder_resolution
     readings = memory.readings

@@ -53,51 +53,32 @@ PITCH = 2
 
 
 class Parameters(Bundle):
-    """Numbers of the estimator.
-
-    Attributes
-    ----------
-    period : float
-        Seconds between two calls.
-    position_gain, velocity_gain : float
-        Parts of an error of a joint by which its position, and its speed times the period, are
-        corrected.
-    threshold : float
-        Normal force from which a contact point counts as standing, as a part of the weight.
-    up : (2,) float
-        Direction along which feet stand on discs.
-    """
+    """Numbers of the estimator."""
 
     period: float = number(float)
+    """Seconds between two calls."""
     position_gain: float = number(float)
     velocity_gain: float = number(float)
+    """position_gain, velocity_gain: Parts of an error of a joint by which its position, and its
+    speed times the period, are corrected."""
     threshold: float = number(float)
+    """Normal force from which a contact point counts as standing, as a part of the weight."""
     up: Floats = array(2)
+    """Direction along which feet stand on discs."""
 
 
 class Memory(Shown):
-    """What the estimator remembers: the estimate is what it shows.
-
-    Attributes
-    ----------
-    calls : int
-    floating : int
-        Whether the first coordinates are x, z and pitch of a trunk.
-    torque : (nu,) float
-        Asked for at the last call.
-    standing : (nc,) int
-        Whether each contact point stands.
-    anchor : (nc, 2) float
-        Where it came to stand.
-    matrix, factor, force, passive, point, rows, columns, small, right
-        Scratch.
-    """
+    """What the estimator remembers: the estimate is what it shows."""
 
     calls: int = cell(int)
     floating: int = cell(int)
+    """Whether the first coordinates are x, z and pitch of a trunk."""
     torque: Floats = array("nu")
+    """Asked for at the last call."""
     standing: Integers = array("nc", of=int)
+    """Whether each contact point stands."""
     anchor: Floats = array("nc", "axes")
+    """Where it came to stand."""
     matrix: Floats = array("nv", "nv")
     factor: Floats = array("nv", "nv")
     force: Floats = array("nv")
@@ -107,6 +88,7 @@ class Memory(Shown):
     columns: Floats = array("held", "nv")
     small: Floats = array("held", "held")
     right: Floats = array("held")
+    """matrix, factor, force, passive, point, rows, columns, small, right: Scratch."""
 
 
 class Log(Bundle):

@@ -25,22 +25,15 @@ EARLY = 1e-12
 
 
 class Parameters(Bundle):
-    """Numbers of the law.
-
-    Attributes
-    ----------
-    kp, kd : (nu,) float
-        Stiffness (N m/rad) and damping (N m s/rad).
-    begins : (pieces,) float
-        When each piece begins, in s.
-    coefficients : (pieces, nu, terms) float
-        Those of c(t) in the time since then, lowest power first.
-    """
+    """Numbers of the law."""
 
     kp: Floats = array("nu")
     kd: Floats = array("nu")
+    """kp, kd: Stiffness (N m/rad) and damping (N m s/rad)."""
     begins: Floats = array("pieces")
+    """When each piece begins, in s."""
     coefficients: Floats = array("pieces", "nu", "terms")
+    """Those of c(t) in the time since then, lowest power first."""
 
 
 @controller

@@ -53,42 +53,29 @@ class Feedforward(StrEnum):
 
 
 class Parameters(StepTiming):
-    """Numbers of the law.
-
-    Attributes
-    ----------
-    kp, kd : (nu,) float
-        Stiffness (N m/rad) and damping (N m s/rad).
-    breakpoints : (pieces + 1,) float
-    coefficients : (2, pieces, terms, nu) float
-        The gait, as in :mod:`heelstrike.control.computed_torque`.
-    latest : float
-        The reference goes on along its polynomials until this time in a step (s).
-    weight, motion : int
-        Whether the weight, and whether velocities and accelerations are fed forward.
-    """
+    """Numbers of the law."""
 
     kp: Floats = array("nu")
     kd: Floats = array("nu")
+    """kp, kd: Stiffness (N m/rad) and damping (N m s/rad)."""
     breakpoints: Floats = array("pieces + 1")
     coefficients: Floats = array(2, "pieces", "terms", "nu")
+    """The gait, as in :mod:`heelstrike.control.computed_torque`."""
     latest: float = number(float)
+    """The reference goes on along its polynomials until this time in a step (s)."""
     weight: int = number(int)
     motion: int = number(int)
+    """weight, motion: Whether the weight, and whether velocities and accelerations are fed
+    forward."""
 
 
 class Memory(Stance):
-    """What the law remembers.
-
-    Attributes
-    ----------
-    position, velocity, acceleration : (nu,) float
-        Of the gait.
-    """
+    """What the law remembers."""
 
     position: Floats = array("nu")
     velocity: Floats = array("nu")
     acceleration: Floats = array("nu")
+    """position, velocity, acceleration: Of the gait."""
 
 
 @controller

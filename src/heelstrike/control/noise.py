@@ -60,11 +60,6 @@ class RandomNumbers(Bundle):
     Kept with the memory: a simulation that is restored draws what it would have drawn. All zeros,
     as a memory begins, are the seed 0; others come from :meth:`seeded`.
 
-    Attributes
-    ----------
-    seeds : (2,) int
-        Its state.
-
     Examples
     --------
     >>> from heelstrike.control import RandomNumbers
@@ -73,6 +68,7 @@ class RandomNumbers(Bundle):
     """
 
     seeds: Integers = array(2, of=int)
+    """Its state."""
 
     @classmethod
     def seeded(cls, seed: int) -> RandomNumbers:

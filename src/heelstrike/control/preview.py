@@ -8,41 +8,31 @@ weighs the error of p against jerk and looks at the reference ahead of time.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve_discrete_are
 
 from heelstrike.errors import ControllerError
+from heelstrike.field_texts import dataclass
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PreviewControl:
-    """Gains of u = −G_I Σ e − G_x x − Σⱼ G_d(j) p_ref(k + j).
-
-    Attributes
-    ----------
-    period : float
-        Time between two samples, in s.
-    height, gravity : float
-        Height of the centre of mass above the ground (m), and gravity (m/s²).
-    sum_gain : float
-        G_I, in 1/s³.
-    state_gain : (3,) float
-        G_x, of position, velocity and acceleration (1/s³, 1/s², 1/s).
-    preview_gain : (horizon,) float
-        G_d(1), G_d(2), …, of the reference so many samples ahead, in 1/s³.
-    """
+    """Gains of u = −G_I Σ e − G_x x − Σⱼ G_d(j) p_ref(k + j)."""
 
     period: float
+    """Time between two samples, in s."""
     height: float
     gravity: float
+    """height, gravity: Height of the centre of mass above the ground (m), and gravity (m/s²)."""
     sum_gain: float
+    """G_I, in 1/s³."""
     state_gain: Floats
+    """(3,) G_x, of position, velocity and acceleration (1/s³, 1/s², 1/s)."""
     preview_gain: Floats
+    """(horizon,) G_d(1), G_d(2), …, of the reference so many samples ahead, in 1/s³."""
 
     @property
     def closed_loop(self) -> Floats:

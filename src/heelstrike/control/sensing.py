@@ -8,7 +8,7 @@ log.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.control.around import PERIOD, Around, Shell, Shown, inside
 from heelstrike.control.noise import normal, seeded
 from heelstrike.errors import ControllerError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts, Controller
@@ -26,26 +27,18 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState, contr
 
 @dataclass(frozen=True, kw_only=True)
 class Encoders:
-    """Encoders of the actuated joints; velocities are filtered differences of their readings.
-
-    Parameters
-    ----------
-    bits : int, optional
-        Counts a turn of the joint, 2 to the power of this; by default angles are not rounded.
-    noise, bias : float
-        Standard deviation of each reading, and of the constant error of each joint, which is drawn
-        once (rad).
-    rate : float, optional
-        Readings a second, at most one a period of the shell; by default one each.
-    cutoff : float, optional
-        Cut-off frequency of the first-order filter of the differences (Hz); none by default.
-    """
+    """Encoders of the actuated joints; velocities are filtered differences of their readings."""
 
     bits: int | None = None
+    """Counts a turn of the joint, 2 to the power of this; by default angles are not rounded."""
     noise: float = 0.0
     bias: float = 0.0
+    """noise, bias: Standard deviation of each reading, and of the constant error of each joint,
+    which is drawn once (rad)."""
     rate: float | None = None
+    """Readings a second, at most one a period of the shell; by default one each."""
     cutoff: float | None = None
+    """Cut-off frequency of the first-order filter of the differences (Hz); none by default."""
 
     def __post_init__(self) -> None:
         _check(self)
@@ -55,23 +48,17 @@ class Encoders:
 
 @dataclass(frozen=True, kw_only=True)
 class InertialUnit:
-    """Pitch of the trunk and its rate, as an imu measurement unit tells them.
-
-    Parameters
-    ----------
-    noise, bias : float
-        Standard deviation of each reading of the pitch, and of its constant error (rad).
-    rate_noise, rate_bias : float
-        The same of its rate (rad/s).
-    rate : float, optional
-        Readings a second; by default one a period of the shell.
-    """
+    """Pitch of the trunk and its rate, as an imu measurement unit tells them."""
 
     noise: float = 0.0
     bias: float = 0.0
+    """noise, bias: Standard deviation of each reading of the pitch, and of its constant error
+    (rad)."""
     rate_noise: float = 0.0
     rate_bias: float = 0.0
+    """rate_noise, rate_bias: The same of its rate (rad/s)."""
     rate: float | None = None
+    """Readings a second; by default one a period of the shell."""
 
     def __post_init__(self) -> None:
         _check(self)
@@ -79,28 +66,21 @@ class InertialUnit:
 
 @dataclass(frozen=True, kw_only=True)
 class FootSensors:
-    """Forces at the contact points as sensors in the feet tell them, or switches.
-
-    Parameters
-    ----------
-    noise, bias : float
-        Standard deviation of each reading, and of the constant error of each component (N).
-    threshold : float, optional
-        Normal forces that are read as less than this are read as none, and so is what is
-        tangential then (N); by default five times noise and bias together, so that a foot in the
-        air reads none.
-    switches : bool
-        Whether there is only a switch under each point: the normal force reads 1 or 0, the
-        tangential one 0.
-    rate : float, optional
-        Readings a second; by default one a period of the shell.
-    """
+    """Forces at the contact points as sensors in the feet tell them, or switches."""
 
     noise: float = 0.0
     bias: float = 0.0
+    """noise, bias: Standard deviation of each reading, and of the constant error of each component
+    (N)."""
     threshold: float | None = None
+    """Normal forces that are read as less than this are read as none, and so is what is tangential
+    then (N); by default five times noise and bias together, so that a foot in the air reads
+    none."""
     switches: bool = False
+    """Whether there is only a switch under each point: the normal force reads 1 or 0, the
+    tangential one 0."""
     rate: float | None = None
+    """Readings a second; by default one a period of the shell."""
 
     def __post_init__(self) -> None:
         _check(self)
@@ -126,31 +106,20 @@ def _check(sensor: object) -> None:
 
 
 class Parameters(Bundle):
-    """Numbers of the sensors.
-
-    Attributes
-    ----------
-    period : float
-        Seconds between two calls.
-    encoder_every, inertial_every, foot_every : int
-        Calls between two readings; 0 for no sensor.
-    resolution, encoder_noise, encoder_bias, smoothing
-        Of the encoders (rad); share of a new difference in the velocity.
-    pitch_noise, pitch_bias, rate_noise, rate_bias : float
-    force_noise, force_bias, threshold : float
-    switches : int
-    late : int
-        Calls by which everything is seen late.
-    """
+    """Numbers of the sensors."""
 
     period: float = number(float)
+    """Seconds between two calls."""
     encoder_every: int = number(int)
     inertial_every: int = number(int)
     foot_every: int = number(int)
+    """encoder_every, inertial_every, foot_every: Calls between two readings; 0 for no sensor."""
     resolution: float = number(float)
     encoder_noise: float = number(float)
     encoder_bias: float = number(float)
     smoothing: float = number(float)
+    """resolution, encoder_noise, encoder_bias, smoothing: Of the encoders (rad); share of a new
+    difference in the velocity."""
     pitch_noise: float = number(float)
     pitch_bias: float = number(float)
     rate_noise: float = number(float)
@@ -160,35 +129,24 @@ class Parameters(Bundle):
     threshold: float = number(float)
     switches: int = number(int)
     late: int = number(int)
+    """Calls by which everything is seen late."""
     seeds: Integers = array(2, of=int)
 
 
 class Memory(Shown):
-    """What the sensors remember.
-
-    Attributes
-    ----------
-    calls : int
-    seeds : (2,) int
-        The generator of the noise.
-    joint_bias, force_bias, pitch_bias, rate_bias
-        Constant errors.
-    joint, joint_rate : (nu,) float
-        Readings of the encoders and the velocity that follows.
-    pitch, pitch_rate : float
-    force : (nc, 2) float
-    past_q, past_v, past_force, past_position, past_normal, past_gap
-        Readings of the last calls, and where contact points were then, a ring.
-    """
+    """What the sensors remember."""
 
     calls: int = cell(int)
     seeds: Integers = array(2, of=int)
+    """The generator of the noise."""
     joint_bias: Floats = array("nu")
     force_bias: Floats = array("nc", "components")
     pitch_bias: float = cell(float)
     rate_bias: float = cell(float)
+    """joint_bias, force_bias, pitch_bias, rate_bias: Constant errors."""
     joint: Floats = array("nu")
     joint_rate: Floats = array("nu")
+    """joint, joint_rate: Readings of the encoders and the velocity that follows."""
     pitch: float = cell(float)
     pitch_rate: float = cell(float)
     force: Floats = array("nc", "components")
@@ -198,6 +156,8 @@ class Memory(Shown):
     past_position: Floats = array("late + 1", "nc", "axes")
     past_normal: Floats = array("late + 1", "nc", "axes")
     past_gap: Floats = array("late + 1", "nc")
+    """past_q, past_v, past_force, past_position, past_normal, past_gap: Readings of the last calls,
+    and where contact points were then, a ring."""
 
 
 class Log(Bundle):

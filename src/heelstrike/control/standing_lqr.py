@@ -13,8 +13,6 @@ more than motions: the regulator takes those of least cost, so that feet are not
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, null_space, solve_continuous_are, solve_discrete_are
@@ -26,36 +24,28 @@ from heelstrike.contact import ContactInverseDynamics, contact_inverse_dynamics,
 from heelstrike.control.arguments import must_be, numbers_of, positive, weights_of
 from heelstrike.dynamics import linearize, loop_displacement, loop_jacobian
 from heelstrike.errors import ControllerError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-
-TOUCHING = 1e-6
-"""Contact points less than this above level ground (m) hold."""
+from heelstrike.tolerances import STANDING_GAP
 
 HELD = 1e-9
 """Singular values of J below this part of the largest are zero."""
 
 
 class Parameters(Bundle):
-    """Numbers of the law.
-
-    Attributes
-    ----------
-    posture : (nq,) float
-        Where the coordinates shall be (m, rad).
-    feedforward : (nu,) float
-        Torques that hold it there (N m).
-    by_position, by_velocity : (nu, nv) float
-        Gains (N m/m, N m/rad; N s, N m s).
-    """
+    """Numbers of the law."""
 
     posture: Floats = array("nq")
+    """Where the coordinates shall be (m, rad)."""
     feedforward: Floats = array("nu")
+    """Torques that hold it there (N m)."""
     by_position: Floats = array("nu", "nv")
     by_velocity: Floats = array("nu", "nv")
+    """by_position, by_velocity: Gains (N m/m, N m/rad; N s, N m s)."""
 
 
 @controller
@@ -74,26 +64,18 @@ def standing_lqr(
 
 @dataclass(frozen=True, eq=False)
 class LinearStanding:
-    """How a robot moves about a posture while the ground holds its feet, and its loops hold.
-
-    Attributes
-    ----------
-    basis : (nv, k) float
-        N: motions of the coordinates that leave the feet where they are, and loops closed;
-        orthonormal columns.
-    A, B : (2 k, 2 k) and (2 k, nu) float
-        d/dt (y, ẏ) = A (y, ẏ) + B δτ.
-    torque : (nu,) float
-        Torques that hold the posture (N m).
-    contacts : tuple of int
-        Contact points that hold.
-    """
+    """How a robot moves about a posture while the ground holds its feet, and its loops hold."""
 
     basis: Floats
+    """(nv, k) N: motions of the coordinates that leave the feet where they are, and loops closed;
+    orthonormal columns."""
     A: Floats
     B: Floats
+    """A, B: (2 k, 2 k) and (2 k, nu) d/dt (y, ẏ) = A (y, ẏ) + B δτ."""
     torque: Floats
+    """(nu,) Torques that hold the posture (N m)."""
     contacts: tuple[int, ...]
+    """Contact points that hold."""
 
 
 def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
@@ -125,7 +107,7 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
         raise ControllerError(f"a posture is of {robot.nq} finite numbers, got {q.tolist()}")
     _refuse_what_is_open(robot, q)
     kinematics = contact_kinematics(robot, q, rest)
-    touching = tuple(int(i) for i in np.flatnonzero(np.abs(kinematics.gap) < TOUCHING))
+    touching = tuple(int(i) for i in np.flatnonzero(np.abs(kinematics.gap) < STANDING_GAP))
     if not touching and robot.floating:
         _refuse_what_floats(robot, kinematics.gap)
     held = contact_inverse_dynamics(robot, q, rest, rest, contacts=touching)
@@ -145,7 +127,7 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
 
 def _refuse_what_is_open(robot: Robot, q: Floats) -> None:
     open_by = float(np.abs(loop_displacement(robot, q)).max(initial=0.0))
-    if open_by > TOUCHING:
+    if open_by > STANDING_GAP:
         raise ControllerError(
             f"in this posture a loop or coupling of robot {robot.name!r} is open by {open_by:.3g}: "
             "take robot.closed(state).q"

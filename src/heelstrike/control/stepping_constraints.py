@@ -50,91 +50,62 @@ STOOD = 0.01
 
 
 class Parameters(Bundle):
-    """Numbers of the law; the first extent of 2 is that of the stance foot.
-
-    Attributes
-    ----------
-    kp, kd : (nu,) float
-        Gains of ÿ = −kp y − kd ẏ (1/s², 1/s).
-    response : float
-        Shift, in largest ones, for an energy that is twice the usual one.
-    trust : float
-        Part of the difference to the slope of the last step that is believed.
-    bounds : Bounds
-        What ground and joints are counted on to bear.
-    steepest : float
-        Largest slope of the family (tangent).
-    rate : float
-        Usual rate of the phase just after touchdown (rad/s).
-    level : float
-        Usual energy at touchdown ((kg m²/s)²).
-    phase : (2, nv) float
-        Factors of the coordinates in θ.
-    middle : (2, 3, 3) float
-        Middle of the range of θ less what is constant in θ, by powers of slope and shift (rad).
-    half : (3, 3) float
-        Half its width, likewise (rad).
-    coefficients : (2, 3, 3, terms, nu) float
-        Chebyshev series of the joints, likewise (rad).
-    energy : (3, levels) float
-        Chebyshev series of the usual energy, by powers of the slope.
-    """
+    """Numbers of the law; the first extent of 2 is that of the stance foot."""
 
     kp: Floats = array("nu")
     kd: Floats = array("nu")
+    """kp, kd: Gains of ÿ = −kp y − kd ẏ (1/s², 1/s)."""
     response: float = number(float)
+    """Shift, in largest ones, for an energy that is twice the usual one."""
     trust: float = number(float)
+    """Part of the difference to the slope of the last step that is believed."""
     bounds: Bounds = part(Bounds)
+    """What ground and joints are counted on to bear."""
     steepest: float = number(float)
+    """Largest slope of the family (tangent)."""
     rate: float = number(float)
+    """Usual rate of the phase just after touchdown (rad/s)."""
     level: float = number(float)
+    """Usual energy at touchdown ((kg m²/s)²)."""
     phase: Floats = array(2, "nv")
+    """Factors of the coordinates in θ."""
     middle: Floats = array(2, 3, 3)
+    """Middle of the range of θ less what is constant in θ, by powers of slope and shift (rad)."""
     half: Floats = array(3, 3)
+    """Half its width, likewise (rad)."""
     coefficients: Floats = array(2, 3, 3, "terms", "nu")
+    """Chebyshev series of the joints, likewise (rad)."""
     energy: Floats = array(3, "levels")
+    """Chebyshev series of the usual energy, by powers of the slope."""
 
 
 class Memory(Bundle):
-    """What the law remembers; what is not named is scratch.
-
-    Attributes
-    ----------
-    stance : int
-        The foot that stands.
-    begun : int
-        Whether the step has begun.
-    landed : int
-        Whether the foot that stands is past the impact with which it came down.
-    slope : float
-        Slope that is believed, in steepest ones.
-    before, shift : float
-        Shift as the step began, and now, in largest ones.
-    start : float
-        Phase at which the step began (rad).
-    missing, bend : (nu,) float
-        What the joints, and their derivatives by θ times FADES of the width, were off the gait.
-    middle, half : (3,) float
-        Range of the phase on that slope, by powers of the shift (rad).
-    coefficients : (3, terms, nu) float
-        Series of the joints on that slope, likewise (rad).
-    energy : (1, levels) float
-        Series of the usual energy on that slope.
-    """
+    """What the law remembers; what is not named is scratch."""
 
     stance: int = cell(int)
+    """The foot that stands."""
     begun: int = cell(int)
+    """Whether the step has begun."""
     landed: int = cell(int)
+    """Whether the foot that stands is past the impact with which it came down."""
     slope: float = cell(float)
+    """Slope that is believed, in steepest ones."""
     before: float = cell(float)
     shift: float = cell(float)
+    """before, shift: Shift as the step began, and now, in largest ones."""
     start: float = cell(float)
+    """Phase at which the step began (rad)."""
     missing: Floats = array("nu")
     bend: Floats = array("nu")
+    """missing, bend: What the joints, and their derivatives by θ times FADES of the width, were off
+    the gait."""
     middle: Floats = array(3)
     half: Floats = array(3)
+    """middle, half: Range of the phase on that slope, by powers of the shift (rad)."""
     coefficients: Floats = array(3, "terms", "nu")
+    """Series of the joints on that slope, likewise (rad)."""
     energy: Floats = array("levels", 1)
+    """Series of the usual energy on that slope."""
     value: Floats = array("nu")
     gradient: Floats = array("nu")
     curvature: Floats = array("nu")

@@ -45,54 +45,40 @@ FADING = 0.1
 
 
 class Parameters(Bundle):
-    """Numbers of the law; the first extent of 2 is that of the stance foot.
-
-    Attributes
-    ----------
-    kp, kd : (nu,) float
-        Gains of ÿ = −kp y − kd ẏ (1/s², 1/s).
-    epsilon, exponent : float
-        Time scale (s) and exponent of the finite-time law; a time scale of zero is none.
-    phase : (2, nv) float
-        Factors of the coordinates in θ.
-    middle, half : (2,) and () float
-        Middle of the range of θ less what is constant in θ, and half its width (rad).
-    coefficients : (2, terms, nu) float
-        Chebyshev series of the joints (rad).
-    outputs, joints : (2, nu, nu) float
-        Outputs of errors of the joints, C, and its inverse.
-    """
+    """Numbers of the law; the first extent of 2 is that of the stance foot."""
 
     kp: Floats = array("nu")
     kd: Floats = array("nu")
+    """kp, kd: Gains of ÿ = −kp y − kd ẏ (1/s², 1/s)."""
     epsilon: float = number(float)
     exponent: float = number(float)
+    """epsilon, exponent: Time scale (s) and exponent of the finite-time law; a time scale of zero
+    is none."""
     phase: Floats = array(2, "nv")
+    """Factors of the coordinates in θ."""
     middle: Floats = array(2)
     half: float = number(float)
+    """middle, half: Middle of the range of θ less what is constant in θ, and half its width
+    (rad)."""
     coefficients: Floats = array(2, "terms", "nu")
+    """Chebyshev series of the joints (rad)."""
     outputs: Floats = array(2, "nu", "nu")
     joints: Floats = array(2, "nu", "nu")
+    """outputs, joints: Outputs of errors of the joints, C, and its inverse."""
 
 
 class Memory(Bundle):
-    """What the law remembers: the foot that stands. The rest is scratch.
-
-    Attributes
-    ----------
-    stance : int
-        The foot that stands.
-    error, error_rate : (nu,) float
-        How far the joints are from the gait.
-    slope, wanted : (nu,) float
-        Derivatives of the gait by θ; accelerations of the joints but for those times θ̈.
-    """
+    """What the law remembers: the foot that stands. The rest is scratch."""
 
     stance: int = cell(int)
+    """The foot that stands."""
     error: Floats = array("nu")
     error_rate: Floats = array("nu")
+    """error, error_rate: How far the joints are from the gait."""
     slope: Floats = array("nu")
     wanted: Floats = array("nu")
+    """slope, wanted: Derivatives of the gait by θ; accelerations of the joints but for those times
+    θ̈."""
 
 
 @kernel

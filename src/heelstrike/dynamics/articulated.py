@@ -33,21 +33,15 @@ Floats = NDArray[np.float64]
 
 
 class ArticulatedBodies(Bundle):
-    """The subtree of every link with its joints free to move.
-
-    Attributes
-    ----------
-    inertia : (nl, 6) float
-        Their inertia about the pivot: rows of the upper triangle, in the order of spatial vectors.
-    momentum : (nv, 3) float
-        U, the momentum of the articulated body per unit velocity of its joint.
-    inverse : (nv,) float
-        1 / D, what the joint accelerates per unit of force while its parent stays.
-    """
+    """The subtree of every link with its joints free to move."""
 
     inertia: Floats = array("nl", 6)
+    """Their inertia about the pivot: rows of the upper triangle, in the order of spatial
+    vectors."""
     momentum: Floats = array("nv", 3)
+    """U, the momentum of the articulated body per unit velocity of its joint."""
     inverse: Floats = array("nv")
+    """1 / D, what the joint accelerates per unit of force while its parent stays."""
 
 
 @kernel

@@ -11,25 +11,27 @@ import math
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.tolerances import NO_PIVOT
 
-RANK_TOLERANCE = 1e-12
+UNIT_PIVOT = 1e-12
 """Pivots of the unit-diagonal matrix below this count as zero."""
 
 GOOD_PIVOT = 0.03
 """Diagonal pivots above this are taken as they come: elimination of a positive semidefinite
 matrix is stable in any order, and only its rank needs the large pivots first."""
 
-SINGULAR = 2e-15
+ROUNDED_PIVOT = 2e-15
 """Pivots of the unit-diagonal matrix below this are rounding."""
 
 CONSISTENT = 1e-12
 """Equations that are left with less than this, relative to the largest, are met."""
 
-SWEEPS, ROUNDING = 100, 1e-14
+SWEEPS, ROUNDED_FORCE = 100, 1e-14
 """How often forces are raised to zero at most, and part of the largest that is none."""
 
-NO_PIVOT = 1e-11
-"""Pivots of any matrix below this, relative to its largest entry, count as zero."""
+CUT_OFF = 100.0 * ROUNDED_FORCE
+"""Part of the largest force by which one may pull in the end and be cut off: rounding of so many
+sweeps."""
 
 
 @kernel
@@ -77,7 +79,7 @@ def eliminate(
         taken[i] = 0
         speeds = max(speeds, abs(tableau[i, 0]))
     nullity = size
-    smallest = RANK_TOLERANCE
+    smallest = UNIT_PIVOT
     while nullity > 0:
         largest = smallest
         row = size
@@ -109,10 +111,73 @@ def eliminate(
         for i in range(size):
             if taken[i] == 0:
                 left = max(left, abs(tableau[i, 0]))
-        if smallest == SINGULAR or left <= CONSISTENT * speeds:
+        if smallest == ROUNDED_PIVOT or left <= CONSISTENT * speeds:
             break
-        smallest = SINGULAR
+        smallest = ROUNDED_PIVOT
     return nullity
+
+
+@kernel
+def triangulate(size: int, width: int, complete: bool, matrix: Floats, order: Integers) -> int:
+    """Replace a matrix by its triangular factors; return its rank, if pivots are `complete`.
+
+    Parameters
+    ----------
+    size, width : int
+        Equations, and columns with those of right-hand sides, which are carried along.
+    complete : bool
+        Whether a pivot is the largest entry of all, and what is left behind the last is nothing; or
+        the largest of its column, of a matrix that is regular.
+    matrix : (size, width) float
+        Out: U, and under its diagonal L, whose own diagonal is one.
+    order : (size,) int
+        The column that has come to each place, or the row that each was exchanged with.
+    """
+    for k in range(size):
+        order[k] = k
+    smallest = 0.0  # known with the first pivot, which is the largest entry
+    for k in range(size):
+        best, row, place = smallest, -1, k
+        for i in range(k, size):
+            for j in range(k, size if complete else k + 1):
+                if abs(matrix[i, j]) > best:
+                    best, row, place = abs(matrix[i, j]), i, j
+        if complete and row < 0:
+            return k
+        if complete and k == 0:
+            smallest = NO_PIVOT * best
+        row = max(row, k)  # numbers that are none are handed on
+        if row != k:
+            for j in range(width):
+                matrix[k, j], matrix[row, j] = matrix[row, j], matrix[k, j]
+        if place != k:
+            for i in range(size):
+                matrix[i, k], matrix[i, place] = matrix[i, place], matrix[i, k]
+        if complete:
+            order[k], order[place] = order[place], order[k]
+        else:
+            order[k] = row
+        for i in range(k + 1, size):
+            ratio = matrix[i, k] / matrix[k, k]
+            matrix[i, k] = ratio
+            if ratio != 0.0:
+                for j in range(k + 1, width):
+                    matrix[i, j] -= ratio * matrix[k, j]
+    return size
+
+
+@kernel
+def substitute(size: int, matrix: Floats, order: Integers, x: Floats) -> None:
+    """Replace x by the solution of equations whose matrix was triangulated by its columns."""
+    for k in range(size):
+        x[k], x[order[k]] = x[order[k]], x[k]
+    for i in range(size):
+        for j in range(i):
+            x[i] -= matrix[i, j] * x[j]
+    for i in range(size - 1, -1, -1):
+        for j in range(i + 1, size):
+            x[i] -= matrix[i, j] * x[j]
+        x[i] /= matrix[i, i]
 
 
 @kernel
@@ -121,57 +186,20 @@ def solve_to_rank(size: int, system: Floats, column: Integers, unknown: Floats) 
 
     Returns the rank; unknowns that the equations leave free are zero.
     """
-    for i in range(size):
-        column[i] = i
-        unknown[i] = 0.0
-    smallest = 0.0  # known with the first pivot, which is the largest entry
-    rank = size
-    for k in range(size):
-        best = smallest
-        row = -1
-        place = -1
-        for i in range(k, size):
-            for j in range(k, size):
-                if abs(system[i, j]) > best:
-                    best = abs(system[i, j])
-                    row = i
-                    place = j
-        if row < 0:
-            rank = k
-            break
-        if k == 0:
-            smallest = NO_PIVOT * best
-        if row != k:
-            for j in range(size + 1):
-                system[k, j], system[row, j] = system[row, j], system[k, j]
-        if place != k:
-            column[k], column[place] = column[place], column[k]
-            for i in range(size):
-                system[i, k], system[i, place] = system[i, place], system[i, k]
-        for i in range(k + 1, size):
-            ratio = system[i, k] / system[k, k]
-            if ratio != 0.0:
-                for j in range(k + 1, size + 1):
-                    system[i, j] -= ratio * system[k, j]
-    for k in range(rank - 1, -1, -1):
-        total = system[k, size]
-        for j in range(k + 1, rank):
-            total -= system[k, j] * unknown[column[j]]
-        unknown[column[k]] = total / system[k, k]
+    rank = triangulate(size, size + 1, True, system, column)
+    for k in range(size - 1, -1, -1):
+        total = 0.0
+        if k < rank:
+            total = system[k, size]
+            for j in range(k + 1, rank):
+                total -= system[k, j] * unknown[column[j]]
+            total /= system[k, k]
+        unknown[column[k]] = total
     return rank
 
 
 class LinearEquations(Bundle):
     """Equations A x = b in a few unknowns, for the memory of a law.
-
-    Attributes
-    ----------
-    system : (unknowns, unknowns + 1) float
-        A, and b in the last column. Solving uses them up.
-    x : (unknowns,) float
-        The answer.
-    order : (unknowns,) int
-        Scratch.
 
     Examples
     --------
@@ -183,8 +211,11 @@ class LinearEquations(Bundle):
     """
 
     system: Floats = array("unknowns", "unknowns + 1")
+    """A, and b in the last column. Solving uses them up."""
     x: Floats = array("unknowns")
+    """The answer."""
     order: Integers = array("unknowns", of=int)
+    """Scratch."""
 
     @kernel
     def solve(self) -> int:
@@ -298,10 +329,10 @@ def raise_to_zero(
                 for j in range(size):
                     unknown[j] += along * system[free, j]
             moved = max(moved, abs(raised) * square)
-        if moved <= ROUNDING * largest:
+        if moved <= ROUNDED_FORCE * largest:
             break
     for i in range(first, size):
-        if presses[i - first] == 1 and 0.0 > unknown[i] > -100.0 * ROUNDING * largest:
+        if presses[i - first] == 1 and 0.0 > unknown[i] > -CUT_OFF * largest:
             unknown[i] = 0.0
 
 

@@ -34,33 +34,34 @@ MISSED = 1e-9
 BEND = 0.5
 
 
-class Reaching(Bundle):
-    """What the search works on.
+LIGHTER, HEAVIER = 0.01, 10.0
+"""What the damping is multiplied by after a step that helps, and after one that does not."""
 
-    Attributes
-    ----------
-    tree : Workspace
-        Kinematics of the pose that was tried last.
-    position : (2,) float
-        The point in that pose.
-    begin, trial, tried : (nq,) float
-        Where the search begins, a step further, and where another beginning led to.
-    columns : (nv, 3) float
-        Jacobian of the point and its link, one row a coordinate.
-    step : (nv,) float
-        Step of each coordinate.
-    free : (nv,) int
-        Whether a coordinate takes part in it.
-    """
+NO_MATRIX = 1e-300
+"""Damping where no joint moves the pose, so that nothing is divided by zero."""
+
+NEARER = 0.999
+"""Part of what an answer misses, squared, below which another one is clearly nearer."""
+
+
+class Reaching(Bundle):
+    """What the search works on."""
 
     tree: Workspace = part(Workspace)
+    """Kinematics of the pose that was tried last."""
     position: Floats = array("axes")
+    """The point in that pose."""
     begin: Floats = array("nq")
     trial: Floats = array("nq")
     tried: Floats = array("nq")
+    """begin, trial, tried: Where the search begins, a step further, and where another beginning led
+    to."""
     columns: Floats = array("nv", 3)
+    """Jacobian of the point and its link, one row a coordinate."""
     step: Floats = array("nv")
+    """Step of each coordinate."""
     free: Integers = array("nv", of=int)
+    """Whether a coordinate takes part in it."""
 
 
 def leg_joints(robot: Robot) -> tuple[tuple[int, ...], ...]:
@@ -122,7 +123,7 @@ def seek(missing: Spatial, damping: float, joints: Integers, work: Reaching) -> 
             zz += z * z
             zr += z * turn
             rr += turn * turn
-    damped = damping * (xx + zz + rr) + 1e-300
+    damped = damping * (xx + zz + rr) + NO_MATRIX
     pull = solve_three((xx + damped, xz, xr), (xz, zz + damped, zr), (xr, zr, rr + damped), missing)
     for k in range(joints.shape[0]):
         joint = joints[k]
@@ -182,11 +183,11 @@ def approach(
         fresh = size < left
         if fresh:
             missing, left = found, size
-            damping = max(0.01 * damping, LEAST_DAMPING)
+            damping = max(LIGHTER * damping, LEAST_DAMPING)
             for j in range(model.nq):
                 q[j] = work.trial[j]
         else:
-            damping *= 10.0
+            damping *= HEAVIER
     return left
 
 
@@ -243,7 +244,7 @@ def reach(
             bend(model, joints, way, work.begin, work.tried)
             other = approach(model, joints, link, local, target, rows, work, work.tried)
             # Where no pose reaches, the first answer counts unless another is clearly nearer.
-            if other < 0.999 * left:
+            if other < NEARER * left:
                 left = other
                 for j in range(model.nq):
                     q[j] = work.tried[j]

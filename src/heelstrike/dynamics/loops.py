@@ -27,20 +27,13 @@ Floats = NDArray[np.float64]
 
 
 class LoopRows(Bundle):
-    """The equations of loops and couplings in a state.
-
-    Attributes
-    ----------
-    displacement : (loop_rows,) float
-        φ, by how much each does not hold (m, rad).
-    jacobian : (loop_rows, nv) float
-    bias : (loop_rows,) float
-        J̇ v.
-    """
+    """The equations of loops and couplings in a state."""
 
     displacement: Floats = array("loop_rows")
+    """φ, by how much each does not hold (m, rad)."""
     jacobian: Floats = array("loop_rows", "nv")
     bias: Floats = array("loop_rows")
+    """J̇ v."""
 
 
 def count_rows(model: Model) -> int:

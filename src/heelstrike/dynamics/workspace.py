@@ -16,41 +16,28 @@ class Workspace(Bundle):
     Spatial vectors are planar and ordered (rotation about +y, x, z), in world axes, taken at the
     point `pivot`: the motion of a link is its angular velocity and the velocity of the body point
     that passes through the pivot; a force is its moment about the pivot and its resultant.
-
-    Attributes
-    ----------
-    angle, cosine, sine : (nl,) float
-        Orientation of every link.
-    origin : (nl, axes) float
-        World position of every link frame.
-    pivot : (axes,) float
-        World position of the reference point of spatial vectors.
-    motion : (nv, 3) float
-        Motion of the joint's link per unit of every velocity.
-    velocity : (nl, 3) float
-        Spatial velocity of every link.
-    bias_acceleration : (nl, 3) float
-        Spatial acceleration of every link when all joint accelerations are zero, no gravity.
-    acceleration, force : (nl, 3) float
-        Scratch of the recursions.
-    inertia : (nl, 4) float
-        Mass, first moments (x, z) and second moment of every link about the pivot.
-    composite : (nl, 4) float
-        The same for the subtree of every link.
-    zero : (nv,) float
-        Zeros, never written.
     """
 
     angle: Floats = array("nl")
     cosine: Floats = array("nl")
     sine: Floats = array("nl")
+    """angle, cosine, sine: Orientation of every link."""
     origin: Floats = array("nl", "axes")
+    """World position of every link frame."""
     pivot: Floats = array("axes")
+    """World position of the reference point of spatial vectors."""
     motion: Floats = array("nv", 3)
+    """Motion of the joint's link per unit of every velocity."""
     velocity: Floats = array("nl", 3)
+    """Spatial velocity of every link."""
     bias_acceleration: Floats = array("nl", 3)
+    """Spatial acceleration of every link when all joint accelerations are zero, no gravity."""
     acceleration: Floats = array("nl", 3)
     force: Floats = array("nl", 3)
+    """acceleration, force: Scratch of the recursions."""
     inertia: Floats = array("nl", 4)
+    """Mass, first moments (x, z) and second moment of every link about the pivot."""
     composite: Floats = array("nl", 4)
+    """The same for the subtree of every link."""
     zero: Floats = array("nv")
+    """Zeros, never written."""

@@ -7,7 +7,6 @@ states. None of the figures is written down here.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
 
@@ -29,6 +28,7 @@ from heelstrike.analysis.support import pushing_feet
 from heelstrike.dynamics import point_jacobian
 from heelstrike.experiments.evidence import STEPS, TIME_STEP, Evidence
 from heelstrike.experiments.refinement import SCHEMES
+from heelstrike.field_texts import dataclass
 from heelstrike.sim import EventKind, Run, RunStatus, Scheme
 
 Floats = NDArray[np.float64]
@@ -46,30 +46,20 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper beside what is measured here.
-
-    Attributes
-    ----------
-    source : str
-        Where the paper makes it.
-    statement : str
-        What it says.
-    measured : str
-        What is measured here.
-    criterion : str
-        When the claim counts as holding.
-    holds : bool
-        Whether it does.
-    remark : str
-        What a reader should know besides.
-    """
+    """A claim of the paper beside what is measured here."""
 
     source: str
+    """Where the paper makes it."""
     statement: str
+    """What it says."""
     measured: str
+    """What is measured here."""
     criterion: str
+    """When the claim counts as holding."""
     holds: bool
+    """Whether it does."""
     remark: str = ""
+    """What a reader should know besides."""
 
     @property
     def verdict(self) -> Verdict:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from heelstrike.analysis.summary import plain
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.interruption import acknowledge
 from heelstrike.robot import Robot, State
 from heelstrike.sim import Controller, Push, Run, simulate
@@ -47,69 +48,46 @@ LANDING = 0.02
 
 @dataclass(frozen=True)
 class Difference:
-    """How one method fared, and how far it is from the reference.
-
-    Attributes
-    ----------
-    method : str
-        Name of the method.
-    status : str
-        How its run ended.
-    touchdowns : int
-        Touchdowns of feet after the start; more than steps if a foot chatters.
-    touchdown_s : float
-        Largest difference in time, in s, between a touchdown of the reference and the nearest of
-        the same foot.
-    impulse_Ns : float
-        Largest difference of the normal impulse of a landing foot, added up over `LANDING`.
-    zmp_m : float
-        Root mean square difference of the stance foot's zero moment point, in m.
-    energy_J : float
-        Root mean square difference of the mechanical energy, in J.
-    position : float
-        Largest difference of a coordinate at the last common instant (rad or m).
-    penetration_m, slip_m : float
-        Deepest penetration and longest slip of its own run.
-    complementarity : float
-        Largest residual of its own contact problems; zero for laws that solve none.
-    wall_s : float
-        Seconds it took to compute.
-    """
+    """How one method fared, and how far it is from the reference."""
 
     method: str
+    """Name of the method."""
     status: str
+    """How its run ended."""
     touchdowns: int
+    """Touchdowns of feet after the start; more than steps if a foot chatters."""
     touchdown_s: float
+    """Largest difference in time, in s, between a touchdown of the reference and the nearest of the
+    same foot."""
     impulse_Ns: float  # noqa: N815 - units keep their letters
+    """Largest difference of the normal impulse of a landing foot, added up over `LANDING`."""
     zmp_m: float
+    """Root mean square difference of the stance foot's zero moment point, in m."""
     energy_J: float  # noqa: N815
+    """Root mean square difference of the mechanical energy, in J."""
     position: float
+    """Largest difference of a coordinate at the last common instant (rad or m)."""
     penetration_m: float
     slip_m: float
+    """penetration_m, slip_m: Deepest penetration and longest slip of its own run."""
     complementarity: float
+    """Largest residual of its own contact problems; zero for laws that solve none."""
     wall_s: float
+    """Seconds it took to compute."""
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Runs of the same robot under several methods.
-
-    Attributes
-    ----------
-    runs : dict of str to Run
-        The runs by the names of their methods.
-    reference : str
-        Name of the run that the others are held against.
-    differences : tuple of Difference
-        One a method, in the order they were given.
-    left_out : dict of str to str
-        Methods that could not simulate this, and why.
-    """
+    """Runs of the same robot under several methods."""
 
     runs: dict[str, Run]
+    """The runs by the names of their methods."""
     reference: str
+    """Name of the run that the others are held against."""
     differences: tuple[Difference, ...]
+    """One a method, in the order they were given."""
     left_out: dict[str, str] = field(default_factory=dict)
+    """Methods that could not simulate this, and why."""
 
     @property
     def interrupted(self) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -13,6 +12,7 @@ from heelstrike.control import ComputedTorque, Encoder
 from heelstrike.experiments.laws import Entry, walking
 from heelstrike.experiments.refinement import Convergence, RefinedWalk, converge, refine
 from heelstrike.experiments.walk import design, walk
+from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State, load_robot
 from heelstrike.sim import Run, TimeStepping, simulate
@@ -33,34 +33,23 @@ ENCODER = Encoder(period=1e-3, resolution=0.0)
 
 @dataclass(frozen=True)
 class Evidence:
-    """Everything the claims are measured on.
-
-    Attributes
-    ----------
-    gait : Gait
-        The gait of the paper's robot.
-    run : Run
-        The walk under computed torque.
-    estimated : Run
-        The same walk with joint velocities estimated from sampled positions, one time step a
-        sample.
-    drop : Run
-        The robot dropped, unpowered, on tilted feet: toes first.
-    other : Run
-        Another robot walking a gait of its own.
-    refinement : tuple of RefinedWalk
-        Walks with several schemes and time steps.
-    convergence : tuple of Convergence
-        Order of convergence of the same schemes.
-    """
+    """Everything the claims are measured on."""
 
     gait: Gait
+    """The gait of the paper's robot."""
     run: Run
+    """The walk under computed torque."""
     estimated: Run
+    """The same walk with joint velocities estimated from sampled positions, one time step a
+    sample."""
     drop: Run
+    """The robot dropped, unpowered, on tilted feet: toes first."""
     other: Run
+    """Another robot walking a gait of its own."""
     refinement: tuple[RefinedWalk, ...]
+    """Walks with several schemes and time steps."""
     convergence: tuple[Convergence, ...]
+    """Order of convergence of the same schemes."""
 
     @property
     def robot(self) -> Robot:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -37,6 +37,7 @@ from heelstrike.dynamics import leg_joints, mass_matrix
 from heelstrike.errors import ControllerError, GaitError, HeelstrikeError
 from heelstrike.experiments.own_law import own_law
 from heelstrike.experiments.walk import StepSize, design, typical_step
+from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, PhasedGait, StepFamily, optimize_gait
 from heelstrike.gait.sole import sole
 from heelstrike.robot import Robot
@@ -62,30 +63,20 @@ sample, makes a joint that moves little inertia chatter."""
 
 @dataclass(frozen=True)
 class Entry:
-    """A controller by its name.
-
-    Attributes
-    ----------
-    name : str
-        What it is called.
-    trial : callable
-        Takes a robot and its gait, returns the walk that is disturbed, under a new controller.
-    needs : callable
-        Takes a robot, returns what it lacks, in a word; nothing if the controller can drive it.
-    stands : bool
-        Whether it makes the robot stand, and needs no gait: None is what it is given.
-    bent_knees : bool
-        Whether it walks on points, by a gait with bent knees: the one of :func:`gait_for`.
-    source : str
-        File of a user whose code was run for it.
-    """
+    """A controller by its name."""
 
     name: str
+    """What it is called."""
     trial: Callable[[Robot, Gait | None], Trial]
+    """Takes a robot and its gait, returns the walk that is disturbed, under a new controller."""
     needs: Callable[[Robot], str]
+    """Takes a robot, returns what it lacks, in a word; nothing if the controller can drive it."""
     stands: bool = False
+    """Whether it makes the robot stand, and needs no gait: None is what it is given."""
     bent_knees: bool = False
+    """Whether it walks on points, by a gait with bent knees: the one of :func:`gait_for`."""
     source: str = ""
+    """File of a user whose code was run for it."""
 
 
 def driven(robot: Robot) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from heelstrike.experiments.claims import Claim, judge
 from heelstrike.experiments.evidence import TIME_STEP, Evidence, gather
 from heelstrike.experiments.report import FIGURES, save_page
+from heelstrike.field_texts import dataclass
 
 SHOWN_STEPS = 4
 """Walking steps that the figures show."""
@@ -16,21 +16,14 @@ SHOWN_STEPS = 4
 
 @dataclass(frozen=True)
 class PaperReport:
-    """What :func:`reproduce_paper` found.
-
-    Attributes
-    ----------
-    page : Path
-        The page, report.md; its figures and data lie beside it.
-    evidence : Evidence
-        The simulations.
-    claims : tuple of Claim
-        Every claim, measured and judged.
-    """
+    """What :func:`reproduce_paper` found."""
 
     page: Path
+    """The page, report.md; its figures and data lie beside it."""
     evidence: Evidence
+    """The simulations."""
     claims: tuple[Claim, ...]
+    """Every claim, measured and judged."""
 
 
 def reproduce_paper(

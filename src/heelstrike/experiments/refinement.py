@@ -8,7 +8,6 @@ range of steps, and their order of convergence is measured.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -18,6 +17,7 @@ from heelstrike.analysis import Summary, summarize
 from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque
 from heelstrike.experiments.walk import walk
+from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot
 from heelstrike.sim import Run, Scheme, TimeStepping, simulate
@@ -43,49 +43,33 @@ COMPARED_AT = 0.9
 
 @dataclass(frozen=True)
 class RefinedWalk:
-    """One walk of the comparison.
-
-    Attributes
-    ----------
-    scheme : Scheme
-        Discretisation.
-    step : float
-        Time step in s.
-    summary : Summary
-        What came of it.
-    """
+    """One walk of the comparison."""
 
     scheme: Scheme
+    """Discretisation."""
     step: float
+    """Time step in s."""
     summary: Summary
+    """What came of it."""
 
 
 @dataclass(frozen=True)
 class Convergence:
-    """How the error of a scheme falls with its step.
-
-    Attributes
-    ----------
-    scheme : Scheme
-        Discretisation.
-    steps : tuple of float
-        Time steps in s.
-    errors : tuple of float
-        Largest difference of a coordinate from the exact motion late in the first walking step,
-        in m or rad.
-    order : float
-        Slope of log(error) over log(step).
-    lost : float
-        Share of all time steps in which an end of the stance sole carries nothing, which stands
-        on both. A scheme that loses the ground regains it when rounding has it so: its errors
-        differ from one processor to the next, and their slope measures nothing.
-    """
+    """How the error of a scheme falls with its step."""
 
     scheme: Scheme
+    """Discretisation."""
     steps: tuple[float, ...]
+    """Time steps in s."""
     errors: tuple[float, ...]
+    """Largest difference of a coordinate from the exact motion late in the first walking step, in m
+    or rad."""
     order: float
+    """Slope of log(error) over log(step)."""
     lost: float
+    """Share of all time steps in which an end of the stance sole carries nothing, which stands on
+    both. A scheme that loses the ground regains it when rounding has it so: its errors differ from
+    one processor to the next, and their slope measures nothing."""
 
 
 def refine(

@@ -7,9 +7,9 @@ on its own: one that cannot be made does not take the others with it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
+from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.sim import Run
 from heelstrike.view.figures import FIGURES
@@ -21,18 +21,12 @@ OF_MOTORS = ("tracking", "velocities", "torque")
 
 @dataclass(frozen=True)
 class Saved:
-    """A file that was written, or what kept it from being written.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    error : Exception or None
-        What went wrong, if anything.
-    """
+    """A file that was written, or what kept it from being written."""
 
     path: Path
+    """The file."""
     error: Exception | None = None
+    """What went wrong, if anything."""
 
 
 class Results:

@@ -10,7 +10,6 @@ of a robot, whose dynamics need mass; it is a force between the mass and its foo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,53 +18,35 @@ from scipy.optimize import root
 
 from heelstrike.arguments import check_fields
 from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.field_texts import dataclass
 
 Floats = NDArray[np.float64]
 Phases = list[tuple[Floats, Floats]]
 
 RTOL, ATOL = 1e-13, 1e-14
-LONGEST = 3.0  # s; a phase that lasts longer leads to no step
-DISTURBANCE = 3e-5  # m, rad; of the differences of fourth order that make multipliers
+LONGEST_PHASE = 3.0  # s; a phase that lasts longer leads to no step
+SPRING_DISTURBANCE = 3e-5  # m, rad; of the differences of fourth order that make multipliers
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cycle:
-    """A gait that repeats.
-
-    Attributes
-    ----------
-    state : (n,) float
-        Walking: height (m) and direction of the velocity (rad, up) where the foot is below the
-        mass. Running: height of the apex (m).
-    multipliers : (n,) complex
-        Floquet multipliers of a step.
-    period, length : float
-        Of a step, in s and m.
-    contact : float
-        Running: how long a foot is on the ground. Walking: how long both are (s).
-    """
+    """A gait that repeats."""
 
     state: Floats
+    """(n,) Walking: height (m) and direction of the velocity (rad, up) where the foot is below the
+    mass. Running: height of the apex (m)."""
     multipliers: NDArray[np.complex128]
+    """(n,) Floquet multipliers of a step."""
     period: float
     length: float
+    """period, length: Of a step, in s and m."""
     contact: float
+    """Running: how long a foot is on the ground. Walking: how long both are (s)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpringMass:
     """A point mass on massless springs.
-
-    Parameters
-    ----------
-    stiffness : float
-        Of a leg, in N/m.
-    angle : float
-        Angle of attack: of a leg to the ground at touchdown, in rad.
-    energy : float
-        In J; nothing is lost.
-    mass, leg, gravity : float
-        In kg, m and m/s².
 
     Raises
     ------
@@ -86,11 +67,15 @@ class SpringMass:
     """
 
     stiffness: float
+    """Of a leg, in N/m."""
     angle: float
+    """Angle of attack: of a leg to the ground at touchdown, in rad."""
     energy: float
+    """In J; nothing is lost."""
     mass: float = 80.0
     leg: float = 1.0
     gravity: float = 9.81
+    """mass, leg, gravity: In kg, m and m/s²."""
 
     def __post_init__(self) -> None:
         check_fields(self, SimulationError)
@@ -191,9 +176,9 @@ class SpringMass:
         columns = [
             (4.0 * (step(state + h)[0] - step(state - h)[0]))
             - 0.5 * (step(state + 2.0 * h)[0] - step(state - 2.0 * h)[0])
-            for h in DISTURBANCE * np.eye(len(state))
+            for h in SPRING_DISTURBANCE * np.eye(len(state))
         ]
-        slope = np.array(columns).T / (6.0 * DISTURBANCE)
+        slope = np.array(columns).T / (6.0 * SPRING_DISTURBANCE)
         multipliers = np.linalg.eigvals(slope).astype(np.complex128)
         return Cycle(
             state=state, multipliers=multipliers, period=period, length=length, contact=contact
@@ -258,7 +243,7 @@ class SpringMass:
 
         falling.terminal, falling.direction = True, -1.0  # type: ignore[attr-defined]
         run = solve_ivp(
-            self._rate(feet), (0.0, LONGEST), start, method="DOP853", rtol=RTOL, atol=ATOL,
+            self._rate(feet), (0.0, LONGEST_PHASE), start, method="DOP853", rtol=RTOL, atol=ATOL,
             events=falling,
         )  # fmt: skip
         if not len(run.t_events[0]):

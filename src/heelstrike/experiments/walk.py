@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +13,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque
 from heelstrike.dynamics import center_of_mass, contact_positions, link_poses
 from heelstrike.errors import GaitError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State
 from heelstrike.sim import Controller, Push, Run, simulate
@@ -33,21 +33,14 @@ touchdown is then inside it, and the robot has not gone far beyond."""
 
 @dataclass(frozen=True)
 class StepSize:
-    """Size of a walking step.
-
-    Attributes
-    ----------
-    length : float
-        In m.
-    duration : float
-        In s.
-    clearance : float
-        Height of the swing foot's path, in m.
-    """
+    """Size of a walking step."""
 
     length: float
+    """In m."""
     duration: float
+    """In s."""
     clearance: float
+    """Height of the swing foot's path, in m."""
 
 
 BRAVO7 = StepSize(0.30, 0.70, 0.03)
@@ -135,21 +128,14 @@ def design(
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """What a walk begins with.
-
-    Attributes
-    ----------
-    state : State
-        The robot on its ground.
-    step_duration : float
-        In s.
-    controller : Controller or None
-        What moves the joints.
-    """
+    """What a walk begins with."""
 
     state: State
+    """The robot on its ground."""
     step_duration: float
+    """In s."""
     controller: Controller | Law | None
+    """What moves the joints."""
 
 
 def beginning(

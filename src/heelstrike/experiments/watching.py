@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol, Unpack
 
@@ -23,6 +23,7 @@ from heelstrike.experiments.laws import (
 )
 from heelstrike.experiments.passive import USUAL_SLOPES, passive_walk
 from heelstrike.experiments.walk import beginning, design, typical_step
+from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, load_gait
 from heelstrike.robot import Robot, State, builtin_robots, load_robot
 from heelstrike.robot.files.options import LoadOptions
@@ -56,40 +57,27 @@ class Methods(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class First:
-    """What is chosen at first.
-
-    Attributes
-    ----------
-    method : str, optional
-        Name of the method; the usual one by default.
-    step : float
-        In s.
-    gait : path, or sequence of these, optional
-        Saved gaits of the robots, offered beside the designed ones; the first is walked.
-    laws : sequence of Entry
-        Laws offered beside those that have a name; the first moves the joints. By default that is
-        the law that steps where balance needs it, where a robot can have it, or computed torque.
-    friction : float
-        For which gaits are designed, too.
-    slope : float, optional
-        In degrees; by default level, or a descent for walkers without motors.
-    roughness : float
-        Greatest height of the ground's corners (m).
-    seed : int
-        Of the roughness.
-    ground : Ground, optional
-        Instead of a slope and roughness that can be set.
-    """
+    """What is chosen at first."""
 
     method: str | None = None
+    """Name of the method; the usual one by default."""
     step: float = 1e-3
+    """In s."""
     gait: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] | None = None
+    """Saved gaits of the robots, offered beside the designed ones; the first is walked."""
     laws: Sequence[Entry] = ()
+    """Laws offered beside those that have a name; the first moves the joints. By default that is
+    the law that steps where balance needs it, where a robot can have it, or computed torque."""
     friction: float = 0.75
+    """For which gaits are designed, too."""
     slope: float | None = None
+    """In degrees; by default level, or a descent for walkers without motors."""
     roughness: float = 0.0
+    """Greatest height of the ground's corners (m)."""
     seed: int = 1
+    """Of the roughness."""
     ground: Ground | None = None
+    """Instead of a slope and roughness that can be set."""
 
 
 class WalkStage(Stage):

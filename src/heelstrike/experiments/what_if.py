@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from heelstrike.errors import HeelstrikeError
 from heelstrike.experiments.laws import Entry, law_called
 from heelstrike.experiments.walk import walk
 from heelstrike.experiments.zoo.disturbances import DISTURBANCES, Chance, Effort
+from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot
 from heelstrike.sim import Push, Run, RunStatus
@@ -54,28 +55,17 @@ NO_GAIT = Tried(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
-    """A walk, with all that decides how it goes.
-
-    Attributes
-    ----------
-    robot : Robot
-    gait : Gait
-    law : Entry
-        What moves the joints; computed torque by default.
-    ground : Ground
-    pushes : sequence of Push
-    method : Method
-    steps : int
-        Steps that it is to take.
-    """
+    """A walk, with all that decides how it goes."""
 
     robot: Robot
     gait: Gait
     law: Entry = PAPER
+    """What moves the joints; computed torque by default."""
     ground: Ground = field(default_factory=Ground)
     pushes: Sequence[Push] = ()
     method: Method = field(default_factory=lambda: TimeStepping(step=1e-3))
     steps: int = 10
+    """Steps that it is to take."""
 
     def run(self, progress: Callable[[float], None] | None = None) -> Run:
         """Walk."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import enum
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 
@@ -14,9 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.arguments import takes
 from heelstrike.errors import GaitError
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.polynomials import evaluated
+from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.model import NUMBERS
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -35,18 +36,6 @@ class Footing(enum.Enum):
 class Phase:
     """A part of a step in which the same feet stand in the same way.
 
-    Attributes
-    ----------
-    contacts : mapping of int to Footing
-        The feet that stand in the first step, by their index in ``robot.feet``, and how.
-    breakpoints : (K + 1,) float
-        Times, since the beginning of the phase, between which one polynomial holds, in s.
-    pieces : (K, d + 1, nu) float
-        Coefficients, lowest first, of the joints' polynomials in the time since the beginning of
-        each piece. A cubic (paper eq. 41) is one piece of degree d = 3.
-    pitch_pieces : (K, d + 1) float or None
-        The same for the trunk's pitch, where no flat foot makes it follow from the joints.
-
     Raises
     ------
     GaitError
@@ -54,9 +43,16 @@ class Phase:
     """
 
     contacts: Mapping[int, Footing]
+    """The feet that stand in the first step, by their index in ``robot.feet``, and how."""
     breakpoints: Floats
+    """(K + 1,) Times, since the beginning of the phase, between which one polynomial holds, in
+    s."""
     pieces: Floats
+    """(K, d + 1, nu) Coefficients, lowest first, of the joints' polynomials in the time since the
+    beginning of each piece. A cubic (paper eq. 41) is one piece of degree d = 3."""
     pitch_pieces: Floats | None = None
+    """(K, d + 1) The same for the trunk's pitch, where no flat foot makes it follow from the
+    joints."""
 
     def __post_init__(self) -> None:
         if not self.contacts:
@@ -85,43 +81,10 @@ class Phase:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Gait:
+class Gait(ShownInNotebooks):
     """A walk in which every step mirrors the one before (paper eq. 13, 41-43).
 
     Joint arrays are in the order of the robot's actuators, ``robot.model.actuator_joint``.
-
-    Attributes
-    ----------
-    robot : str
-        Name of the robot it was designed for.
-    fingerprint : str
-        :func:`fingerprint` of that robot.
-    joint_names : tuple of nu str
-        Actuated joints.
-    step_length : float
-        Distance (m) between the feet when both are on the ground: how far the body moves a step.
-    phases : tuple of Phase
-        The first step, phase by phase.
-    mirror_joint : (nu,) int
-        Counterpart of every joint on the other side.
-    mirror_sign, mirror_offset : (nu,) float
-        Mirrored positions are ``mirror_sign * q[mirror_joint] + mirror_offset``.
-    initial_state : State
-        All coordinates at the beginning of the first step, just after touchdown, with the middle
-        of the stance sole, or the point on which the robot stands, at the origin of the world.
-    cost : float
-        ∫ΓᵀΓ dt over one step, in N²m²s (paper eq. 40).
-    friction : float
-        Coefficient of friction it was designed for.
-    clearance : float
-        Greatest height of the swing foot's clearance profile, in m.
-    clearance_profile : ClearanceProfile
-        Shape of that profile.
-    touchdown_impulse : (3,) float
-        Impulse of the ground on the landing foot at the middle of its sole: normal (N s),
-        tangential (N s), moment about +y (N m s). Zero for a gait without impact.
-    margins : Margins
-        How far the gait stays from its constraints.
 
     Raises
     ------
@@ -130,20 +93,37 @@ class Gait:
     """
 
     robot: str
+    """Name of the robot it was designed for."""
     fingerprint: str
+    """:func:`fingerprint` of that robot."""
     joint_names: tuple[str, ...]
+    """The nu actuated joints."""
     step_length: float
+    """Distance (m) between the feet when both are on the ground: how far the body moves a step."""
     phases: tuple[Phase, ...]
+    """The first step, phase by phase."""
     mirror_joint: NDArray[np.int64]
+    """(nu,) Counterpart of every joint on the other side."""
     mirror_sign: Floats
     mirror_offset: Floats
+    """mirror_sign, mirror_offset: (nu,) Mirrored positions are ``mirror_sign * q[mirror_joint] +
+    mirror_offset``."""
     initial_state: State
+    """All coordinates at the beginning of the first step, just after touchdown, with the middle of
+    the stance sole, or the point on which the robot stands, at the origin of the world."""
     cost: float
+    """∫ΓᵀΓ dt over one step, in N²m²s (paper eq. 40)."""
     friction: float
+    """Coefficient of friction it was designed for."""
     clearance: float
+    """Greatest height of the swing foot's clearance profile, in m."""
     clearance_profile: ClearanceProfile
+    """Shape of that profile."""
     touchdown_impulse: Floats
+    """(3,) Impulse of the ground on the landing foot at the middle of its sole: normal (N s),
+    tangential (N s), moment about +y (N m s). Zero for a gait without impact."""
     margins: Margins
+    """How far the gait stays from its constraints."""
 
     def __post_init__(self) -> None:
         nu = len(self.joint_names)
@@ -418,11 +398,6 @@ class Gait:
         from heelstrike.gait.file import save_gait
 
         save_gait(self, path)
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import gait_card
-
-        return gait_card(self)
 
     def __repr__(self) -> str:
         return (

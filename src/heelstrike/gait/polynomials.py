@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.polynomial.polynomial import polyder, polyval, polyvander
 from numpy.typing import NDArray
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.field_texts import dataclass
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -132,24 +132,17 @@ def motion_in_piece(
 
 @dataclass(frozen=True)
 class Instants:
-    """Instants of a step on a mesh of equal pieces.
-
-    Attributes
-    ----------
-    pieces : int
-        Number of pieces.
-    piece : (N,) int
-        Piece in which an instant lies: at a joint of two, that whose end is meant.
-    share : (N,) float
-        Where in that piece, from 0 to 1.
-    weight : (N,) float
-        Quadrature weights for a step of duration 1; zero for instants at which constraints hold.
-    """
+    """Instants of a step on a mesh of equal pieces."""
 
     pieces: int
+    """Number of pieces."""
     piece: Integers
+    """(N,) Piece in which an instant lies: at a joint of two, that whose end is meant."""
     share: Floats
+    """(N,) Where in that piece, from 0 to 1."""
     weight: Floats
+    """(N,) Quadrature weights for a step of duration 1; zero for instants at which constraints
+    hold."""
 
     @property
     def phases(self) -> Floats:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 import scipy.sparse.linalg
 from numpy.typing import NDArray
 
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.polynomials import Instants, coefficients, gauss, lobatto
 from heelstrike.gait.request import Request
@@ -73,27 +73,18 @@ def first_instants(request: Request) -> tuple[int, Instants]:
 
 @dataclass(frozen=True)
 class Solution:
-    """Where IPOPT stopped.
-
-    Attributes
-    ----------
-    unknowns : (n,) float
-        The unknowns of the program.
-    objective : float
-        Value of the objective.
-    converged : bool
-        Whether it is an optimum within the tolerance.
-    ended : str
-        IPOPT's own word for how it did.
-    multipliers : (m,) float
-        Multipliers of the scaled constraints, in the order of :meth:`Program.labelled_rows`.
-    """
+    """Where IPOPT stopped."""
 
     unknowns: Floats
+    """(n,) The unknowns of the program."""
     objective: float
+    """Value of the objective."""
     converged: bool
+    """Whether it is an optimum within the tolerance."""
     ended: str
+    """IPOPT's own word for how it did."""
     multipliers: Floats
+    """(m,) Multipliers of the scaled constraints, in the order of :meth:`Program.labelled_rows`."""
 
 
 @dataclass(eq=False)
@@ -104,28 +95,20 @@ class Program:
     beginning of every piece, and the parts of its acceleration; then the step's duration and
     length. The positions at its beginning are the mirror image of those at its end. Where a piece
     ends, the next one begins: those equations always hold, also in an elastic program.
-
-    Parameters
-    ----------
-    transcription : Transcription
-        The functions.
-    profile : ClearanceProfile
-        Shape of the swing foot's clearance.
-    degree : int
-        Degree of the polynomials.
-    instants : Instants
-        When the constraints along the path hold. Equations among them hold where the instants
-        have a weight; the others only carry inequalities.
-    elastic : bool
-        Let every constraint be violated and minimise the sum of the scaled violations instead of
-        the effort: shows which constraints are in conflict when there is no solution.
     """
 
     transcription: Transcription
+    """The functions."""
     profile: ClearanceProfile
+    """Shape of the swing foot's clearance."""
     degree: int
+    """Degree of the polynomials."""
     instants: Instants
+    """When the constraints along the path hold. Equations among them hold where the instants have a
+    weight; the others only carry inequalities."""
     elastic: bool = False
+    """Let every constraint be violated and minimise the sum of the scaled violations instead of the
+    effort: shows which constraints are in conflict when there is no solution."""
 
     def __post_init__(self) -> None:
         self.request = self.transcription.request

@@ -40,7 +40,7 @@ NUMBERS = {
 }
 """Numbers that are asked for: the unit of one that must be positive; others are not negative."""
 
-SHORTEST, LONGEST = 0.2, 40.0
+SHORTEST_STEP, LONGEST_STEP = 0.2, 40.0
 """Step durations that are considered, in units of the pendulum time sqrt(height / gravity)."""
 SHORTEST_FREE, LONGEST_FREE = 0.5, 8.0
 """The same where the optimiser chooses the duration."""
@@ -170,7 +170,7 @@ class Request:
                 f"robot {self.robot.name!r} cannot take a step of {length:g} m: stretched flat "
                 f"out, its legs put the feet less than {self.reach:.4g} m apart."
             )
-        shortest, longest = (k * self.pendulum_time for k in (SHORTEST, LONGEST))
+        shortest, longest = (k * self.pendulum_time for k in (SHORTEST_STEP, LONGEST_STEP))
         if duration is not None and not shortest <= duration <= longest:
             raise InfeasibleGaitError(
                 f"a step of {duration:g} s is out of range for robot {self.robot.name!r}: with a "

@@ -2,50 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import GaitError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
+from heelstrike.tolerances import CLOSED_GAP
 
 Floats = NDArray[np.float64]
-
-TOUCHING = 1e-9
-"""Contact points less than this above the ground (m) belong to the sole of a flat foot."""
 
 
 @dataclass(frozen=True)
 class Sole:
-    """A foot standing on level ground.
-
-    Attributes
-    ----------
-    foot : int
-        Index of the foot in ``robot.feet``.
-    link : int
-        Link of the foot.
-    angle : float
-        Rotation of the link about +y (rad) at which the foot lies flat; zero for a point foot.
-    point : (2,) float
-        Middle of the sole on the ground, or centre of a point foot's disc, in the link frame (m).
-    radius : float
-        Radius of a point foot's disc (m), which rolls; zero for a flat foot.
-    half_length : float
-        Distance (m) from the middle of the sole to its heel and toe; zero for a point foot.
-    contacts : tuple of int
-        All contact points of the foot.
-    """
+    """A foot standing on level ground."""
 
     foot: int
+    """Index of the foot in ``robot.feet``."""
     link: int
+    """Link of the foot."""
     angle: float
+    """Rotation of the link about +y (rad) at which the foot lies flat; zero for a point foot."""
     point: Floats
+    """(2,) Middle of the sole on the ground, or centre of a point foot's disc, in the link frame
+    (m)."""
     radius: float
+    """Radius of a point foot's disc (m), which rolls; zero for a flat foot."""
     half_length: float
+    """Distance (m) from the middle of the sole to its heel and toe; zero for a point foot."""
     contacts: tuple[int, ...]
+    """All contact points of the foot."""
 
     @property
     def flat(self) -> bool:
@@ -81,8 +69,8 @@ def sole(robot: Robot, foot: int) -> Sole:
         for angle in _tangent_angles(center[i] - center[j], radius[i] - radius[j]):
             x, z = _rotated(center, angle)
             bottom = z - radius
-            touching = x[bottom < bottom[i] + TOUCHING]
-            if bottom.min() >= bottom[i] - TOUCHING and np.ptp(touching) > TOUCHING:
+            touching = x[bottom < bottom[i] + CLOSED_GAP]
+            if bottom.min() >= bottom[i] - CLOSED_GAP and np.ptp(touching) > CLOSED_GAP:
                 found.append((angle, touching.min(), touching.max(), bottom[i]))
     if not found:
         raise GaitError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import product
 
 import casadi
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, symbols
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.request import Request
 from heelstrike.gait.sole import leg
 
@@ -28,27 +28,21 @@ TYPICAL_DURATION = 2.2
 TYPICAL_LENGTH = 0.3
 """Step length in standing heights where none is given."""
 SWEEPS = 60
-DAMPING = 1e-4
+START_DAMPING = 1e-4
 
 
 @dataclass(frozen=True)
 class Start:
-    """A step to start from: the parabola through three postures.
-
-    Attributes
-    ----------
-    begin, middle, end : (n,) float
-        Positions of the coordinates that the stance foot leaves free, at the beginning, in the
-        middle and at the end of the step.
-    duration, length : float
-        Duration (s) and length (m) of the step.
-    """
+    """A step to start from: the parabola through three postures."""
 
     begin: Floats
     middle: Floats
     end: Floats
+    """begin, middle, end: (n,) Positions of the coordinates that the stance foot leaves free, at
+    the beginning, in the middle and at the end of the step."""
     duration: float
     length: float
+    """duration, length: Duration (s) and length (m) of the step."""
 
     def motion(self, phases: Floats) -> tuple[Floats, Floats, Floats]:
         """Positions, velocities and accelerations at phases of the step, (n, N) each."""
@@ -149,7 +143,7 @@ class _Kinematics:
             missing = target - value.ravel()
             if np.abs(missing).max() < 1e-9:
                 break
-            normal = jacobian.T @ jacobian + DAMPING * np.eye(q.size)
+            normal = jacobian.T @ jacobian + START_DAMPING * np.eye(q.size)
             step = np.linalg.solve(normal, jacobian.T @ missing)
             q = self._in_range(q + step / max(1.0, np.abs(step).max() / BENT))
         return q

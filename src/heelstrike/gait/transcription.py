@@ -7,7 +7,6 @@ inside; on a point there is none, which is an equation along the path.
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -15,6 +14,7 @@ import casadi
 import numpy as np
 
 from heelstrike.dynamics.queries.symbolic import expression, symbols
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.request import Request
 from heelstrike.gait.support import Impact, Support, Symbols
 
@@ -54,25 +54,17 @@ class Group(enum.Enum):
 
 @dataclass(frozen=True)
 class Row:
-    """One scaled constraint, ``lower <= expression <= upper``.
-
-    Attributes
-    ----------
-    group : Group
-        What it is about.
-    subject : str
-        Joint or contact point concerned, if any.
-    lower, upper : float
-        Bounds in scaled units.
-    scale : float
-        Size of the scaled unit in the unit of the group.
-    """
+    """One scaled constraint, ``lower <= expression <= upper``."""
 
     group: Group
+    """What it is about."""
     subject: str
+    """Joint or contact point concerned, if any."""
     lower: float
     upper: float
+    """lower, upper: Bounds in scaled units."""
     scale: float
+    """Size of the scaled unit in the unit of the group."""
 
 
 class Constraints:

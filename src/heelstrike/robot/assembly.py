@@ -21,7 +21,7 @@ LARGEST_NUMBER = 1e10
 
 UNLIKELY = "numbers that are unlikely"
 DIFFERENT = "left and right differ"
-SINGULAR = 1e-12
+SINGULAR_MASS = 1e-12
 """Smallest eigenvalue of a mass matrix, of diagonal 1, up to which it is singular: rounding."""
 SHARE = 0.1  # of a motion without mass, from which a joint is named
 SHOWN = 6  # how many findings a message lists before it counts the rest
@@ -191,7 +191,7 @@ def _refuse_joints_without_inertia(model: Model, joint_names: tuple[str, ...], s
     matrix = _mass_matrix(model, 1.0 + np.sqrt(np.arange(model.nj)))  # in line by no chance
     scale = np.sqrt(np.maximum(matrix.diagonal(), resistance))
     least, motions = np.linalg.eigh(matrix / np.outer(scale, scale))
-    if least[0] <= SINGULAR:
+    if least[0] <= SINGULAR_MASS:
         free = np.flatnonzero(np.abs(motions[:, 0]) > SHARE)
         raise RobotError(
             f"{source}: joints {' and '.join(repr(joint_names[joint]) for joint in free)} can move "

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.shapes import mesh_corners
@@ -17,10 +18,9 @@ from heelstrike.robot.files.snapping import IN_PLANE
 from heelstrike.robot.model import NUMBERS, SCALES, bounds
 from heelstrike.robot.shapes.convex import lowest_chain, touches_first
 from heelstrike.robot.warning import warn
+from heelstrike.tolerances import LEVEL_GROUND, ONE_POINT
 
-SAME_PLACE = 1e-9  # metres; nearer points of one link are one point
 SMALLEST_RADIUS = 1e-9  # metres; a smaller sphere is a point, which MJCF cannot say otherwise
-LEVEL = 1e-6  # sine of the slope up to which ground counts as level
 
 MOST_POINTS = 2000
 
@@ -29,30 +29,22 @@ PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)  # MuJ
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """A disc (or a point, of radius zero) fixed to a link.
-
-    Attributes
-    ----------
-    link : int
-        Link that carries it.
-    x, z : float
-        Its centre in the link frame (m).
-    radius : float
-        Radius (m).
-    friction : float
-        Sliding friction that the file gives its geom. The simulation takes friction from the
-        ground; this number only serves to compare left and right.
-    friction_scale, restitution_scale : float
-        What friction and restitution of the ground are multiplied by under it.
-    """
+    """A disc (or a point, of radius zero) fixed to a link."""
 
     link: int
+    """Link that carries it."""
     x: float
     z: float
+    """x, z: Its centre in the link frame (m)."""
     radius: float
+    """Radius (m)."""
     friction: float
+    """Sliding friction that the file gives its geom. The simulation takes friction from the ground;
+    this number only serves to compare left and right."""
     friction_scale: float = 1.0
     restitution_scale: float = 1.0
+    """friction_scale, restitution_scale: What friction and restitution of the ground are multiplied
+    by under it."""
 
 
 def of_model(points: list[ContactPoint]) -> dict[str, Any]:
@@ -216,8 +208,8 @@ def _mention_terrain(file: MujocoFile, ground: Iterable[int]) -> None:
         file.name("geom", g)
         for g in ground
         if model.geom_type[g] != PLANE
-        or abs(pose.geom_xpos[g, 2]) > SAME_PLACE
-        or np.hypot(pose.geom_xmat[g, 2], pose.geom_xmat[g, 5]) > LEVEL
+        or abs(pose.geom_xpos[g, 2]) > ONE_POINT
+        or np.hypot(pose.geom_xmat[g, 2], pose.geom_xmat[g, 5]) > LEVEL_GROUND
     ]
     if terrain:
         warn(
@@ -263,7 +255,7 @@ def _sole(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     height = corners[:, 1] - corners[:, 1].min()
     lowest = corners[np.lexsort((corners[:, 0], np.round(height, 9)))[0]]
     reach = np.abs(corners[:, 0] - lowest[0])
-    reach[reach < SAME_PLACE] = 0.0
+    reach[reach < ONE_POINT] = 0.0
     rise = corners[:, 1] - lowest[1]
     slope = np.divide(rise, reach, out=np.full_like(reach, np.inf), where=reach > 0.0)
     other = corners[np.lexsort((-reach, np.round(slope, 9)))[0]]
@@ -274,13 +266,13 @@ def _sole(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 def _merged(points: Iterable[ContactPoint]) -> list[ContactPoint]:
     """Points without repetition; of two that coincide the first stays, with the larger numbers."""
     kept: list[ContactPoint] = []
-    near: dict[tuple[int, float], list[int]] = {}  # by link and x in steps of `SAME_PLACE`
+    near: dict[tuple[int, float], list[int]] = {}  # by link and x in steps of `ONE_POINT`
     for point in points:
-        step = point.x / SAME_PLACE // 1.0
+        step = point.x / ONE_POINT // 1.0
         for i in sorted(i for k in (-1, 0, 1) for i in near.get((point.link, step + k), ())):
             other = kept[i]
             apart = math.hypot(point.x - other.x, point.z - other.z)
-            if max(apart, abs(point.radius - other.radius)) < SAME_PLACE:
+            if max(apart, abs(point.radius - other.radius)) < ONE_POINT:
                 larger = ("friction", *SCALES)
                 most = {name: max(getattr(other, name), getattr(point, name)) for name in larger}
                 kept[i] = replace(other, **most)

@@ -6,7 +6,7 @@ import math
 import os
 import warnings
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.assembly import DIFFERENT, UNLIKELY, link_origins
 from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mjcf import read_mjcf
@@ -32,35 +33,25 @@ from heelstrike.robot.plausibility import (
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.sides.symmetry import find_mirror
 from heelstrike.robot.warning import RobotWarning
+from heelstrike.tolerances import LEVEL_SOLE
 
-SAME_HEIGHT = 1e-4
-"""Metres up to which two contact points are equally high."""
-
-ROUND_OFF = 1e-12
+LEG_ROUNDING = 1e-12
 """Metres, of sums along a leg."""
 
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """A look at a robot.
-
-    Attributes
-    ----------
-    source : str
-        What was looked at.
-    robot : Robot or None
-        The robot, None if the file gives none. If the file holds impossible inertias, it is the
-        robot with the nearest possible ones: to look at, not to simulate.
-    findings : tuple of Finding
-        What looks wrong, nothing for a sound robot.
-    loadable : bool
-        Whether :func:`load_robot` takes the file as it is.
-    """
+    """A look at a robot."""
 
     source: str
+    """What was looked at."""
     robot: Robot | None
+    """The robot, None if the file gives none. If the file holds impossible inertias, it is the
+    robot with the nearest possible ones: to look at, not to simulate."""
     findings: tuple[Finding, ...]
+    """What looks wrong, nothing for a sound robot."""
     loadable: bool = True
+    """Whether :func:`load_robot` takes the file as it is."""
 
     @property
     def sound(self) -> bool:
@@ -226,7 +217,7 @@ def _soles(robot: Robot) -> Iterator[Finding]:
         if _is_wheel(points):
             continue
         for contact, height in zip(foot.contacts, points[:, 1] - heights[-1], strict=True):
-            if height > SAME_HEIGHT:
+            if height > LEVEL_SOLE:
                 yield Finding(
                     FindingKind.CONTACT,
                     f"{robot.contact_names[contact]} is {1e3 * height:.3g} mm above the sole of "
@@ -234,7 +225,7 @@ def _soles(robot: Robot) -> Iterator[Finding]:
                 )
     if not robot.feet:
         yield Finding(FindingKind.FOOT, "no link ends a leg and has contact points.")
-    if heights and max(heights) - min(heights) > SAME_HEIGHT:
+    if heights and max(heights) - min(heights) > LEVEL_SOLE:
         told = ", ".join(
             f"{foot.name} {height:.4g} m" for foot, height in zip(robot.feet, heights, strict=True)
         )
@@ -253,7 +244,7 @@ def _bottoms(robot: Robot) -> Floats:
     model = robot.model
     points: Floats = link_origins(model)[model.contact_link] + model.contact_position
     points[:, 1] -= model.contact_radius
-    points[np.abs(points) < ROUND_OFF] = 0.0
+    points[np.abs(points) < LEG_ROUNDING] = 0.0
     return points
 
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, Member, extent
+from heelstrike.field_texts import dataclass
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -35,41 +35,28 @@ SELDOM = ("loops", "couplings", "latches", "brakes")
 
 @dataclass(frozen=True, kw_only=True)
 class Number(Member):
-    """What is known of a number of the robot.
-
-    Attributes
-    ----------
-    unit : str
-        Unit of a hinge, and of a slide if that is another.
-    default : float, optional
-        What a robot has of which nobody said it.
-    least, most : float
-        The least and the most that it may be.
-    infinite : bool
-        Whether it may be infinite, which stands for none.
-    alike : bool
-        Whether left and right share it as it is, whatever the senses of their joints.
-    given : bool
-        Whether it is one of :class:`JointProperties`, by itself.
-    later : bool
-        Whether there are run files that are older than it, and mean the default.
-    called, label : str
-        What the builder and messages call it, if not by its name.
-    points : str
-        The extent that an index counts.
-    """
+    """What is known of a number of the robot."""
 
     unit: str = ""
+    """Unit of a hinge, and of a slide if that is another."""
     default: float | None = None
+    """What a robot has of which nobody said it."""
     least: float = -math.inf
     most: float = math.inf
+    """least, most: The least and the most that it may be."""
     infinite: bool = False
+    """Whether it may be infinite, which stands for none."""
     alike: bool = False
+    """Whether left and right share it as it is, whatever the senses of their joints."""
     given: bool = False
+    """Whether it is one of :class:`JointProperties`, by itself."""
     later: bool = False
+    """Whether there are run files that are older than it, and mean the default."""
     called: str = ""
     label: str = ""
+    """called, label: What the builder and messages call it, if not by its name."""
     points: str = ""
+    """The extent that an index counts."""
 
 
 def of(*shape: str | int, kind: type = float, **about: Any) -> Any:
@@ -92,117 +79,55 @@ class Model(Bundle):
     coordinate ``i`` belong together; a body with several joints becomes a chain of links of which
     all but the last are massless. All link frames are parallel to the world frame when ``q``
     equals `reference`; vectors are (x, z) pairs in link axes, lengths in metres.
-
-    Attributes
-    ----------
-    nl, nj, nq, nv : int
-        Number of links, of joints (one a link), of positions and of velocities. In the plane they
-        are equal; each counts what it says.
-    nc, nu : int
-        Number of contact points and of actuators.
-    loops, couplings, latches, brakes : int
-        Number of closed loops, of coupled joints, of latches and of brakes.
-    axes : int
-        Dimension of space.
-    parent : (nl,) int
-        Index of the parent link, smaller than the link's own; -1 for the world.
-    axis : (nj, 3) float
-        Motion of the joint per unit of its coordinate, in the parent's axes: rotation about +y
-        (rad), translation along x and z (m). ``(±1, 0, 0)`` is a hinge, ``(0, x, z)`` a slide.
-    offset : (nj, axes) float
-        Origin of the link frame in the parent's frame when ``q`` equals `reference`.
-    reference : (nq,) float
-        Coordinates at which all link frames are parallel to the world frame.
-    mass, inertia : (nl,) float
-        Mass (kg) and moment of inertia about the link's own centre of mass (kg m²).
-    center_of_mass : (nl, axes) float
-        Centre of mass in the link frame.
-    armature, damping, stiffness : (nv,) float
-        Rotor inertia (kg m²), viscous damping (N m s) and spring (N m).
-    rest : (nq,) float
-        Coordinate at which the spring is slack.
-    dry_friction : (nv,) float
-        Coulomb friction of the joint (N m; N of a slide): what it takes to move it at all, and what
-        opposes it as it moves.
-    lower, upper : (nq,) float
-        Range of the coordinate; infinite where there is no stop.
-    speed_limit : (nv,) float
-        Greatest speed that the drive of the joint stands (rad/s, m/s), which gaits keep to;
-        infinite where there is none.
-    stall_torque : (nv,) float
-        Torque of the motor (N m; N of a slide) at rest and full voltage, seen at the joint;
-        infinite if unknown, and then nothing but `torque_lower` and `torque_upper` limits it.
-    no_load_speed : (nv,) float
-        Speed of the joint (rad/s, m/s) at which that torque is zero, falling along a straight line;
-        infinite if unknown, and then it does not fall.
-    winding_resistance : (nv,) float
-        Electrical resistance of the motor (ohm); zero if unknown.
-    gravity : (axes,) float
-        Acceleration of free fall (m/s²), (0, -9.81) on earth.
-    contact_link : (nc,) int
-        Link that carries each contact point.
-    contact_position : (nc, axes) float
-        Centre of each contact disc in the link frame.
-    contact_radius : (nc,) float
-        Radius of each contact disc; zero for a point.
-    friction_scale, restitution_scale : (nc,) float
-        What friction and restitution of the ground are multiplied by under each contact point;
-        restitution by one at most.
-    actuator_joint : (nu,) int
-        Coordinate that each actuator drives.
-    torque_lower, torque_upper : (nu,) float
-        Torque (N m) or force (N) limits at the joint; infinite where there is none.
-    loop_link : (loops, 2) int
-        The two links that each closed loop joins by a hinge, -1 for the world.
-    loop_position : (loops, 2, axes) float
-        Where the hinge is on each of them, in the frame of the link (m).
-    coupling_joint : (couplings, 2) int
-        Joint that follows another and the one that leads it, -1 if it is held where it is.
-    coupling_polynomial : (couplings, 5) float
-        How far from its `reference` the follower is (rad, m): coefficients c₀ … c₄ of the powers of
-        how far the leader is from its own.
-    latch_joint : (latches,) int
-        Joint that each latch holds once it has reached an end of its range.
-    latch_side : (latches,) int
-        That end: 1 for the upper, -1 for the lower.
-    latch_release : (latches,) int
-        Link whose touchdown makes it let go; -1 if none does.
-    brake_joint : (brakes,) int
-        Joint that each brake holds wherever it is, while it is on.
-    brake_limit : (brakes,) float
-        Torque (N m) or force (N) beyond which it slips, and goes on rubbing with; infinite for one
-        that does not slip.
-    pivot : int
-        Link whose origin serves as the reference point of spatial vectors, so that a robot far
-        from the world origin loses no digits.
     """
 
     nl: int = extent()
     nj: int = extent()
     nq: int = extent()
     nv: int = extent()
+    """nl, nj, nq, nv: Number of links, of joints (one a link), of positions and of velocities. In
+    the plane they are equal; each counts what it says."""
     nc: int = extent()
     nu: int = extent()
+    """nc, nu: Number of contact points and of actuators."""
     loops: int = extent()
     couplings: int = extent()
     latches: int = extent()
     brakes: int = extent()
+    """loops, couplings, latches, brakes: Number of closed loops, of coupled joints, of latches and
+    of brakes."""
     axes: int = extent()
+    """Dimension of space."""
 
     parent: Integers = of("nl", kind=int, points="nl", least=-1)
+    """Index of the parent link, smaller than the link's own; -1 for the world."""
     axis: Floats = of("nj", 3, unit="rad, m")
+    """Motion of the joint per unit of its coordinate, in the parent's axes: rotation about +y
+    (rad), translation along x and z (m). ``(±1, 0, 0)`` is a hinge, ``(0, x, z)`` a slide."""
     offset: Floats = of("nj", "axes", unit="m", alike=True, label="place")
+    """Origin of the link frame in the parent's frame when ``q`` equals `reference`."""
     reference: Floats = of("nq", unit="rad, m", **_POSE)
+    """Coordinates at which all link frames are parallel to the world frame."""
     mass: Floats = of("nl", unit="kg", **_PART)
+    """Mass of the link."""
     center_of_mass: Floats = of("nl", "axes", unit="m", alike=True, label="centre of mass", **_POSE)
+    """In the link frame."""
     inertia: Floats = of("nl", unit="kg m²", **_PART)
+    """Moment of inertia about the link's own centre of mass."""
     armature: Floats = of("nv", unit="kg m², kg", **_PART)
+    """Inertia of the rotor."""
     damping: Floats = of("nv", unit="N m s/rad, N s/m", **_PART)
+    """Viscous damping."""
     stiffness: Floats = of("nv", unit="N m/rad, N/m", **_PART)
+    """Stiffness of the spring."""
     rest: Floats = of("nq", unit="rad, m", **_POSE)
+    """Coordinate at which the spring is slack."""
     dry_friction: Floats = of("nv", unit="N m, N", later=True, **_PART)
+    """Coulomb friction of the joint: what it takes to move it at all, and what
+    opposes it as it moves."""
     lower: Floats = of("nq", unit="rad, m", **_LIMIT)
     upper: Floats = of("nq", unit="rad, m", **_LIMIT)
+    """lower, upper: Range of the coordinate; infinite where there is no stop."""
     speed_limit: Floats = of(
         "nv",
         unit="rad/s, m/s",
@@ -210,28 +135,57 @@ class Model(Bundle):
         called="speed",
         **_LIMIT | _PART | _UNKNOWN,
     )
+    """Greatest speed that the drive of the joint stands, which gaits keep to; infinite
+    where there is none."""
     stall_torque: Floats = of("nv", unit="N m, N", later=True, **_LIMIT | _PART | _UNKNOWN)
+    """Torque of the motor at rest and full voltage, seen at the joint; infinite
+    if unknown, and then nothing but `torque_lower` and `torque_upper` limits it."""
     no_load_speed: Floats = of("nv", unit="rad/s, m/s", later=True, **_LIMIT | _PART | _UNKNOWN)
+    """Speed of the joint at which that torque is zero, falling along a straight line;
+    infinite if unknown, and then it does not fall."""
     winding_resistance: Floats = of("nv", unit="ohm", later=True, **_PART)
+    """Electrical resistance of the motor; zero if unknown."""
     gravity: Floats = of("axes", unit="m/s²")
+    """Acceleration of free fall, (0, -9.81) on earth."""
     contact_link: Integers = of("nc", kind=int, points="nl", least=0)
+    """Link that carries each contact point."""
     contact_position: Floats = of("nc", "axes", unit="m")
+    """Centre of each contact disc in the link frame."""
     contact_radius: Floats = of("nc", unit="m", least=0.0)
+    """Radius of each contact disc; zero for a point."""
     friction_scale: Floats = of("nc", **_SCALE)
     restitution_scale: Floats = of("nc", most=1.0, **_SCALE)
+    """friction_scale, restitution_scale: What friction and restitution of the ground are multiplied
+    by under each contact point; restitution by one at most."""
     actuator_joint: Integers = of("nu", kind=int, points="nv", least=0)
+    """Coordinate that each actuator drives."""
     torque_lower: Floats = of("nu", unit="N m, N", **_LIMIT)
     torque_upper: Floats = of("nu", unit="N m, N", **_LIMIT)
+    """torque_lower, torque_upper: Limits of torque or force at the joint; infinite where there is
+    none."""
     loop_link: Integers = of("loops", 2, kind=int, points="nl", least=-1, **_LATER)
+    """The two links that each closed loop joins by a hinge, -1 for the world."""
     loop_position: Floats = of("loops", 2, "axes", unit="m", **_LATER)
+    """Where the hinge is on each of them, in the frame of the link."""
     coupling_joint: Integers = of("couplings", 2, kind=int, points="nv", least=-1, **_LATER)
+    """Joint that follows another and the one that leads it, -1 if it is held where it is."""
     coupling_polynomial: Floats = of("couplings", POWERS, unit="rad, m", **_LATER)
+    """How far from its `reference` the follower is: coefficients c₀ … c₄ of the powers of
+    how far the leader is from its own."""
     latch_joint: Integers = of("latches", kind=int, points="nv", least=0, **_LATER)
+    """Joint that each latch holds once it has reached an end of its range."""
     latch_side: Integers = of("latches", kind=int, least=-1, **_LATER)
+    """That end: 1 for the upper, -1 for the lower."""
     latch_release: Integers = of("latches", kind=int, points="nl", least=-1, **_LATER)
+    """Link whose touchdown makes it let go; -1 if none does."""
     brake_joint: Integers = of("brakes", kind=int, points="nv", least=0, **_LATER)
+    """Joint that each brake holds wherever it is, while it is on."""
     brake_limit: Floats = of("brakes", unit="N m, N", least=0.0, later=True, **_LIMIT | _UNKNOWN)
+    """Torque or force beyond which it slips, and goes on rubbing with; infinite for one
+    that does not slip."""
     pivot: int = of(kind=int, points="nl", least=0)
+    """Link whose origin serves as the reference point of spatial vectors, so that a robot far from
+    the world origin loses no digits."""
 
     @classmethod
     def made(cls, **members: Any) -> Model:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Model
 
 LARGEST_EXTENT = 100.0
@@ -40,18 +40,12 @@ class FindingKind(enum.Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that looks wrong.
-
-    Attributes
-    ----------
-    kind : FindingKind
-        What it is about.
-    message : str
-        What was found, where, with the numbers.
-    """
+    """One thing that looks wrong."""
 
     kind: FindingKind
+    """What it is about."""
     message: str
+    """What was found, where, with the numbers."""
 
     def __str__(self) -> str:
         return f"{self.kind.value}: {self.message}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,8 @@ import numpy as np
 
 from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
+from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.coordinates import Spread, checked, finite, index_of, spread_of
 from heelstrike.robot.model import Model
 from heelstrike.robot.shapes.outlines import Outline
@@ -24,96 +26,64 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Foot:
-    """A link that ends a leg and carries contact points.
-
-    Attributes
-    ----------
-    name : str
-        Name of the foot's body in the robot file.
-    link : int
-        Index of the foot's link.
-    contacts : tuple of int
-        Indices of its contact points, ordered from heel to toe.
-    """
+    """A link that ends a leg and carries contact points."""
 
     name: str
+    """Name of the foot's body in the robot file."""
     link: int
+    """Index of the foot's link."""
     contacts: tuple[int, ...]
+    """Indices of its contact points, ordered from heel to toe."""
 
 
 @dataclass(frozen=True)
 class LockedJoint:
-    """A joint of a robot's file that the planar robot does not have.
-
-    Attributes
-    ----------
-    name, link : str
-        Name of the joint and of the body that it moves in the file.
-    kind : str
-        ``hinge``, ``slide``, ``ball`` or ``free``.
-    axis : (3,) float
-        Its axis in the world (x forward, y to the left, z up); zero where it has no single one.
-    position : float
-        Where it is locked (rad, m).
-    reason : str
-        Why it does not move.
-    """
+    """A joint of a robot's file that the planar robot does not have."""
 
     name: str
     link: str
+    """name, link: Name of the joint and of the body that it moves in the file."""
     kind: str
+    """``hinge``, ``slide``, ``ball`` or ``free``."""
     axis: tuple[float, float, float]
+    """Its axis in the world (x forward, y to the left, z up); zero where it has no single one."""
     position: float
+    """Where it is locked (rad, m)."""
     reason: str
+    """Why it does not move."""
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
-    """A planar robot.
-
-    Attributes
-    ----------
-    name : str
-        Name of the robot.
-    model : Model
-        The arrays that the kernels use.
-    joint_names, link_names : tuple of str
-        Names of the nv coordinates and of the links they move. A body with several joints gives
-        several links that share its name.
-    actuator_names : tuple of str
-        Names of the nu actuators.
-    contact_names : tuple of str
-        Names of the nc contact points.
-    feet : tuple of Foot
-        Links that end a leg and carry contact points, in file order.
-    mirror : Mirror or None
-        Exchange of left and right, or None for a robot that is not symmetric.
-    floating : bool
-        Whether the first three coordinates are the trunk's x, z and pitch.
-    contact_friction : tuple of float
-        Friction of the nc contact points according to the robot's file, empty if unknown. A
-        simulation takes friction from its `Ground`.
-    source : str
-        File or builder the robot came from, for error messages.
-    locked : tuple of LockedJoint
-        Joints of its file that do not move here, as ``projected=True`` makes them.
-    outlines : tuple of Outline
-        What its links look like, for pictures; nothing if its file has no shapes.
-    """
+class Robot(ShownInNotebooks):
+    """A planar robot."""
 
     name: str
+    """Name of the robot."""
     model: Model
+    """The arrays that the kernels use."""
     joint_names: tuple[str, ...]
     link_names: tuple[str, ...]
+    """joint_names, link_names: Names of the nv coordinates and of the links they move. A body with
+    several joints gives several links that share its name."""
     actuator_names: tuple[str, ...]
+    """Names of the nu actuators."""
     contact_names: tuple[str, ...]
+    """Names of the nc contact points."""
     feet: tuple[Foot, ...]
+    """Links that end a leg and carry contact points, in file order."""
     mirror: Mirror | None
+    """Exchange of left and right, or None for a robot that is not symmetric."""
     floating: bool
+    """Whether the first three coordinates are the trunk's x, z and pitch."""
     contact_friction: tuple[float, ...] = ()
+    """Friction of the nc contact points according to the robot's file, empty if unknown. A
+    simulation takes friction from its `Ground`."""
     source: str = field(default="", repr=False)
+    """File or builder the robot came from, for error messages."""
     locked: tuple[LockedJoint, ...] = field(default=(), repr=False)
+    """Joints of its file that do not move here, as ``projected=True`` makes them."""
     outlines: tuple[Outline, ...] = field(default=(), repr=False)
+    """What its links look like, for pictures; nothing if its file has no shapes."""
 
     def __post_init__(self) -> None:
         if self.mirror is not None:
@@ -595,11 +565,6 @@ class Robot:
         from heelstrike.dynamics.queries.c_code import c_code
 
         return c_code(self.model, name or self.name, self.joint_names)
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import robot_card
-
-        return robot_card(self)
 
     def __repr__(self) -> str:
         return (

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Foot, Robot
 
 Floats = NDArray[np.float64]
@@ -14,26 +13,18 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Sole:
-    """The line under a foot from its first to its last contact point.
-
-    Attributes
-    ----------
-    foot : Foot
-        The foot.
-    reference : (2,) float
-        Reference point in the link frame (m): the foot link's origin, that is the ankle, projected
-        onto the sole. A foot of one contact point has its reference there.
-    heel, toe : float
-        Ends of the sole, measured forward along it from the reference point (m).
-    ends : (2, 2) float
-        The same, heel and toe, as points (x, z) in the link frame (m).
-    """
+    """The line under a foot from its first to its last contact point."""
 
     foot: Foot
+    """The foot."""
     reference: Floats
+    """(2,) Reference point in the link frame (m): the foot link's origin, that is the ankle,
+    projected onto the sole. A foot of one contact point has its reference there."""
     heel: float
     toe: float
+    """heel, toe: Ends of the sole, measured forward along it from the reference point (m)."""
     ends: Floats
+    """(2, 2) The same, heel and toe, as points (x, z) in the link frame (m)."""
 
 
 def sole(robot: Robot, foot: Foot) -> Sole:

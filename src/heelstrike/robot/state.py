@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.arguments import are_numbers, refusal
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
 
 
 @dataclass(frozen=True)
 class State:
-    """Position and velocity of a robot at one instant.
-
-    Attributes
-    ----------
-    q : (nq,) float
-        Generalised positions (m, rad).
-    v : (nv,) float
-        Generalised velocities (m/s, rad/s).
-    """
+    """Position and velocity of a robot at one instant."""
 
     q: NDArray[np.float64]
+    """(nq,) Generalised positions (m, rad)."""
     v: NDArray[np.float64]
+    """(nv,) Generalised velocities (m/s, rad/s)."""
 
     def __post_init__(self) -> None:
         for name in ("q", "v"):

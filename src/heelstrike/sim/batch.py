@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import field
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -21,6 +21,7 @@ from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import ControllerError, RobotError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -59,59 +60,45 @@ SHOWN = 10
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """What many simulations came to.
-
-    Attributes
-    ----------
-    position : (n, nq) float
-    velocity : (n, nv) float
-        State of each run when it ended (m, rad; m/s, rad/s).
-    time : (n,) float
-        When that was, in s.
-    status : tuple of RunStatus
-        How each run ended.
-    message : tuple of str
-        The same in a person's words.
-    steps, saturations : (n,) int
-        Steps taken; times that a torque was clipped to its limit.
-    events : (n, kinds) int
-        Events of each kind, in the order of :class:`~heelstrike.sim.closed_sets.EventKind`.
-    penetration : (n,) float
-        Deepest penetration of a contact point, in m.
-    complementarity, cone, non_penetration : (n,) float
-        Largest relative residuals of the contact problems.
-    energy_gain : (n,) float
-        Kinetic energy that restitution made (J).
-    solves, shortcuts, fallbacks, failures, combinations, relaxed : (n,) int
-        Contact problems of each run, and how they were solved; see
-        :class:`~heelstrike.sim.run.SolverCount`.
-    threads : int
-        Threads that worked on it.
-    timing : Timing
-        Seconds spent compiling, or loading compiled code, and simulating.
-    """
+    """What many simulations came to."""
 
     position: Floats
+    """(n, nq)"""
     velocity: Floats
+    """(n, nv) State of each run when it ended (m, rad; m/s, rad/s)."""
     time: Floats
+    """(n,) When that was, in s."""
     status: tuple[RunStatus, ...]
+    """How each run ended."""
     message: tuple[str, ...]
+    """The same in a person's words."""
     steps: Integers
     saturations: Integers
+    """steps, saturations: (n,) Steps taken; times that a torque was clipped to its limit."""
     events: Integers
+    """(n, kinds) Events of each kind, in the order of
+    :class:`~heelstrike.sim.closed_sets.EventKind`."""
     penetration: Floats
+    """(n,) Deepest penetration of a contact point, in m."""
     complementarity: Floats
     cone: Floats
     non_penetration: Floats
+    """complementarity, cone, non_penetration: (n,) Largest relative residuals of the contact
+    problems."""
     energy_gain: Floats
+    """(n,) Kinetic energy that restitution made (J)."""
     solves: Integers
     shortcuts: Integers
     fallbacks: Integers
     failures: Integers
     combinations: Integers
     relaxed: Integers
+    """solves, shortcuts, fallbacks, failures, combinations, relaxed: (n,) Contact problems of each
+    run, and how they were solved; see :class:`~heelstrike.sim.run.SolverCount`."""
     threads: int
+    """Threads that worked on it."""
     timing: Timing
+    """Seconds spent compiling, or loading compiled code, and simulating."""
     _runs: tuple[Run | None, ...] | None = field(default=None, repr=False)
 
     def __len__(self) -> int:

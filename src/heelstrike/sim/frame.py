@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -27,6 +26,7 @@ from numba import types
 from heelstrike.compiler.compilation import dissolved_kernel, loop_for
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.solvers.certified_solve import try_solvers
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.controller.asking import ask
@@ -88,33 +88,24 @@ class Scene(NamedTuple):
 
 @dataclass(frozen=True)
 class Kernels:
-    """What a method supplies to the frame; ``work`` is the bundle of the method.
-
-    Attributes
-    ----------
-    begin : kernel
-        ``begin(model, ground, memory, work, record)``: prepare the first instant; returns ``DONE``
-        or what is in the way.
-    prepare : kernel
-        ``prepare(model, ground, memory, work)``: find kinematics, velocities and contacts of the
-        state in ``memory.q`` and ``memory.v``.
-    decide : kernel
-        ``decide(scene, control, memory, work, record, clock)``: decide what
-        acts from now on; returns ``DONE`` or what is in the way.
-    report : kernel
-        ``report(scene, control, memory, work, record, clock)``: append to the
-        record what is due of this instant.
-    move : kernel
-        ``move(scene, control, memory, work, record, clock)``: bring state and
-        ``clock.time`` to the next instant; returns ``DONE`` or what is in the way. After
-        ``RECORD_FULL`` or ``FORK`` it is called again.
-    """
+    """What a method supplies to the frame; ``work`` is the bundle of the method."""
 
     begin: Callable[..., int]
+    """Kernel ``begin(model, ground, memory, work, record)``: prepare the first instant; returns
+    ``DONE`` or what is in the way."""
     prepare: Callable[..., None]
+    """Kernel ``prepare(model, ground, memory, work)``: find kinematics, velocities and contacts of
+    the state in ``memory.q`` and ``memory.v``."""
     decide: Callable[..., int]
+    """Kernel ``decide(scene, control, memory, work, record, clock)``: decide what acts from now on;
+    returns ``DONE`` or what is in the way."""
     report: Callable[..., None]
+    """Kernel ``report(scene, control, memory, work, record, clock)``: append to the record what is
+    due of this instant."""
     move: Callable[..., int]
+    """Kernel ``move(scene, control, memory, work, record, clock)``: bring state and ``clock.time``
+    to the next instant; returns ``DONE`` or what is in the way. After ``RECORD_FULL`` or ``FORK``
+    it is called again."""
 
 
 @dissolved_kernel

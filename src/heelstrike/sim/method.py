@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar
 
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact import problem
 from heelstrike.errors import ContactProblemError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
@@ -269,20 +270,14 @@ class UnknownMethod:
     """What a file tells of a method whose class, or that of a law of it, is not known.
 
     Runs made with it can be looked at, compared and saved again, but not gone on with.
-
-    Parameters
-    ----------
-    name : str
-        Name of its class.
-    settings : mapping
-        Its settings as they are in the file; those of a law begin with the law's name.
-    impulses_in_events : bool
-        Whether impulses of impacts are in the events of a run, not in the forces of its rows.
     """
 
     name: str
+    """Name of its class."""
     settings: Mapping[str, str | int | float] = field(hash=False)
+    """Its settings as they are in the file; those of a law begin with the law's name."""
     impulses_in_events: bool = False
+    """Whether impulses of impacts are in the events of a run, not in the forces of its rows."""
 
     def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:  # noqa: ARG002
         """Say nothing: nothing is known of it.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.places import add_point_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 
@@ -22,17 +23,6 @@ from heelstrike.robot.robot import Robot
 @dataclass(frozen=True)
 class Push:
     """A constant force on a point of a link over a window of time.
-
-    Parameters
-    ----------
-    link : str or int
-        Name of the body, or index of the link.
-    force : (2,) float
-        Force (x, z) on the robot in world axes, in N.
-    start, duration : float
-        When it begins and how long it lasts, in s.
-    point : (2,) float, optional
-        Where it acts, in the axes of the link, in m; by default at the link's centre of mass.
 
     Raises
     ------
@@ -51,10 +41,14 @@ class Push:
     """
 
     link: str | int
+    """Name of the body, or index of the link."""
     force: tuple[float, float] = field(kw_only=True)
+    """Force (x, z) on the robot in world axes, in N."""
     start: float = field(kw_only=True)
     duration: float = field(kw_only=True)
+    """start, duration: When it begins and how long it lasts, in s."""
     point: tuple[float, float] | None = field(default=None, kw_only=True)
+    """Where it acts, in the axes of the link, in m; by default at the link's centre of mass."""
 
     def __post_init__(self) -> None:
         check_fields(self, SimulationError)
@@ -143,25 +137,18 @@ def _pair(name: str, value: Sequence[float]) -> tuple[float, float]:
 
 
 class Pushes(Bundle):
-    """The pushes of a simulation as the kernels see them.
-
-    Attributes
-    ----------
-    link : (np,) int
-    point, position, force : (np, 2) float
-        Points in the axes of their links and, scratch, in the world; forces in world axes.
-    start, end : (np,) float
-    share : (np,) float
-        How much of each push acts in the step being computed, 0 to 1.
-    """
+    """The pushes of a simulation as the kernels see them."""
 
     link: Integers = array("np", of=int)
     point: Floats = array("np", "axes")
     position: Floats = array("np", "axes")
     force: Floats = array("np", "axes")
+    """point, position, force: Points in the axes of their links and, scratch, in the world; forces
+    in world axes."""
     start: Floats = array("np")
     end: Floats = array("np")
     share: Floats = array("np")
+    """How much of each push acts in the step being computed, 0 to 1."""
 
 
 def pushes_on(robot: Robot, pushes: Sequence[Push]) -> Pushes:

@@ -5,13 +5,11 @@ in the memory of a simulation it is, its unit and what it is called. The arrays 
 the dataset, the files and the figures follow.
 """
 
-# ruff: noqa: RUF009 - a call declares a field
-
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +18,8 @@ from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
+from heelstrike.field_texts import dataclass
+from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind, RunStatus
@@ -42,74 +42,55 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is recorded of every row.
-
-    Attributes
-    ----------
-    shape : tuple of str
-        Extents of the array of a row, by their names in :class:`~heelstrike.sim.memory.Memory`.
-    of : str
-        Where in the memory it is when a row is written.
-    unit : str
-    label : str
-        What datasets and figures call it.
-    later : bool
-        Whether there are files that are older than it, and mean zero.
-    """
+    """What is recorded of every row."""
 
     shape: tuple[str, ...]
+    """Extents of the array of a row, by their names in :class:`~heelstrike.sim.memory.Memory`."""
     of: str
+    """Where in the memory it is when a row is written."""
     unit: str
     label: str
+    """What datasets and figures call it."""
     later: bool = False
+    """Whether there are files that are older than it, and mean zero."""
+
+    @property
+    def dimensions(self) -> tuple[str, ...]:
+        """Extents of what is recorded of it, a row an instant."""
+        return ("nt", *self.shape)
 
 
 def recorded(*shape: str, of: str, unit: str, label: str, later: bool = False) -> Any:
     """Declare a recorded quantity; see :class:`Quantity`."""
-    return field(metadata={"quantity": Quantity(shape, of, unit, label, later)})
+    return field(metadata={"declared": Quantity(shape, of, unit, label, later)})
 
 
 @dataclass(frozen=True, eq=False)
 class Logged:
-    """What a controller told of itself, a value a row.
-
-    Attributes
-    ----------
-    values : (nt, ...) array
-        Values: at every row what it wrote at its last call for good.
-    unit, label : str
-        As its log declares them.
-    extents : tuple of str
-        How the array of a row is declared: ``("nu",)``, ``("2",)``; nothing of a number.
-    """
+    """What a controller told of itself, a value a row."""
 
     values: NDArray[Any]
+    """(nt, ...) Values: at every row what it wrote at its last call for good."""
     unit: str = ""
     label: str = ""
+    """unit, label: As its log declares them."""
     extents: tuple[str, ...] = ()
+    """How the array of a row is declared: ``("nu",)``, ``("2",)``; nothing of a number."""
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened at a contact point.
-
-    Attributes
-    ----------
-    time : float
-        When, in seconds.
-    kind : EventKind
-        Touchdown, lift-off, beginning of slip or of stick.
-    contact : int
-        Index of the contact point, or of the joint of a ``JOINT_`` event.
-    impulse : tuple of float
-        Impulse (normal, tangent) on the robot over the step in which it happened, in N s. Of a
-        ``BRIDGE`` its length (s) and how far it may be wrong.
-    """
+    """Something that happened at a contact point."""
 
     time: float
+    """When, in seconds."""
     kind: EventKind
+    """Touchdown, lift-off, beginning of slip or of stick."""
     contact: int
+    """Index of the contact point, or of the joint of a ``JOINT_`` event."""
     impulse: tuple[float, float]
+    """Impulse (normal, tangent) on the robot over the step in which it happened, in N s. Of a
+    ``BRIDGE`` its length (s) and how far it may be wrong."""
 
     @property
     def kind_in_words(self) -> str:
@@ -136,50 +117,36 @@ class Event:
 
 @dataclass(frozen=True)
 class Certificates:
-    """Worst values over every step of a run, recorded or not.
-
-    Attributes
-    ----------
-    penetration : float
-        Deepest penetration of a contact point, in metres.
-    complementarity, cone, non_penetration : float
-        Largest residuals of the contact problems, relative to the size of their data.
-    energy_gain : float
-        Kinetic energy that Newton's restitution with friction made, of all impacts together (J).
-        Events of kind ``ENERGY_GAIN`` tell when.
-    """
+    """Worst values over every step of a run, recorded or not."""
 
     penetration: float
+    """Deepest penetration of a contact point, in metres."""
     complementarity: float
     cone: float
     non_penetration: float
+    """complementarity, cone, non_penetration: Largest residuals of the contact problems, relative
+    to the size of their data."""
     energy_gain: float = 0.0
+    """Kinetic energy that Newton's restitution with friction made, of all impacts together (J).
+    Events of kind ``ENERGY_GAIN`` tell when."""
 
 
 @dataclass(frozen=True)
 class SolverCount:
-    """How the contact problems of a run were solved.
-
-    Attributes
-    ----------
-    name : str
-        Solver tried first.
-    solves, shortcuts, fallbacks, failures : int
-        Contact problems; those answered by the modes of the step before, verified; those that
-        needed another solver; those that none could certify.
-    combinations : int
-        Of the latter two, those that came to the last resort, combinations of contact modes.
-    relaxed : int
-        Steps that were asked for less than to leave the ground and to bounce: in a wedge.
-    """
+    """How the contact problems of a run were solved."""
 
     name: str
+    """Solver tried first."""
     solves: int
     shortcuts: int
     fallbacks: int
     failures: int
+    """solves, shortcuts, fallbacks, failures: Contact problems; those answered by the modes of the
+    step before, verified; those that needed another solver; those that none could certify."""
     combinations: int = 0
+    """Of the latter two, those that came to the last resort, combinations of contact modes."""
     relaxed: int = 0
+    """Steps that were asked for less than to leave the ground and to bounce: in a wedge."""
 
     def __str__(self) -> str:
         backed = f" with {self.fallbacks} fallbacks" if self.fallbacks else ""
@@ -196,100 +163,32 @@ class SolverCount:
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds spent.
-
-    Attributes
-    ----------
-    compile_s : float
-        Compiling, or loading compiled code.
-    wall_s : float
-        Simulating.
-    """
+    """Seconds spent."""
 
     compile_s: float
+    """Compiling, or loading compiled code."""
     wall_s: float
+    """Simulating."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Run:
+class Run(ShownInNotebooks):
     """Record of a simulation.
 
     A row holds everything about one instant: the state, the torques decided in it, and the
     contact forces of the step that follows. Forces act on the robot.
-
-    Attributes
-    ----------
-    robot : Robot
-    ground : Ground
-    method : Method or UnknownMethod
-        How it went through time; unknown if only its file told so.
-    status : RunStatus
-        How the run ended.
-    message : str
-        The same in a person's words.
-    time : (nt,) float
-        Seconds.
-    position : (nt, nq) float
-        Generalised positions (m, rad).
-    velocity : (nt, nv) float
-        Generalised velocities (m/s, rad/s).
-    torque : (nt, nu) float
-        Joint torques within their limits (N m).
-    stop_torque : (nt, nv) float
-        Generalised force of the joint stops on the robot (N m, or N for a slide).
-    friction_torque : (nt, nv) float
-        Generalised force of the joints' dry friction on the robot (N m, or N for a slide).
-    contact_point : (nt, nc, 2) float
-        World position (x, z) of the contact points (m).
-    contact_normal : (nt, nc, 2) float
-        Ground normal (x, z) under the contact points; the tangent is (normal z, −normal x).
-    gap : (nt, nc) float
-        Distance of the contact points to the ground (m).
-    contact_force : (nt, nc, 2) float
-        Force (normal, tangent) on the robot at each contact point (N): the mean over the step, so
-        that an impact shows as a large force over one step.
-    slip_velocity : (nt, nc) float
-        Tangential velocity (m/s) at the end of the step of the points in the contact problem;
-        zero for the others.
-    loop_force : (nt, loops, 2) float
-        Force (x, z) on the first link of each closed loop at its hinge (N), in world axes: the mean
-        over the step. The second link feels the opposite.
-    coupling_force : (nt, couplings) float
-        Generalised force on each joint that follows another (N m, or N for a slide); the leader
-        feels it times minus the slope of the coupling.
-    brake_torque : (nt, brakes) float
-        Generalised force of each brake on its joint (N m, or N for a slide), zero while it is off.
-    residual : (nt, 3) float
-        Relative residuals of the contact problem: complementarity, cone, non-penetration.
-    events : tuple of Event
-    certificates : Certificates
-    solver : SolverCount
-    steps : int
-        Steps taken.
-    saturations : int
-        Times a torque was clipped to its limit, counted when the controller is called for good: at
-        every step or control period. What the speed-torque line of a motor holds back is counted
-        at every step. Of a controller that acts continuously, at the samples or ends of steps only;
-        what is clipped within them is not counted.
-    timing : Timing
-    error : BaseException or None
-        What the controller raised, if that ended the run; a ControllerError if it did what it may
-        not.
-    pushes : tuple of Push
-        What pushed the robot.
-    log : mapping of str to Logged
-        What the controller told of itself, by name.
-    final : Snapshot or None
-        What a simulation goes on from, as if it had not stopped: hand it over as `state`. None of a
-        run from a file, or under a controller in Python that takes no part in snapshots.
     """
 
     robot: Robot
     ground: Ground
     method: Method | UnknownMethod
+    """How it went through time; unknown if only its file told so."""
     status: RunStatus
+    """How the run ended."""
     message: str
+    """The same in a person's words."""
     time: Floats
+    """(nt,) Seconds."""
     position: Floats = recorded("nq", of="q", unit="m or rad", label="generalised positions")
     velocity: Floats = recorded("nv", of="v", unit="m/s or rad/s", label="generalised velocities")
     torque: Floats = recorded(
@@ -312,6 +211,7 @@ class Run:
     contact_normal: Floats = recorded(
         "nc", "axes", of="contacts.normal", unit="1", label="ground normal under the contact points"
     )
+    """The tangent is (normal z, −normal x)."""
     gap: Floats = recorded(
         "nc", of="contacts.gap", unit="m", label="distance of the contact points to the ground"
     )
@@ -319,36 +219,53 @@ class Run:
         "nc", "components", of="contacts.force", unit="N",
         label="force on the robot at the contact points, mean over the step that follows",
     )  # fmt: skip
+    """Normal and tangent. An impact shows as a large force over one step."""
     slip_velocity: Floats = recorded(
         "nc", of="reaction.slip", unit="m/s",
         label="tangential velocity of the contact points at the end of the step",
     )  # fmt: skip
+    """Zero for points that are not in the contact problem."""
     loop_force: Floats = recorded(
         "loops", "axes", of="loops.loop_force", unit="N", later=True,
         label="force on the first link of the closed loops, mean over the step that follows",
     )  # fmt: skip
+    """At its hinge, in world axes. The second link feels the opposite."""
     coupling_force: Floats = recorded(
         "couplings", of="loops.coupling_force", unit="N m or N", later=True,
         label="force on the joints that follow others",
     )  # fmt: skip
+    """The leader feels it times minus the slope of the coupling."""
     brake_torque: Floats = recorded(
         "brakes", of="loops.brake_force", unit="N m or N", later=True,
         label="force of the brakes on their joints",
     )  # fmt: skip
+    """Zero while it is off."""
     residual: Floats = recorded(
         "conditions", of="assembly.answer.residual", unit="1",
         label="relative residuals of the contact problem",
     )  # fmt: skip
+    """Complementarity, cone, non-penetration."""
     events: tuple[Event, ...]
     certificates: Certificates
     solver: SolverCount
     steps: int
+    """Steps taken."""
     saturations: int
+    """Times a torque was clipped to its limit, counted when the controller is called for good: at
+    every step or control period. What the speed-torque line of a motor holds back is counted at
+    every step. Of a controller that acts continuously, at the samples or ends of steps only; what
+    is clipped within them is not counted."""
     timing: Timing
     error: BaseException | None = field(default=None, repr=False)
+    """What the controller raised, if that ended the run; a ControllerError if it did what it may
+    not."""
     pushes: tuple[Push, ...] = ()
+    """What pushed the robot."""
     log: Mapping[str, Logged] = field(default_factory=dict, repr=False)
+    """What the controller told of itself, by name."""
     final: Snapshot | None = field(default=None, repr=False)
+    """What a simulation goes on from, as if it had not stopped: hand it over as `state`. None of a
+    run from a file, or under a controller in Python that takes no part in snapshots."""
 
     def __repr__(self) -> str:
         last = self.time[-1] if len(self.time) else 0.0
@@ -356,11 +273,6 @@ class Run:
             f"Run({self.robot.name}, {self.method.name}, {last:.6g} s, "
             f"{self.status.value}, {self.steps} steps)"
         )
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import run_card
-
-        return run_card(self)
 
     @property
     def completed(self) -> bool:
@@ -542,7 +454,7 @@ class Run:
 
 
 QUANTITIES: dict[str, Quantity] = {
-    each.name: each.metadata["quantity"] for each in fields(Run) if "quantity" in each.metadata
+    each.name: each.metadata["declared"] for each in fields(Run) if each.metadata
 }
 """What is recorded, by its name, in the order of rows."""
 

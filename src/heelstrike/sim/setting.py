@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Required, TypedDict
 from weakref import WeakKeyDictionary
 
@@ -14,6 +13,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.dynamics.queries.loops import loop_displacement
 from heelstrike.dynamics.queries.momenta import center_of_mass
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import NUMBERS, SCALES, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -56,42 +56,27 @@ class Setup(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Setting:
-    """What is to be simulated.
-
-    Attributes
-    ----------
-    robot : Robot
-    state : State
-        Where the robot begins.
-    ground : Ground
-    control_period : float or None
-        Seconds between two calls of the controller; None for as often as the method can.
-    record_every : int
-        Steps between two rows of the record.
-    fallen_height : float
-        Height of the centre of mass above the ground (m) below which the robot has fallen.
-    pushes : tuple of Push
-    held : tuple of bool
-        Which latches of the robot are engaged as it begins.
-    braked : tuple of bool
-        Which of its brakes are on as it begins.
-    checked : bool
-        Whether compiled controllers run in Python, every index looked at.
-    on_error : OnError
-        What becomes of an error in the controller.
-    """
+    """What is to be simulated."""
 
     robot: Robot
     state: State
+    """Where the robot begins."""
     ground: Ground
     control_period: float | None
+    """Seconds between two calls of the controller; None for as often as the method can."""
     record_every: int
+    """Steps between two rows of the record."""
     fallen_height: float
+    """Height of the centre of mass above the ground (m) below which the robot has fallen."""
     pushes: tuple[Push, ...]
     held: tuple[bool, ...]
+    """Which latches of the robot are engaged as it begins."""
     braked: tuple[bool, ...]
+    """Which of its brakes are on as it begins."""
     checked: bool
+    """Whether compiled controllers run in Python, every index looked at."""
     on_error: OnError
+    """What becomes of an error in the controller."""
 
 
 def checked_setting(

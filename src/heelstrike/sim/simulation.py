@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time as clock_time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn, Unpack
 
@@ -16,6 +16,7 @@ from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import ControllerError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
@@ -969,32 +970,22 @@ def simulate(
 
 @dataclass(frozen=True)
 class Ending:
-    """How one simulation of a batch came to its end.
-
-    Attributes
-    ----------
-    status, message
-        How, and the same in a person's words.
-    error : BaseException or None
-        What the controller raised, if that ended it.
-    state, time
-        Where the robot was, and when.
-    events : (kinds,) int
-        Events of each kind.
-    counts : dict
-        What was counted, and the worst values, by name.
-    run : Run or None
-        The record, if rows were kept.
-    """
+    """How one simulation of a batch came to its end."""
 
     status: RunStatus
     message: str
+    """status, message: How, and the same in a person's words."""
     error: BaseException | None
+    """What the controller raised, if that ended it."""
     state: State
     time: float
+    """state, time: Where the robot was, and when."""
     events: Integers
+    """(kinds,) Events of each kind."""
     counts: dict[str, Any]
+    """What was counted, and the worst values, by name."""
     run: Run | None
+    """The record, if rows were kept."""
 
 
 def simulation_to_the_end(

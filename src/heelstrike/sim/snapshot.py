@@ -9,7 +9,6 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from heelstrike.arguments import takes
 from heelstrike.errors import RunFileError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.state import State
 from heelstrike.whole_file import write_whole
 
@@ -33,17 +33,12 @@ class Snapshot:
 
     Made by :meth:`heelstrike.Simulation.snapshot`, taken up by
     :meth:`heelstrike.Simulation.restore` or as the `state` of a new simulation.
-
-    Attributes
-    ----------
-    arrays : dict of str to array
-        State, time, memory of the controller, contact modes and all else, by name.
-    identity : mapping of str to str
-        Robot, method and controller it was taken of; it fits no other.
     """
 
     arrays: dict[str, NDArray[Any]]
+    """State, time, memory of the controller, contact modes and all else, by name."""
     identity: Mapping[str, str]
+    """Robot, method and controller it was taken of; it fits no other."""
 
     @property
     def time(self) -> float:

@@ -18,7 +18,7 @@ HEAD_LENGTH = 0.035
 HEAD_WIDTH = 0.022
 WEIGHT_LENGTH = 0.35
 """Length of the arrow of one robot's weight as a fraction of the robot's size."""
-LONGEST = 1.3
+LONGEST_ARROW = 1.3
 """Longest arrow as a fraction of the robot's size."""
 
 
@@ -48,7 +48,7 @@ class Arrows:
 
     def show(self, foot: Floats, force: Floats) -> None:
         """Draw forces (n, 2), in N, as arrows that start at the points `foot` (n, 2), in m."""
-        length = np.minimum(np.hypot(*force.T) * self._scale, LONGEST * self._size)
+        length = np.minimum(np.hypot(*force.T) * self._scale, LONGEST_ARROW * self._size)
         seen = length > 0.25 * HEAD_LENGTH * self._size
         start, along = foot[seen], force[seen] / np.hypot(*force[seen].T)[:, None]
         length = length[seen, None]

@@ -12,7 +12,6 @@ from __future__ import annotations
 import enum
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -25,9 +24,11 @@ from numpy.typing import NDArray
 from heelstrike.analysis.motion import in_world
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import LinkPoses, link_poses
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import are_around
 from heelstrike.sim.push import Push
+from heelstrike.tolerances import NO_BONE
 from heelstrike.view.bars import bars
 from heelstrike.view.style import (
     FORCE_COLOR,
@@ -45,7 +46,6 @@ from heelstrike.view.style import (
 Floats = NDArray[np.float64]
 Bone = tuple[int, Floats, int, Floats, float]  # link, place, link, place, width
 
-SAME_PLACE = 1e-6  # metres
 DISC_CORNERS = 16
 THICKEST = 15.0  # points, of a bone that has the whole mass
 THINNEST = 2.5
@@ -66,31 +66,21 @@ class Side(enum.IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Line segments fixed to the links of a robot.
-
-    Attributes
-    ----------
-    link : (ns, 2) int
-        Link of each end of each segment.
-    local : (ns, 2, 2) float
-        Place (x, z) of each end in the frame of its link, in m.
-    width : (ns,) float
-        Line width in points.
-    side : (ns,) int
-        `Side` of each segment.
-    foot : (ns,) int
-        Index of the foot at the end of the segment's leg, -1 for the trunk.
-    pieces : tuple of slice
-        Segments that go round an outline, or are a bone, in the order of drawing; empty where all
-        are bones.
-    """
+    """Line segments fixed to the links of a robot."""
 
     link: NDArray[np.int64]
+    """(ns, 2) Link of each end of each segment."""
     local: Floats
+    """(ns, 2, 2) Place (x, z) of each end in the frame of its link, in m."""
     width: Floats
+    """(ns,) Line width in points."""
     side: NDArray[np.int64]
+    """(ns,) `Side` of each segment."""
     foot: NDArray[np.int64]
+    """(ns,) Index of the foot at the end of the segment's leg, -1 for the trunk."""
     pieces: tuple[slice, ...] = ()
+    """Segments that go round an outline, or are a bone, in the order of drawing; empty where all
+    are bones."""
 
     @property
     def colors(self) -> list[str]:
@@ -241,7 +231,7 @@ def _bones(robot: Robot, link: int, reference: Floats, width: float) -> list[Bon
         lines = _outline(points)
     bones += [(link, start, link, end, thickness) for start, end in lines]
     for point, radius in zip(points, model.contact_radius[contacts], strict=True):
-        if radius > SAME_PLACE:
+        if radius > NO_BONE:
             rim = _disc(point, float(radius))
             bones += [(link, start, link, end, DISC_WIDTH) for start, end in rim]
     if not bones and _apart(center, home):
@@ -250,7 +240,7 @@ def _bones(robot: Robot, link: int, reference: Floats, width: float) -> list[Bon
 
 
 def _apart(a: Floats, b: Floats) -> bool:
-    return bool(np.hypot(*(a - b)) > SAME_PLACE)
+    return bool(np.hypot(*(a - b)) > NO_BONE)
 
 
 def _is_trunk(robot: Robot, link: int, joints: Floats) -> bool:
@@ -264,7 +254,7 @@ def _is_trunk(robot: Robot, link: int, joints: Floats) -> bool:
         parent >= 0
         and model.mass[parent] == 0.0
         and len(joints) > 0
-        and np.ptp(joints, axis=0).max() <= SAME_PLACE
+        and np.ptp(joints, axis=0).max() <= NO_BONE
         and link not in model.contact_link
     )
 

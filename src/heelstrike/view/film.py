@@ -6,7 +6,6 @@ artists whose data change are drawn over it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import run_motion
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows, draw_scale
 from heelstrike.view.drawing import body, extent, ground_outline, leg_labels
@@ -40,34 +40,23 @@ FOLLOWS_WITHIN = 0.6
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """What is to be seen in every frame of a film, in world axes.
-
-    Attributes
-    ----------
-    time : (nf,) float
-        Time of each frame, in s.
-    row : (nf,) int
-        Row of the run that each frame shows.
-    segments : (nf, ns, 2, 2) float
-        The robot.
-    center : (nf, 2) float
-        Centre of mass, in m.
-    point : (nf, nc, 2) float
-        Contact points, in m.
-    force : (nf, nc, 2) float
-        Mean force on the robot at them since the frame before, in N, so that impacts, which last
-        one step, are seen with their impulse and not missed between frames.
-    pressure : (nf, 2) float
-        Zero moment point of the mean forces, in m; NaN where nothing pushes.
-    """
+    """What is to be seen in every frame of a film, in world axes."""
 
     time: Floats
+    """(nf,) Time of each frame, in s."""
     row: NDArray[np.int64]
+    """(nf,) Row of the run that each frame shows."""
     segments: Floats
+    """(nf, ns, 2, 2) The robot."""
     center: Floats
+    """(nf, 2) Centre of mass, in m."""
     point: Floats
+    """(nf, nc, 2) Contact points, in m."""
     force: Floats
+    """(nf, nc, 2) Mean force on the robot at them since the frame before, in N, so that impacts,
+    which last one step, are seen with their impulse and not missed between frames."""
     pressure: Floats
+    """(nf, 2) Zero moment point of the mean forces, in m; NaN where nothing pushes."""
 
 
 def frames(run: Run, interval: float) -> Frames:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Run
 from heelstrike.view.style import (
@@ -59,37 +60,25 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """Curves on common axes.
-
-    Attributes
-    ----------
-    unit : str
-        Label of the y axis.
-    curves : sequence of Curve
-        Later ones are drawn over earlier ones.
-    title, remark : str
-        Words above, to the left and to the right.
-    bounds : mapping of str to sequence of float
-        Levels that are drawn as limits, by what they are.
-    cone : (nt,) float, optional
-        Half the width of a band about zero.
-    span : tuple of float, optional
-        Ends of the y axis; those of the curves by default.
-    impacts : bool
-        Whether the y axis holds impacts, or only what is between them.
-    height : float
-        Compared with the other panels'.
-    """
+    """Curves on common axes."""
 
     unit: str
+    """Label of the y axis."""
     curves: Sequence[Curve]
+    """Later ones are drawn over earlier ones."""
     title: str = ""
     remark: str = ""
+    """title, remark: Words above, to the left and to the right."""
     bounds: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    """Levels that are drawn as limits, by what they are."""
     cone: Floats | None = None
+    """(nt,) Half the width of a band about zero."""
     span: tuple[float, float] | None = None
+    """Ends of the y axis; those of the curves by default."""
     impacts: bool = True
+    """Whether the y axis holds impacts, or only what is between them."""
     height: float = 1.0
+    """Compared with the other panels'."""
 
 
 def draw_panels(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from heelstrike.analysis.diagnosis.falls import Fall
 from heelstrike.analysis.diagnosis.symptoms import FOOTHOLD, Cause
 from heelstrike.control.balance.controllers import FootstepFeedback
 from heelstrike.errors import HeelstrikeError
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.run import Run
@@ -52,46 +52,30 @@ class Lever(enum.Enum):
 
 @dataclass(frozen=True)
 class Change:
-    """Something to change.
-
-    Attributes
-    ----------
-    lever : Lever
-        What.
-    value : float or str
-        To what, as the lever says.
-    where : str
-        Name of the joint that it is about; nothing if it is about none.
-    reason : str
-        Why, in a sentence.
-    """
+    """Something to change."""
 
     lever: Lever
+    """What."""
     value: float | str
+    """To what, as the lever says."""
     where: str = ""
+    """Name of the joint that it is about; nothing if it is about none."""
     reason: str = ""
+    """Why, in a sentence."""
 
 
 @dataclass(frozen=True)
 class Tried:
-    """What came of something that was tried.
-
-    Attributes
-    ----------
-    what : str
-        What was tried, in words.
-    outcome : str
-        What came of it, in words.
-    lasted : bool or None
-        Whether the walk lasted; None if it was no matter of that, or was not tried.
-    change : Change or None
-        The change that was tried, if it was one.
-    """
+    """What came of something that was tried."""
 
     what: str
+    """What was tried, in words."""
     outcome: str
+    """What came of it, in words."""
     lasted: bool | None = None
+    """Whether the walk lasted; None if it was no matter of that, or was not tried."""
     change: Change | None = None
+    """The change that was tried, if it was one."""
 
 
 def changes(run: Run, fall: Fall, gait: Gait | None = None) -> tuple[Change, ...]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from heelstrike.analysis.diagnosis.symptoms import Cause, Symptom, Walk, find_symptoms
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Run
@@ -27,33 +27,22 @@ when its run ends."""
 
 @dataclass(frozen=True)
 class Fall:
-    """Why a run did not go well.
-
-    Attributes
-    ----------
-    cause : Cause
-        What went wrong first.
-    time : float
-        When that began, in s.
-    where : str
-        Name of the foot or joint at which it did; nothing if it was at none.
-    evidence : mapping of str to float
-        Numbers that show it, by names that end in their units.
-    chain : tuple of Symptom
-        The first cause and what followed, the first of each kind, in the order of time.
-    pushes : tuple of Push
-        Pushes that acted then or up to a step before.
-    end : float
-        When the run ended, in s.
-    """
+    """Why a run did not go well."""
 
     cause: Cause
+    """What went wrong first."""
     time: float
+    """When that began, in s."""
     where: str
+    """Name of the foot or joint at which it did; nothing if it was at none."""
     evidence: Mapping[str, float]
+    """Numbers that show it, by names that end in their units."""
     chain: tuple[Symptom, ...]
+    """The first cause and what followed, the first of each kind, in the order of time."""
     pushes: tuple[Push, ...]
+    """Pushes that acted then or up to a step before."""
     end: float
+    """When the run ended, in s."""
 
     def __str__(self) -> str:
         at = f" ({self.where.replace('_', ' ')})" if self.where else ""

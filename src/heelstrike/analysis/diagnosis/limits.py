@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from heelstrike.analysis.actuation import torque_bounds
 from heelstrike.analysis.friction import friction_coefficient, friction_use
 from heelstrike.analysis.zero_moment_point import zero_moment_point
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.sole import has_length, soles
 from heelstrike.sim.run import Run
 
@@ -24,31 +24,21 @@ REACHED = 1.0 - 1e-6
 
 @dataclass(frozen=True)
 class Limit:
-    """How close a run came to something that it cannot go beyond.
-
-    Attributes
-    ----------
-    name : str
-        What is limited: friction of a foot, its zero moment point, a torque, a joint.
-    kind : str
-        ``"friction"``, ``"zero moment point"``, ``"torque"``, ``"speed"`` or ``"joint"``.
-    used : float
-        Largest share of the limit, 1 at the limit; zero moment point: 0 in the middle of the sole,
-        1 at its ends, in single support.
-    time : float
-        When that was, in s.
-    reached : float
-        When the limit was first reached (s); infinite if it never was.
-    detail : str
-        The same in units.
-    """
+    """How close a run came to something that it cannot go beyond."""
 
     name: str
+    """What is limited: friction of a foot, its zero moment point, a torque, a joint."""
     kind: str
+    """``"friction"``, ``"zero moment point"``, ``"torque"``, ``"speed"`` or ``"joint"``."""
     used: float
+    """Largest share of the limit, 1 at the limit; zero moment point: 0 in the middle of the sole, 1
+    at its ends, in single support."""
     time: float
+    """When that was, in s."""
     reached: float
+    """When the limit was first reached (s); infinite if it never was."""
     detail: str
+    """The same in units."""
 
 
 def limits(run: Run, *, until: float = math.inf) -> tuple[Limit, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.slip import max_slip
 from heelstrike.analysis.support import stances, walking_steps
 from heelstrike.analysis.tracking import tracking_error
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 MID_SWING = (0.2, 0.8)
 """Parts of a swing between which its clearance counts: the foot is on the ground at both ends."""
-ROUNDING = 1e-9
+NO_SLIP = 1e-9
 """Slip (m) of points that stick, but for rounding."""
 STEPPED = 0.1
 """Shortest swing that counts (s): what is shorter is chatter."""
@@ -33,47 +33,32 @@ STEPPED = 0.1
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure of a walk.
-
-    Attributes
-    ----------
-    name : str
-        What is measured.
-    value : float
-        NaN where there is nothing to measure.
-    unit : str
-    detail : str
-        What else there is to say of it.
-    """
+    """A figure of a walk."""
 
     name: str
+    """What is measured."""
     value: float
     unit: str
+    """value, unit: How much it is; NaN where there is nothing to measure."""
     detail: str = ""
+    """What else there is to say of it."""
 
 
 @dataclass(frozen=True)
 class MotorLoad:
-    """What a motor does over a run.
-
-    Attributes
-    ----------
-    name : str
-        Name of the actuator.
-    peak_torque, rms_torque : float
-        In N m; N of a slide.
-    peak_speed : float
-        In rad/s; m/s of a slide.
-    mean_power, peak_power : float
-        Mechanical power τ ω: the mean of its size, and its largest size, in W.
-    """
+    """What a motor does over a run."""
 
     name: str
+    """Name of the actuator."""
     peak_torque: float
     rms_torque: float
+    """peak_torque, rms_torque: In N m; N of a slide."""
     peak_speed: float
+    """In rad/s; m/s of a slide."""
     mean_power: float
     peak_power: float
+    """mean_power, peak_power: Mechanical power τ ω: the mean of its size, and its largest size, in
+    W."""
 
 
 def motor_loads(run: Run) -> tuple[MotorLoad, ...]:
@@ -170,7 +155,7 @@ def _measures(run: Run, gait: Gait | None) -> Iterator[Measure]:
         )  # fmt: skip
     if run.robot.nc:
         slip = max_slip(run)
-        slid = 1e3 * slip if slip > ROUNDING else 0.0
+        slid = 1e3 * slip if slip > NO_SLIP else 0.0
         yield Measure("slip of a pressed contact point", slid, "mm", "in all")
     if gait is not None:
         error = tracking_error(run, gait)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -26,6 +26,7 @@ from heelstrike.analysis.support import pushing, pushing_feet, stances, walking_
 from heelstrike.analysis.tracking import reference_motion
 from heelstrike.analysis.wrenches import sole_points
 from heelstrike.dynamics import leg_joints
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.sole import has_length, soles
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.run import Run
@@ -117,41 +118,27 @@ class Cause(enum.Enum):
 
 @dataclass(frozen=True)
 class Symptom:
-    """Something that went wrong.
-
-    Attributes
-    ----------
-    cause : Cause
-        What.
-    time, end : float
-        When it began and when it was over, in s.
-    where : str
-        Name of the foot or joint; nothing if it was at none.
-    evidence : mapping of str to float
-        Numbers that show it, by names that end in their units.
-    """
+    """Something that went wrong."""
 
     cause: Cause
+    """What."""
     time: float
     end: float
+    """time, end: When it began and when it was over, in s."""
     where: str = ""
+    """Name of the foot or joint; nothing if it was at none."""
     evidence: Mapping[str, float] = field(default_factory=dict)
+    """Numbers that show it, by names that end in their units."""
 
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A run with what several symptoms are found by.
-
-    Attributes
-    ----------
-    run : Run
-        The run, of at least one row.
-    gait : Gait or None
-        The gait that it followed, if it is known.
-    """
+    """A run with what several symptoms are found by."""
 
     run: Run
+    """The run, of at least one row."""
     gait: Gait | None = None
+    """The gait that it followed, if it is known."""
 
     @cached_property
     def motion(self) -> Motion:

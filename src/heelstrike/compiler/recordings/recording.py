@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.compilation import kernel, uncompiled
 from heelstrike.compiler.recordings import tape
 from heelstrike.compiler.recordings.tape import Entry, Symbols, Tape, Value
+from heelstrike.field_texts import dataclass
 
 CONSTANT = "model"
 """The argument that never changes. Where its numbers are 0, 1 or -1, they are so in every robot
@@ -32,24 +32,17 @@ number that is not known yet."""
 
 @dataclass(frozen=True)
 class Program:
-    """A kernel and the arguments to record it with.
-
-    Attributes
-    ----------
-    kernel : kernel
-        It may branch on integers, and on numbers of the model where they are 0, 1 or -1.
-    arguments : mapping of str to Bundle or array
-        Its arguments in order, with their true shapes.
-    scratch : sequence of str
-        Arrays, ``argument`` or ``argument.member``, whose contents nobody reads afterwards.
-    name : str, optional
-        Name of the function that is made of it; else the kernel's.
-    """
+    """A kernel and the arguments to record it with."""
 
     kernel: Callable[..., Any]
+    """The kernel. It may branch on integers, and on numbers of the model where they are 0, 1 or
+    -1."""
     arguments: Mapping[str, Any]
+    """Its arguments in order, bundles and arrays, with their true shapes."""
     scratch: tuple[str, ...] = ()
+    """Arrays, ``argument`` or ``argument.member``, whose contents nobody reads afterwards."""
     name: str = ""
+    """Name of the function that is made of it; else the kernel's."""
 
     def __post_init__(self) -> None:
         if not self.name:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -23,42 +21,30 @@ from heelstrike.dynamics import (
     mass_matrix,
 )
 from heelstrike.errors import ContactProblemError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
-
-TOUCHING = 1e-6
-"""Contact points nearer to the ground than this (m) touch it."""
-MOVING = 1e-6
-"""Contact points faster than this (m/s) come down, separate or slide."""
+from heelstrike.tolerances import STANDING_GAP, STANDING_SPEED
 
 
 @dataclass(frozen=True, eq=False)
 class ContactForwardDynamics:
-    """Accelerations and contact forces of one state.
-
-    Attributes
-    ----------
-    acceleration : (nv,) float
-        Acceleration of the coordinates.
-    contact_force : (nc, 2) float
-        Force (normal, tangent) of the ground on the robot at each contact point, in N; zero where
-        it does not touch. On a flat foot the split of least norm.
-    contact_acceleration : (nc, 2) float
-        Acceleration of the gap and of the sliding velocity of each contact point, in m/s².
-    mode : tuple of nc ContactMode
-        What every contact point does.
-    certificate : Certificate
-        Whether, and how well, the contact problem is solved.
-    loop_force : (2 loops + couplings,) float
-        Forces of closed loops and coupled joints along the rows of
-        :func:`heelstrike.dynamics.loop_jacobian`, in N and N m.
-    """
+    """Accelerations and contact forces of one state."""
 
     acceleration: Floats
+    """(nv,) Acceleration of the coordinates."""
     contact_force: Floats
+    """(nc, 2) Force (normal, tangent) of the ground on the robot at each contact point, in N; zero
+    where it does not touch. On a flat foot the split of least norm."""
     contact_acceleration: Floats
+    """(nc, 2) Acceleration of the gap and of the sliding velocity of each contact point, in
+    m/s²."""
     mode: tuple[ContactMode, ...]
+    """What each of the nc contact points does."""
     certificate: Certificate
+    """Whether, and how well, the contact problem is solved."""
     loop_force: Floats
+    """(2 loops + couplings,) Forces of closed loops and coupled joints along the rows of
+    :func:`heelstrike.dynamics.loop_jacobian`, in N and N m."""
 
 
 @takes(ContactProblemError)
@@ -116,7 +102,9 @@ def contact_forward_dynamics(
     """
     kinematics = contact_kinematics(robot, q, v, ground)
     touching = _touching(robot, kinematics)
-    sliding = np.where(np.abs(kinematics.velocity[:, 1]) > MOVING, kinematics.velocity[:, 1], 0.0)
+    sliding = np.where(
+        np.abs(kinematics.velocity[:, 1]) > STANDING_SPEED, kinematics.velocity[:, 1], 0.0
+    )
     count = len(touching)
     loops = loop_jacobian(robot, q)
     held = len(loops)
@@ -161,13 +149,13 @@ def contact_forward_dynamics(
 
 
 def _touching(robot: Robot, kinematics: ContactKinematics) -> list[int]:
-    touches = kinematics.gap < TOUCHING
+    touches = kinematics.gap < STANDING_GAP
     speed = kinematics.velocity[:, 0]
-    coming = [robot.contact_names[i] for i in np.flatnonzero(touches & (speed < -MOVING))]
+    coming = [robot.contact_names[i] for i in np.flatnonzero(touches & (speed < -STANDING_SPEED))]
     if coming:
         raise ContactProblemError(
             f"robot {robot.name!r}: {', '.join(coming)} come down on the ground. That is an "
             "impact, and there is no acceleration at it; simulate it, or ask for a state before "
             "or after."
         )
-    return [int(i) for i in np.flatnonzero(touches & (speed <= MOVING))]
+    return [int(i) for i in np.flatnonzero(touches & (speed <= STANDING_SPEED))]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -12,15 +11,16 @@ from numpy.typing import ArrayLike
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.force_distribution import ForceDistribution, distribute
-from heelstrike.contact.queries.forward_dynamics import TOUCHING
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics import inverse_dynamics, loop_jacobian, passive_force
 from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.errors import ContactProblemError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Integers
 from heelstrike.robot.motors import torque_range
 from heelstrike.robot.robot import Robot
+from heelstrike.tolerances import STANDING_GAP
 
 RELATIVE = 1e-9
 """Shares of the largest generalised force below which a violation is rounding."""
@@ -28,47 +28,35 @@ RELATIVE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ContactInverseDynamics:
-    """Torques and contact forces for an acceleration, and what stands against it.
-
-    Attributes
-    ----------
-    torque : (nu,) float
-        Torques of the actuators, in the order of ``robot.actuator_names`` (N m, N for a slide).
-    contact_force : (nc, 2) float
-        Force (normal, tangent) of the ground on the robot at each contact point, in N; zero at
-        points that do not carry.
-    loop_force : (2 loops + couplings,) float
-        Forces of closed loops (x, z, in N) and couplings (N m, N for a slide) along their rows.
-    missing_force : (nv,) float
-        Generalised force that neither motors, ground nor loops can supply, in N and N m: zero if
-        the acceleration is possible.
-    friction_use : (nc,) float
-        |tangential| / (μ · normal) of every point: above 1 it would slip, infinite where it pulls
-        or has a tangential force alone; 0 at points without force.
-    pulling : (nc,) bool
-        Whether the ground would have to pull at the point.
-    torque_excess : (nu,) float
-        By how much each torque exceeds what its motor can give at v, in N m; zero within.
-    contact_acceleration : (nc, 2) float
-        Acceleration of the gap and of the sliding velocity of every contact point, in m/s²: zero
-        at carrying points if the acceleration keeps them where they are.
-    feasible : bool
-        Whether the ground pushes, inside its friction cones, the torques are within their limits
-        and nothing is missing.
-    message : str
-        In words, what stands against it; empty if nothing.
-    """
+    """Torques and contact forces for an acceleration, and what stands against it."""
 
     torque: Floats
+    """(nu,) Torques of the actuators, in the order of ``robot.actuator_names`` (N m, N for a
+    slide)."""
     contact_force: Floats
+    """(nc, 2) Force (normal, tangent) of the ground on the robot at each contact point, in N; zero
+    at points that do not carry."""
     loop_force: Floats
+    """(2 loops + couplings,) Forces of closed loops (x, z, in N) and couplings (N m, N for a slide)
+    along their rows."""
     missing_force: Floats
+    """(nv,) Generalised force that neither motors, ground nor loops can supply, in N and N m: zero
+    if the acceleration is possible."""
     friction_use: Floats
+    """(nc,) |tangential| / (μ · normal) of every point: above 1 it would slip, infinite where it
+    pulls or has a tangential force alone; 0 at points without force."""
     pulling: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    """(nc,) Whether the ground would have to pull at the point."""
     torque_excess: Floats
+    """(nu,) By how much each torque exceeds what its motor can give at v, in N m; zero within."""
     contact_acceleration: Floats
+    """(nc, 2) Acceleration of the gap and of the sliding velocity of every contact point, in m/s²:
+    zero at carrying points if the acceleration keeps them where they are."""
     feasible: bool
+    """Whether the ground pushes, inside its friction cones, the torques are within their limits and
+    nothing is missing."""
     message: str
+    """In words, what stands against it; empty if nothing."""
 
 
 @takes(ContactProblemError)
@@ -133,7 +121,7 @@ def contact_inverse_dynamics(
     """
     choice = _choice(distribution)
     kinematics = contact_kinematics(robot, q, v, ground)
-    touching = np.flatnonzero(kinematics.gap < TOUCHING)
+    touching = np.flatnonzero(kinematics.gap < STANDING_GAP)
     carrying = list(contact_indices(robot, touching if contacts is None else contacts))
     a = joint_vector(robot, "acceleration", acceleration)
     force = inverse_dynamics(robot, q, v, a) - passive_force(robot, q, v)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -14,6 +12,7 @@ from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.places import write_point_rows
 from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.errors import ContactProblemError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 
 
@@ -22,32 +21,22 @@ class ContactKinematics:
     """The contact points of a robot in one state, each with the nearest feature of the ground.
 
     Components are (normal, tangent); the tangent is (n_z, −n_x), forward on level ground.
-
-    Attributes
-    ----------
-    position : (nc, 2) float
-        World position of the point of each disc that is nearest to the ground, in m.
-    normal : (nc, 2) float
-        Outward normal of the ground there.
-    gap : (nc,) float
-        Distance to the ground, negative when penetrating, in m.
-    friction : (nc,) float
-        Coefficient of friction there.
-    jacobian : (nc, 2, nv) float
-        Rows (normal, tangent) of the points.
-    velocity : (nc, 2) float
-        Their velocity, in m/s.
-    bias_acceleration : (nc, 2) float
-        J̇v: rate of the gap's rate and of the sliding velocity at v̇ = 0, in m/s².
     """
 
     position: Floats
+    """(nc, 2) World position of the point of each disc that is nearest to the ground, in m."""
     normal: Floats
+    """(nc, 2) Outward normal of the ground there."""
     gap: Floats
+    """(nc,) Distance to the ground, negative when penetrating, in m."""
     friction: Floats
+    """(nc,) Coefficient of friction there."""
     jacobian: Floats
+    """(nc, 2, nv) Rows (normal, tangent) of the points."""
     velocity: Floats
+    """(nc, 2) Their velocity, in m/s."""
     bias_acceleration: Floats
+    """(nc, 2) J̇v: rate of the gap's rate and of the sliding velocity at v̇ = 0, in m/s²."""
 
 
 @takes(ContactProblemError)

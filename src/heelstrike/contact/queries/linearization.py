@@ -8,7 +8,6 @@ that the linearisation of a walk is made of.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +21,7 @@ from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.places import write_point_rows
 from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.errors import ContactProblemError, RobotError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -33,22 +33,15 @@ GRAZING = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class ActiveContacts:
-    """What holds a robot between two events, or takes part in an impact.
-
-    Attributes
-    ----------
-    resting : tuple of int
-        Contact points on the ground that do not slide; an impact leaves them at rest.
-    sliding : tuple of (int, int)
-        Contact points on the ground that slide, each with the direction, 1 forward or -1; of an
-        impact, those at whose end they still do.
-    joints : tuple of int
-        Joints at a stop, or held by a latch.
-    """
+    """What holds a robot between two events, or takes part in an impact."""
 
     resting: tuple[int, ...] = ()
+    """Contact points on the ground that do not slide; an impact leaves them at rest."""
     sliding: tuple[tuple[int, int], ...] = ()
+    """Contact points on the ground that slide, each with the direction, 1 forward or -1; of an
+    impact, those at whose end they still do."""
     joints: tuple[int, ...] = ()
+    """Joints at a stop, or held by a latch."""
 
     @property
     def points(self) -> tuple[int, ...]:
@@ -58,37 +51,24 @@ class ActiveContacts:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PhaseLinearization:
-    """d/dt (δq, δv) = A (δq, δv) + B δΓ while contacts stay as they are.
-
-    Attributes
-    ----------
-    A : (nq + nv, nq + nv) float
-        Derivative of (v, v̇) by (q, v).
-    B : (nq + nv, nu) float
-        Derivative by the joint torques.
-    rate : (nq + nv,) float
-        (v, v̇) itself.
-    """
+    """d/dt (δq, δv) = A (δq, δv) + B δΓ while contacts stay as they are."""
 
     A: Floats
+    """(nq + nv, nq + nv) Derivative of (v, v̇) by (q, v)."""
     B: Floats
+    """(nq + nv, nu) Derivative by the joint torques."""
     rate: Floats
+    """(nq + nv,) (v, v̇) itself."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ImpactLinearization:
-    """An impact and its derivative.
-
-    Attributes
-    ----------
-    velocity : (nv,) float
-        Velocity after it.
-    reset : (nq + nv, nq + nv) float
-        Derivative of the state after by the state before, DΔ.
-    """
+    """An impact and its derivative."""
 
     velocity: Floats
+    """(nv,) Velocity after it."""
     reset: Floats
+    """(nq + nv, nq + nv) Derivative of the state after by the state before, DΔ."""
 
 
 @takes(ContactProblemError)

@@ -14,12 +14,10 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.coordinates import checked, index_of
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.tolerances import LEVEL_SOLE
 
 TRUNK = (0, 1, 2)  # coordinates of a floating trunk: x, z, pitch
-LEVEL = (
-    1e-4  # m; contact points of a foot that are no higher than this above its lowest are its sole
-)
-CLOSE = 1e-12  # m; gaps that small are closed
+PLACED_GAP = 1e-12  # m; gaps that small are closed
 MOST_ITERATIONS = 60
 LARGEST_CHANGE = 0.2  # rad, m; of a joint in one iteration
 MOST_TILT = 0.6  # rad, m; of all joints together, beyond which a foot is not made to fit the ground
@@ -54,7 +52,7 @@ def standing(robot: Robot, ground: Ground) -> State:
     for _ in range(MOST_ITERATIONS if sole else 0):
         at = contact_kinematics(robot, q, start.v, ground)
         gap = np.concatenate([at.gap[sole], dynamics.loop_displacement(robot, q)])
-        if np.abs(gap).max() < CLOSE:
+        if np.abs(gap).max() < PLACED_GAP:
             break
         # The least change that closes the gaps, were the ground straight around each point.
         along = np.vstack([at.jacobian[sole, 0], dynamics.loop_jacobian(robot, q)])
@@ -79,7 +77,7 @@ def closed(robot: Robot, state: State, keep: Iterable[str | int] = ()) -> State:
     for _ in range(MOST_ITERATIONS):
         open_by = dynamics.loop_displacement(robot, q)
         worst = float(np.abs(open_by).max(initial=0.0))
-        if worst < CLOSE and (before == np.inf or not worst < 0.5 * before):
+        if worst < PLACED_GAP and (before == np.inf or not worst < 0.5 * before):
             break  # closed as it came, or as well as can be
         before = worst
         change = _least(robot, q, moves, -open_by)
@@ -89,7 +87,7 @@ def closed(robot: Robot, state: State, keep: Iterable[str | int] = ()) -> State:
     rates = dynamics.loop_jacobian(robot, q) @ v
     v[free] += _least(robot, q, free, -rates)
     left = np.abs(dynamics.loop_jacobian(robot, q) @ v).max(initial=0.0)
-    if not worst < CLOSE or left > CLOSE * max(1.0, float(np.abs(v).max(initial=0.0))):
+    if not worst < PLACED_GAP or left > PLACED_GAP * max(1.0, float(np.abs(v).max(initial=0.0))):
         names = [f"{name} along {axis}" for name in robot.loop_names for axis in "xz"]
         names += [f"coupling of {name}" for name in robot.coupling_names]
         place = int(np.argmax(np.abs(open_by)))
@@ -160,6 +158,6 @@ def _soles(robot: Robot) -> list[int]:
     ends: list[int] = []
     for foot in robot.feet:
         contacts = np.array(foot.contacts)
-        low = contacts[bottoms[contacts] <= bottoms[contacts].min() + LEVEL]
+        low = contacts[bottoms[contacts] <= bottoms[contacts].min() + LEVEL_SOLE]
         ends += sorted({int(low[0]), int(low[-1])})
     return ends

@@ -43,6 +43,26 @@ are not solutions; on random problems that costs five failures for one."""
 GOLDEN = 0.6180339887498949
 
 
+KINK = 0.3
+"""A derivative of the function where it has none: 1 - 1/√2, that of equal arguments."""
+
+OUTWARDS = 20.0
+"""Powers of two in which starting points go outwards, then begin anew."""
+
+DAMPING_FLOOR, WEAKEST, RANGE = 1e-15, -12.0, 10.0
+"""Least damping, rounding of a matrix of diagonal one; the powers of ten in which it grows with the
+starts, first and number."""
+
+LEAST_STEP = 1e-8
+"""Part of a step from which on shorter ones are not tried: the root of rounding."""
+
+DECREASE = 1e-4
+"""Part of the predicted decrease that is asked for (Armijo's constant)."""
+
+SOLVED_MERIT = 1e-30
+"""Half the sum of squares of residuals that are rounding, 1e-15."""
+
+
 @kernel
 def read_iterate(count: int, reduced: ReducedProblem, iteration: Iteration, mode: Integers) -> bool:
     """Write the modes that an iterate and its velocity point to; return whether any changed."""
@@ -91,10 +111,10 @@ def equations(count: int, size: float, reduced: ReducedProblem, iteration: Itera
         root = math.sqrt(force * force + speed[first] * speed[first])
         value[first] = force + speed[first] - root
         merit += 0.5 * value[first] * value[first]
-        by_speed = 1.0 - speed[first] / root if root > 0.0 else 0.3
+        by_speed = 1.0 - speed[first] / root if root > 0.0 else KINK
         for j in range(unknowns):
             tableau[first, j] = by_speed * matrix[first, j]
-        tableau[first, first] += 1.0 - force / root if root > 0.0 else 0.3
+        tableau[first, first] += 1.0 - force / root if root > 0.0 else KINK
         if tangent[contact] < 0:
             continue
         # Inner: room to the upper edge against backward slip; outer: room to the lower edge.
@@ -107,10 +127,10 @@ def equations(count: int, size: float, reduced: ReducedProblem, iteration: Itera
         root = math.sqrt(lower * lower + inner * inner)
         value[second] = lower + inner - root
         merit += 0.5 * value[second] * value[second]
-        by_lower = 1.0 - lower / root if root > 0.0 else 0.3
-        by_inner = 1.0 - inner / root if root > 0.0 else 0.3
-        by_upper = by_inner * (upper / inner_root - 1.0 if inner_root > 0.0 else -0.3)
-        by_speed = by_inner * (speed[second] / inner_root + 1.0 if inner_root > 0.0 else 0.3)
+        by_lower = 1.0 - lower / root if root > 0.0 else KINK
+        by_inner = 1.0 - inner / root if root > 0.0 else KINK
+        by_upper = by_inner * (upper / inner_root - 1.0 if inner_root > 0.0 else -KINK)
+        by_speed = by_inner * (speed[second] / inner_root + 1.0 if inner_root > 0.0 else KINK)
         for j in range(unknowns):
             tableau[second, j] = by_speed * matrix[second, j]
         tableau[second, first] += opening * (by_lower + by_upper)
@@ -164,7 +184,7 @@ def fischer_burmeister(
         start = float(iteration.number // STEPS)
         if iteration.number % STEPS == 0:
             for i in range(unknowns):
-                iterate[i] = 2.0 ** (start % 20.0) * ((GOLDEN * start * (i + 1)) % 1.0)
+                iterate[i] = 2.0 ** (start % OUTWARDS) * ((GOLDEN * start * (i + 1)) % 1.0)
             for contact in range(count):
                 second = reduced.tangent[contact]
                 if second >= 0:
@@ -174,18 +194,19 @@ def fischer_burmeister(
         tally.iterations += 1
         merit = equations(count, size, reduced, iteration)
         changed = read_iterate(count, reduced, iteration, mode)
-        newton_step(unknowns, 1e-15 + 10.0 ** (-12.0 + start % 10.0) * min(merit, 1.0), iteration)
+        growing = 10.0 ** (WEAKEST + start % RANGE)
+        newton_step(unknowns, DAMPING_FLOOR + growing * min(merit, 1.0), iteration)
         for i in range(unknowns):
             iterate[i] += step[i]
         along = 1.0
         while (
-            along > 1e-8
-            and equations(count, size, reduced, iteration) > (GROWTH - 1e-4 * along) * merit
+            along > LEAST_STEP
+            and equations(count, size, reduced, iteration) > (GROWTH - DECREASE * along) * merit
         ):
             along *= 0.5
             for i in range(unknowns):
                 iterate[i] -= along * step[i]
-        if along <= 1e-8 or merit < 1e-30:
+        if along <= LEAST_STEP or merit < SOLVED_MERIT:
             # Stuck, or solved without the modes being right: on to the next starting point.
             iteration.number = (int(start) + 1) * STEPS
         if changed or call == 0:

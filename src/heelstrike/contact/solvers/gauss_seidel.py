@@ -22,6 +22,10 @@ SWEEPS = 2000
 """Sweeps over all contacts before giving up."""
 
 
+DEPENDENT_ROWS = 1e-14
+"""Determinant of the two rows of a contact, of diagonal one, up to which they are one row."""
+
+
 @kernel
 def solve_block(contact: int, reduced: ReducedProblem, iterate: Floats) -> int:
     """Solve one contact of the reduced problem for its own impulse; return its mode."""
@@ -50,7 +54,7 @@ def solve_block(contact: int, reduced: ReducedProblem, iterate: Floats) -> int:
         return OPEN
     cone = reduced.cone[contact]
     determinant = inertia * across - coupling * coupling
-    if determinant > 1e-14:
+    if determinant > DEPENDENT_ROWS:
         force = (coupling * slip - across * rest) / determinant
         friction = (coupling * rest - inertia * slip) / determinant
         if abs(friction) <= cone * force:

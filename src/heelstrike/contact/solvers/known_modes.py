@@ -25,11 +25,12 @@ from heelstrike.contact.workspace import (
     Yardstick,
 )
 from heelstrike.dynamics.dense import solve_positive
+from heelstrike.tolerances import NO_PIVOT
 
-SAME_ROW = 1e-14
+SHARED_ROW = 1e-14
 """Two rows are one if the inverse mass along their difference is less than this, relative."""
 
-GOOD_PIVOT = 1e-2
+EARLY_PIVOT = 1e-2
 """Pivots that keep more than this of their diagonal are good."""
 
 CLEAN = 1e-11
@@ -44,9 +45,6 @@ be had without."""
 
 TRIES = 4
 """How often modes are tried, and those that are found wrong changed, before the general way."""
-
-NO_PIVOT = 1e-11
-"""Rows that keep less depend on those before; what lies between is left to the general way."""
 
 
 @dissolved_kernel
@@ -75,7 +73,7 @@ def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) 
             other = 2 * earlier + 1
             if equation[other] >= 0:
                 both = delassus[tangent, tangent] + delassus[other, other]
-                if abs(both - 2.0 * delassus[tangent, other]) <= SAME_ROW * both:
+                if abs(both - 2.0 * delassus[tangent, other]) <= SHARED_ROW * both:
                     equation[tangent] = equation[other]
                     sharers[equation[other]] += 1.0
                     break
@@ -170,7 +168,7 @@ def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> b
         order[i] = i
     rank = 0
     rest = size
-    least = GOOD_PIVOT
+    least = EARLY_PIVOT
     poor = False
     while rank < rest:
         row = source[order[rank]]

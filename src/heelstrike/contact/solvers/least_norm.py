@@ -17,12 +17,23 @@ from heelstrike.contact.workspace import (
     Tally,
 )
 
-TIE = 1e-13
+SPLIT_TIE = 1e-13
 """How close two ratios tie in the pivots of the split."""
 
-MARGIN = 1e-14
+CONE_MARGIN = 1e-14
 """How far the cones are opened, relative to the scaled unknowns, where rounding has closed them;
 a hundred times as far if that is not enough, and once more."""
+
+
+STILL_MOVES = 1e-9
+"""A direction changes a velocity if it does so by more than this part of its largest unknown: the
+elimination that found it stops at pivots of 1e-12, and leaves the root of that at worst."""
+
+NO_EDGE = 1e-12
+"""Length of an edge in terms of the free directions up to which they do not move it."""
+
+WIDER = 100.0
+"""How much further the cones are opened each time."""
 
 
 @kernel
@@ -81,7 +92,7 @@ def keep_velocity(
         for i in range(2 * count):
             length += image[k, i] * image[k, i]
         length = math.sqrt(length)
-        kind[k] = 1 if length > 1e-9 * largest else 0
+        kind[k] = 1 if length > STILL_MOVES * largest else 0
         if kind[k] == 1:
             for i in range(2 * count):
                 image[k, i] /= length
@@ -200,7 +211,7 @@ def list_edges(
                 edges[number, k] = part
                 length += part * part
             length = math.sqrt(length)
-            if length > 1e-12:
+            if length > NO_EDGE:
                 for k in range(nullity):
                     edges[number, k] /= length
                 room = along * point[place] + across * point[second]
@@ -228,11 +239,11 @@ def step_inside(
                 dual[i, j + 1] = entry
             dual[i, 0] = edges[i, nullity] + margin * edges[i, nullity + 1]
             dual[i, number + 1] = 1.0
-        if pivot_to_solution(number, TIE, tally, equations.dual) == SOLVED:
+        if pivot_to_solution(number, SPLIT_TIE, tally, equations.dual) == SOLVED:
             break
         if attempt == 3:
             return
-        margin = MARGIN if attempt == 0 else 100.0 * margin
+        margin = CONE_MARGIN if attempt == 0 else WIDER * margin
     for k in range(nullity):
         step[k] = 0.0
     for i in range(number):

@@ -28,17 +28,25 @@ PATHS = 9
 """How many covering vectors are tried: what rounding spoils on one path it spares on another, and
 where one path ends in a ray another may find a solution."""
 
-AT_REST = 1e-11
+NO_VELOCITY = 1e-11
 """Velocities below this, where the largest free one is one, are read as zero."""
 
 GOLDEN = 0.6180339887498949
+
+
+TIE, FINER_TIE, COARSER_TIE = 1e-11, 1e-13, 1e-9
+"""How close two ratios tie: on the first path, and on the others in turn. The matrix has a diagonal
+of one, and pivots leave some hundred times its rounding."""
+
+SPREAD = 6.0
+"""Powers of ten over which the entries of later covering vectors are spread."""
 
 
 @kernel
 def covering(path: int, row: int) -> float:
     """Return an entry of the covering vector of a path, from 1 to 2 at first, later to 1e6."""
     share = (GOLDEN * path * (row + 1)) % 1.0
-    return 1.0 + share if path < 3 else 10.0 ** (6.0 * share)
+    return 1.0 + share if path < 3 else 10.0 ** (SPREAD * share)
 
 
 @kernel
@@ -118,11 +126,11 @@ def lemke(
     """
     if path == PATHS:
         return dictionary.status if dictionary.status != SOLVED else UNCERTIFIED
-    tie = 1e-11
+    tie = TIE
     if path % 3 == 1:
-        tie = 1e-13
+        tie = FINER_TIE
     elif path % 3 == 2:
-        tie = 1e-9
+        tie = COARSER_TIE
     pairs = load_frictional(count, path, reduced, dictionary.tableau)
     dictionary.status = pivot_to_solution(pairs, tie, tally, dictionary)
     place = dictionary.place
@@ -133,13 +141,13 @@ def lemke(
         if path == 0:
             # By the velocities. The other paths are for problems that rounding makes difficult,
             # and go by the basis.
-            if mode[contact] == OPEN and value(row, dictionary) <= AT_REST:
+            if mode[contact] == OPEN and value(row, dictionary) <= NO_VELOCITY:
                 mode[contact] = STICK
             if mode[contact] == STICK and frictional:
                 slip = 0.5 * (value(row + 1, dictionary) - value(row + 2, dictionary))
-                if slip > AT_REST:
+                if slip > NO_VELOCITY:
                     mode[contact] = SLIP_FORWARD
-                elif slip < -AT_REST:
+                elif slip < -NO_VELOCITY:
                     mode[contact] = SLIP_BACKWARD
         elif mode[contact] == STICK and frictional and place[pairs + row + 3] >= 0:
             # Slip. With the friction to both sides in the basis its speed is zero, though.

@@ -7,6 +7,9 @@ from heelstrike.contact.modes import ITERATION_LIMIT, RAY, SOLVED
 from heelstrike.contact.workspace import Dictionary, Floats, Integers, Tally
 from heelstrike.dynamics.dense import pivot
 
+SURE_PIVOT = 10.0
+"""Pivots larger than so many ties are no rounding."""
+
 
 @kernel
 def precedes(
@@ -85,7 +88,7 @@ def pivot_to_solution(pairs: int, tie: float, tally: Tally, dictionary: Dictiona
         best = 0.0
         for i in range(pairs):
             size = -tableau[i, column]
-            if size > 10.0 * tie:
+            if size > SURE_PIVOT * tie:
                 ratio = max(tableau[i, 0], 0.0) / size
                 slack = tie * (1.0 + best)
                 if (

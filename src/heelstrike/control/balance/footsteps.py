@@ -26,80 +26,64 @@ NEAR = 0.03
 """How far, in lengths of a step, a foot is placed beside the gait's foothold as it flies there."""
 
 
-class Planning(Bundle):
-    """What plans are made by.
+NO_PLAN = 1e30
+"""Cost of a plan that is not made: more than any has."""
 
-    Attributes
-    ----------
-    heel, toe : float
-        Where the centre of pressure may be along the sole, from its middle (m).
-    shortest, longest : float
-        Where a foot may land before the other (m).
-    earliest, latest : float
-        When (s after the last).
-    soon : float
-        The centre of pressure is not planned for less than this (s).
-    acceleration : float
-        That of the swing foot at most (m/s²).
-    hurry : float
-        How many times faster than in the gait the swing foot may move.
-    foothold_weight, time_weight, capture_weight : float
-        Costs of deviations (1/m², 1/s², 1/m²).
-    """
+LEAST_TIME = 1e-4
+"""Least time (s) to the landing that is reckoned with: far less than between two calls."""
+
+
+class Planning(Bundle):
+    """What plans are made by."""
 
     heel: float = number(float)
     toe: float = number(float)
+    """heel, toe: Where the centre of pressure may be along the sole, from its middle (m)."""
     shortest: float = number(float)
     longest: float = number(float)
+    """shortest, longest: Where a foot may land before the other (m)."""
     earliest: float = number(float)
     latest: float = number(float)
+    """earliest, latest: When (s after the last)."""
     soon: float = number(float)
+    """The centre of pressure is not planned for less than this (s)."""
     acceleration: float = number(float)
+    """That of the swing foot at most (m/s²)."""
     hurry: float = number(float)
+    """How many times faster than in the gait the swing foot may move."""
     foothold_weight: float = number(float)
     time_weight: float = number(float)
     capture_weight: float = number(float)
+    """foothold_weight, time_weight, capture_weight: Costs of deviations (1/m², 1/s², 1/m²)."""
 
 
 class Plan(Bundle):
-    """A landing, and what it is reckoned from.
-
-    Attributes
-    ----------
-    length, offset : float
-        Step that is wanted (m), and capture point before the foot as it lands (m).
-    phase, elapsed : float
-        Where the reference is, and how long the foot has stood (s).
-    gone : float
-        Time since the plan before (s).
-    capture : float
-        Capture point before the stance sole's middle (m).
-    swing, speed : float
-        Where the swing sole is, and how fast (m, m/s).
-    foothold, remaining : float
-        Where it lands, and when (m, s from now).
-    pressure : float
-        Centre of pressure until then (m).
-    error : float
-        How far from the wanted place the capture point would be as the gait's foot lands, if
-        nothing were done (m).
-    cost : float
-        What the plan costs.
-    """
+    """A landing, and what it is reckoned from."""
 
     length: float = cell(float)
     offset: float = cell(float)
+    """length, offset: Step that is wanted (m), and capture point before the foot as it lands
+    (m)."""
     phase: float = cell(float)
     elapsed: float = cell(float)
+    """phase, elapsed: Where the reference is, and how long the foot has stood (s)."""
     gone: float = cell(float)
+    """Time since the plan before (s)."""
     capture: float = cell(float)
+    """Capture point before the stance sole's middle (m)."""
     swing: float = cell(float)
     speed: float = cell(float)
+    """swing, speed: Where the swing sole is, and how fast (m, m/s)."""
     foothold: float = cell(float)
     remaining: float = cell(float)
+    """foothold, remaining: Where it lands, and when (m, s from now)."""
     pressure: float = cell(float)
+    """Centre of pressure until then (m)."""
     error: float = cell(float)
+    """How far from the wanted place the capture point would be as the gait's foot lands, if nothing
+    were done (m)."""
     cost: float = cell(float)
+    """What the plan costs."""
 
 
 @kernel
@@ -177,12 +161,12 @@ def make_plan(planning: Planning, reference: Reference, retimed: bool, plan: Pla
     capture = value_at(reference.capture, plan.phase)
     correction = reference.end - own - (capture - own) * grown
     plan.error = own + correction + (plan.capture - own) * grown - plan.length - plan.offset
-    plan.cost = 1e30
+    plan.cost = NO_PLAN
     least = COMMITTED * reference.duration
     left = plan.remaining - plan.gone
     if left < least and plan.elapsed > 0.0:
         # The foot is as good as down: what is left is too short to be worth another plan.
-        consider(planning, reference, own, correction, max(left, 1e-4), plan)
+        consider(planning, reference, own, correction, max(left, LEAST_TIME), plan)
     else:
         rest = reference.duration - plan.elapsed
         consider(planning, reference, own, correction, max(rest, least), plan)

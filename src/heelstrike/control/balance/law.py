@@ -47,6 +47,30 @@ STEEPEST = 0.35
 """No slope is believed to be steeper."""
 
 
+TOO_EARLY = 0.3
+"""Part of the shortest step within which no touchdown is believed: the foot has just left."""
+
+LEVEL_FEET = 0.1
+"""How far feet are apart or above each other, in parts of the gait's step or of what is held, for
+them to stand in one place and on one height."""
+
+LIFTED_LEFT = 0.3
+"""Part of a step that is left at least for a foot that is lifted over an obstacle."""
+
+LATE_BEGINS = 0.2
+"""Alarm that a late foot has to make good before it is one: no touchdown is on time to the call."""
+
+SHORTENED_LEG = 0.015
+"""Part of its length by which a leg stays short of its reach, when alarmed."""
+
+DOUBTED = 0.92
+"""Part of the posture's weight that is given up when alarmed."""
+
+BEND_BEGINS, BEND_GROWS, ALARM_GROWS = 0.5, 2.5, 4.0
+"""How the least bend of a swing knee grows: from this part of the gait's bend, and how fast with it
+and with the alarm."""
+
+
 @kernel
 def begin_step(t: float, reference: Reference, memory: Memory) -> None:
     """Set the reference to the beginning of a step."""
@@ -86,7 +110,7 @@ def exchange_at_touchdown(
 ) -> None:
     """Exchange stance and swing when the swing foot has met the ground."""
     early = memory.phase < parameters.touchdown
-    if early or t - memory.start < 0.3 * parameters.planning.earliest:
+    if early or t - memory.start < TOO_EARLY * parameters.planning.earliest:
         return
     swing = 1 - memory.stance
     if memory.lifting == 0 and touched(contacts, robot, swing):
@@ -108,7 +132,7 @@ def learn_slope(parameters: Parameters, memory: Memory) -> None:
     the slope that is believed: an error of the estimate would confirm itself.
     """
     length = memory.sole[0] - memory.rear[0]
-    if abs(length) > 0.1 * parameters.reference.length:
+    if abs(length) > LEVEL_FEET * parameters.reference.length:
         rise = memory.sole[1] - memory.rear[1]
         slope = min(max(rise / length, -STEEPEST), STEEPEST)
         off = slope - memory.slope
@@ -141,7 +165,7 @@ def lift_over(
     memory.alarm = 1.0
     memory.phase = min(memory.phase, 0.5)
     memory.late = 0.0
-    memory.plan.remaining = max(memory.plan.remaining, 0.3 * parameters.reference.duration)
+    memory.plan.remaining = max(memory.plan.remaining, LIFTED_LEFT * parameters.reference.duration)
 
 
 @kernel
@@ -172,7 +196,7 @@ def stand_or_walk(t: float, parameters: Parameters, memory: Memory) -> None:
             memory.stands = 0
             begin_step(t, parameters.reference, memory)
     elif parameters.speed == 0.0 and memory.phase < JUST_BEGUN and memory.landed == 1:
-        level = abs(memory.swing[1] - memory.sole[1]) < 0.1 * hold
+        level = abs(memory.swing[1] - memory.sole[1]) < LEVEL_FEET * hold
         if level and abs(plan.swing) < hold and away < 0.5 * hold:
             memory.stands = 1
             memory.back = memory.swing[0]
@@ -211,7 +235,7 @@ def decide(t: float, landed: bool, tilt: float, parameters: Parameters, memory: 
     memory.alarm = max(memory.alarm - elapsed / parameters.calming, 0.0)
     if landed and parameters.adapts == 1:
         # A foot that is late has found the ground lower than it should be.
-        alarm = min(2.0 * memory.late / parameters.search - 0.2, 1.0)
+        alarm = min(2.0 * memory.late / parameters.search - LATE_BEGINS, 1.0)
         # One that does not lie as the ground is believed to lies on ground that is not known.
         alarm = max(alarm, min(abs(tilt + atan(memory.slope)) / BUMP - 1.0, 1.0))
         amiss = sqrt(plan.cost)
@@ -268,7 +292,7 @@ def want_height(
     own = value_at(reference.hip, memory.phase)
     # The plane in which the body goes: parallel to the ground.
     rise = memory.slope * (hip[0] - memory.sole[0])
-    reach = (1.0 - 0.015 * alarm) * legs.length
+    reach = (1.0 - SHORTENED_LEG * alarm) * legs.length
     across = hip[0] - ankle[0]
     under = ankle[1] - memory.sole[1]
     room = under + sqrt(max(reach * reach - across * across, 0.0)) - rise
@@ -401,7 +425,7 @@ def want_posture(
     """Add what settles what the other tasks leave open: the gait's joints, bent knees, effort."""
     reference, weights = parameters.reference, parameters.weights
     program, on, phase, rate = memory.program, memory.on, memory.phase, memory.rate
-    weight = weights.posture * (1.0 - 0.92 * memory.alarm)
+    weight = weights.posture * (1.0 - DOUBTED * memory.alarm)
     for i in range(robot.nu):
         table = reference.joints[memory.stance, :, i]
         wanted = curvature_at(table, phase) * rate * rate
@@ -434,7 +458,7 @@ def keep_knees_bent(state: ControlState, parameters: Parameters, memory: Memory)
             # A swing leg that is bent the wrong way could not be lifted.
             table = parameters.reference.joints[memory.stance, :, knee]
             gait = sign * (value_at(table, memory.phase) - legs.straight[foot])
-            part = max(min(4.0 * part, 1.0), min(2.5 * gait - 0.5, 1.0))
+            part = max(min(ALARM_GROWS * part, 1.0), min(BEND_GROWS * gait - BEND_BEGINS, 1.0))
         least = parameters.straight_knee + max(part, 0.0) * range_of
         row = program.count
         for i in range(program.x.shape[0]):

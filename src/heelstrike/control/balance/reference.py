@@ -34,42 +34,30 @@ PIECES = 48
 
 
 class Reference(Bundle):
-    """A step of a gait, in cubic pieces of the phase, lowest power first.
-
-    Attributes
-    ----------
-    hip : (pieces, 4) float
-        Height of the stance leg's hip (m).
-    pitch : (pieces, 4) float
-        Rotation of the trunk about +y (rad).
-    swing_x, swing_z, swing_angle : (pieces, 4) float
-        Place of the middle of the swing sole (m), and how far it is from flat (rad).
-    pressure : (pieces, 4) float
-        Centre of pressure along the stance sole (m).
-    capture : (pieces, 4) float
-        Capture point x + ẋ/ω (m).
-    joints : (2, pieces, nu, 4) float
-        The joints, for either stance foot (rad).
-    length, duration : float
-        Of a step (m, s).
-    rate : float
-        ω = √(g/z) of the capture point (1/s).
-    end : float
-        Capture point at the end of the step (m).
-    """
+    """A step of a gait, in cubic pieces of the phase, lowest power first."""
 
     hip: Floats = array("pieces", 4)
+    """Height of the stance leg's hip (m)."""
     pitch: Floats = array("pieces", 4)
+    """Rotation of the trunk about +y (rad)."""
     swing_x: Floats = array("pieces", 4)
     swing_z: Floats = array("pieces", 4)
     swing_angle: Floats = array("pieces", 4)
+    """swing_x, swing_z, swing_angle: Place of the middle of the swing sole (m), and how far it is
+    from flat (rad)."""
     pressure: Floats = array("pieces", 4)
+    """Centre of pressure along the stance sole (m)."""
     capture: Floats = array("pieces", 4)
+    """Capture point x + ẋ/ω (m)."""
     joints: Floats = array(2, "pieces", "nu", 4)
+    """The joints, for either stance foot (rad)."""
     length: float = number(float)
     duration: float = number(float)
+    """length, duration: Of a step (m, s)."""
     rate: float = number(float)
+    """ω = √(g/z) of the capture point (1/s)."""
     end: float = number(float)
+    """Capture point at the end of the step (m)."""
 
 
 @kernel

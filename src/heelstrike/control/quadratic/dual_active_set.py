@@ -37,6 +37,13 @@ REFINEMENTS = 3
 """How often, at most."""
 
 
+NO_ROW = 1e-30
+"""Size, far below that of any row, which keeps a row of zeros from being divided by."""
+
+NO_SIZE = 1e-300
+"""The same of a programme, in which rows may be as small as numbers are."""
+
+
 @kernel
 def begin(program: Program) -> bool:
     """Find the least without rows, and J = L⁻ᵀ; tell whether H is positive definite."""
@@ -104,7 +111,7 @@ def most_violated(program: Program, taken: int) -> int:
         missed = slack(program, row)
         if row < program.equalities:
             missed = -abs(missed)
-        if missed >= -VIOLATED * (1e-30 + size_of(program, row)):
+        if missed >= -VIOLATED * (NO_ROW + size_of(program, row)):
             continue
         held = False
         for k in range(taken):
@@ -116,7 +123,7 @@ def most_violated(program: Program, taken: int) -> int:
         length = 0.0
         for i in range(program.x.shape[0]):
             length += program.rows[row, i] * program.rows[row, i]
-        missed /= sqrt(length) + 1e-30
+        missed /= sqrt(length) + NO_ROW
         if missed < worst:
             worst, found = missed, row
     return found
@@ -267,7 +274,7 @@ def strayed(program: Program, taken: int, signs: int) -> bool:
     off = worst > STRAYED * force
     for k in range(taken):
         row = program.active[k]
-        off = off or abs(slack(program, row)) > STRAYED * (1e-30 + size_of(program, row))
+        off = off or abs(slack(program, row)) > STRAYED * (NO_ROW + size_of(program, row))
     return off
 
 
@@ -364,7 +371,7 @@ def certify(program: Program) -> None:
     for row in range(program.count):
         if program.given_up[row] != 0:
             continue
-        size = size_of(program, row) + 1e-300
+        size = size_of(program, row) + NO_SIZE
         missed = slack(program, row) / size
         pull = 0.0
         for i in range(n):
@@ -375,7 +382,7 @@ def certify(program: Program) -> None:
             violation = max(violation, -missed)
             wrong = pull if program.multiplier[row] < 0.0 else min(1.0, abs(missed)) * pull
             complementarity = max(complementarity, wrong)
-    scale = 1.0 / (force + 1e-300)
+    scale = 1.0 / (force + NO_SIZE)
     program.stationarity = scale * stationarity
     program.violation = violation
     program.complementarity = scale * complementarity

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -16,6 +14,7 @@ from heelstrike.control.quadratic.program import (
     Program,
 )
 from heelstrike.errors import ControllerError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 
 MOST_EQUALITIES = 62
@@ -24,27 +23,19 @@ MOST_EQUALITIES = 62
 
 @dataclass(frozen=True, kw_only=True)
 class QuadraticSolution:
-    """The answer to a quadratic programme, with its certificate.
-
-    Attributes
-    ----------
-    x : (n,) float
-        The answer.
-    multiplier : (m,) float
-        Those of the rows: H x + g = Cᵀ multiplier.
-    iterations : int
-        Rows taken up or dropped on the way.
-    stationarity, violation, complementarity : float
-        How far x and multipliers are from the conditions of Karush, Kuhn and Tucker, found from the
-        data alone and relative to its size.
-    """
+    """The answer to a quadratic programme, with its certificate."""
 
     x: Floats
+    """(n,) The answer."""
     multiplier: Floats
+    """(m,) Those of the rows: H x + g = Cᵀ multiplier."""
     iterations: int
+    """Rows taken up or dropped on the way."""
     stationarity: float
     violation: float
     complementarity: float
+    """stationarity, violation, complementarity: How far x and multipliers are from the conditions
+    of Karush, Kuhn and Tucker, found from the data alone and relative to its size."""
 
 
 @takes(ControllerError)

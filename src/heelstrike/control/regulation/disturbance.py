@@ -22,27 +22,19 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
 
 class Disturbance(Bundle):
-    """What is remembered of the call before, and what was found.
-
-    Attributes
-    ----------
-    known : int
-        Whether there was a call before, and no impact since.
-    force : (nv,) float
-        d, as found and filtered.
-    q, v, torque : (nq,), (nv,) and (nu,) float
-        State and torques of the call before.
-    jacobian, found : (2, nv) and (nv,) float
-        Scratch.
-    """
+    """What is remembered of the call before, and what was found."""
 
     known: int = cell(int)
+    """Whether there was a call before, and no impact since."""
     force: Floats = array("nv")
+    """d, as found and filtered."""
     q: Floats = array("nq")
     v: Floats = array("nv")
     torque: Floats = array("nu")
+    """q, v, torque: State and torques of the call before."""
     jacobian: Floats = array(2, "nv")
     found: Floats = array("nv")
+    """jacobian, found: Scratch."""
 
 
 @kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 
-FLAT = 1e-9
+NO_SLOPE = 1e-9
 """A condition whose slope is less, in parts of its size, does not depend on the number."""
 
 
@@ -14,7 +14,7 @@ def narrowed(lower: float, upper: float, value: float, slope: float) -> tuple[fl
 
     If there is none, the end that comes nearest to it is all that is left.
     """
-    if abs(slope) <= FLAT * (1.0 + abs(value)):
+    if abs(slope) <= NO_SLOPE * (1.0 + abs(value)):
         return lower, upper, value >= 0.0
     bound = -value / slope
     if slope > 0.0:

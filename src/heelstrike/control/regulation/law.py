@@ -42,6 +42,9 @@ from heelstrike.sim.controller.law import controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance import complete, joint_torques, solve_three_transposed
 
+JUST_MET = 1e-9
+"""Part of its terms by which a bound that the clock has just met may be missed: rounding."""
+
 
 @kernel
 def advance(t: float, memory: Memory) -> float:
@@ -159,7 +162,7 @@ def choose(parameters: Parameters, elapsed: float, memory: Memory, log: Log) -> 
     for i in range(MOMENTS):
         left = rows[i, 0] + rows[i, 1] * hurry
         # Bounds that the clock has just met are met: rounding moves no ankle.
-        left += 1e-9 * (abs(rows[i, 0]) + abs(rows[i, 1] * hurry))
+        left += JUST_MET * (abs(rows[i, 0]) + abs(rows[i, 1] * hurry))
         lowest, highest, kept = narrowed(lowest, highest, left, rows[i, 2])
         if not kept:
             log.given_up = 3

@@ -15,120 +15,80 @@ PERIOD = 1e-3
 
 
 class Parameters(Landing):
-    """Numbers of the law.
-
-    Attributes
-    ----------
-    kp, kd : (nu,) float
-        Gains (1/s², 1/s).
-    breakpoints : (pieces + 1,) float
-        Times in a step between which one polynomial holds (s).
-    coefficients : (2, pieces, terms, nu) float
-        For either stance foot the joints' polynomials, lowest power first.
-    ankle : (2,) int
-        Actuator of the ankle of each foot.
-    earliest, latest : float
-        A touchdown counts only after this time of the gait; the reference ends at this (s).
-    margin : float
-        How far the zero moment point stays inside the sole (m).
-    friction : float
-        Coefficient of friction that is reckoned with.
-    least_force : float
-        Least normal force (N).
-    returning : float
-        T_r, in which the clock comes back to the pace of time (s).
-    hurry : float
-        Greatest |s̈| (1/s).
-    slowest, fastest : float
-        Bounds of ṡ.
-    bandwidth : float
-        Frequency (Hz) up to which disturbances are felt; negative for not at all.
-    """
+    """Numbers of the law."""
 
     kp: Floats = array("nu")
     kd: Floats = array("nu")
+    """kp, kd: Gains (1/s², 1/s)."""
     breakpoints: Floats = array("pieces + 1")
+    """Times in a step between which one polynomial holds (s)."""
     coefficients: Floats = array(2, "pieces", "terms", "nu")
+    """For either stance foot the joints' polynomials, lowest power first."""
     ankle: Integers = array(2, of=int)
+    """Actuator of the ankle of each foot."""
     earliest: float = number(float)
     latest: float = number(float)
+    """earliest, latest: A touchdown counts only after this time of the gait; the reference ends at
+    this (s)."""
     margin: float = number(float)
+    """How far the zero moment point stays inside the sole (m)."""
     friction: float = number(float)
+    """Coefficient of friction that is reckoned with."""
     least_force: float = number(float)
+    """Least normal force (N)."""
     returning: float = number(float)
+    """T_r, in which the clock comes back to the pace of time (s)."""
     hurry: float = number(float)
+    """Greatest |s̈| (1/s)."""
     slowest: float = number(float)
     fastest: float = number(float)
+    """slowest, fastest: Bounds of ṡ."""
     bandwidth: float = number(float)
+    """Frequency (Hz) up to which disturbances are felt; negative for not at all."""
 
 
 class Choice(Bundle):
-    """What the ground exerts on the stance foot, and the motion, for numbers to be chosen.
-
-    Attributes
-    ----------
-    position, slope, curvature : (nu,) float
-        q_d, q_d′ and q_d″.
-    joints : (3, nu) float
-        Accelerations of the joints as nothing is chosen, and what s̈ and w add to them.
-    force : (3, nv) float
-        Generalised forces of motors and ground for these.
-    conditions : (5, 3) float
-        Numbers that must not be negative, likewise.
-    """
+    """What the ground exerts on the stance foot, and the motion, for numbers to be chosen."""
 
     position: Floats = array("nu")
     slope: Floats = array("nu")
     curvature: Floats = array("nu")
+    """position, slope, curvature: q_d, q_d′ and q_d″."""
     joints: Floats = array(3, "nu")
+    """Accelerations of the joints as nothing is chosen, and what s̈ and w add to them."""
     force: Floats = array(3, "nv")
+    """Generalised forces of motors and ground for these."""
     conditions: Floats = array(CONDITIONS, 3)
+    """Numbers that must not be negative, likewise."""
 
 
 class Memory(Stance):
-    """What the law remembers.
-
-    Attributes
-    ----------
-    time : float
-        Of the last call (s).
-    clock, rate, hurry : float
-        s, ṡ and s̈ (s, 1, 1/s).
-    choice : Choice
-    disturbance : Disturbance
-    """
+    """What the law remembers."""
 
     time: float = cell(float)
+    """Of the last call (s)."""
     clock: float = cell(float)
     rate: float = cell(float)
     hurry: float = cell(float)
+    """clock, rate, hurry: s, ṡ and s̈ (s, 1, 1/s)."""
     choice: Choice = part(Choice)
     disturbance: Disturbance = part(Disturbance)
 
 
 class Log(Bundle):
-    """What the law tells of itself.
-
-    Attributes
-    ----------
-    clock, rate, hurry : float
-        s, ṡ and s̈.
-    slowest_hurry, fastest_hurry : float
-        The interval of s̈; both the same if it is empty.
-    ankle : float
-        w, what the stance ankle accelerates besides (rad/s²).
-    pressure : float
-        Zero moment point that is expected, from the middle of the sole towards the toe (m).
-    given_up : int
-        0: all conditions are met. 1: normal force or friction are not. 2: s̈ alone would not keep
-        the zero moment point, the ankle does. 3: neither does.
-    """
+    """What the law tells of itself."""
 
     clock: float = cell(float, unit="s", label="Clock of the gait")
     rate: float = cell(float, label="Rate of the clock")
     hurry: float = cell(float, unit="1/s", label="Change of the clock's rate")
+    """clock, rate, hurry: s, ṡ and s̈."""
     slowest_hurry: float = cell(float, unit="1/s", label="Least change of the clock's rate")
     fastest_hurry: float = cell(float, unit="1/s", label="Greatest change of the clock's rate")
+    """slowest_hurry, fastest_hurry: The interval of s̈; both the same if it is empty."""
     ankle: float = cell(float, unit="rad/s²", label="Acceleration that the ankle gives up")
+    """w, at the stance ankle."""
     pressure: float = cell(float, unit="m", label="Expected zero moment point")
+    """From the middle of the sole towards the toe."""
     given_up: int = cell(int, label="Conditions given up")
+    """0: all conditions are met. 1: normal force or friction are not. 2: s̈ alone would not keep
+    the zero moment point, the ankle does. 3: neither does."""

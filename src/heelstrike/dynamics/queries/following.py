@@ -12,7 +12,6 @@ those of the assembly that it stands in, and derivatives of what they converge t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 
 from heelstrike.dynamics.queries.loops import loop_jacobian
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 
 Symbols = NDArray[Any]
@@ -38,19 +38,13 @@ INDEPENDENT = 1e-9
 
 @dataclass(frozen=True)
 class Drive:
-    """Which joints of a floating robot have a motor, and which follow from these.
-
-    Attributes
-    ----------
-    driven, following : tuple of int
-        Coordinates of the joints, in the order of the robot.
-    rows : tuple of int
-        Equations of the loops that say where the latter are.
-    """
+    """Which joints of a floating robot have a motor, and which follow from these."""
 
     driven: tuple[int, ...]
     following: tuple[int, ...]
+    """driven, following: Coordinates of the joints, in the order of the robot."""
     rows: tuple[int, ...]
+    """Equations of the loops that say where the latter are."""
 
 
 def drive_of(robot: Robot) -> Drive:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.dynamics.inverse_kinematics import MISSED, Reaching, leg_joints, reach
 from heelstrike.dynamics.queries.evaluation import joint_vector, plane_vector
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.coordinates import index_of
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -18,18 +17,12 @@ from heelstrike.robot.sole import sole
 
 @dataclass(frozen=True, eq=False)
 class LegPose:
-    """Positions in which a foot is where it shall be, or as near as the leg comes.
-
-    Attributes
-    ----------
-    q : (nq,) float
-        Positions (m, rad); other coordinates than those of the leg are as they were given.
-    residual : float
-        What is missing, of the kinematics of `q`: the larger of metres and radians.
-    """
+    """Positions in which a foot is where it shall be, or as near as the leg comes."""
 
     q: Floats
+    """(nq,) Positions (m, rad); other coordinates than those of the leg are as they were given."""
     residual: float
+    """What is missing, of the kinematics of `q`: the larger of metres and radians."""
 
     @property
     def reached(self) -> bool:

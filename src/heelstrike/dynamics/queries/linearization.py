@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 
@@ -21,30 +21,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Linearization:
-    """d/dt (δq, δv) = A (δq, δv) + B δΓ about a state and torque.
-
-    Attributes
-    ----------
-    A : (nq + nv, nq + nv) float
-        Derivative of (v, v̇) with respect to (q, v).
-    B : (nq + nv, nu) float
-        Derivative of (v, v̇) with respect to the joint torques.
-    state_derivative : (nq + nv,) float
-        (v, v̇) at the state itself, zero at an equilibrium.
-    contact_force : (k, 2) float
-        Force (normal, tangent) of the ground on the robot at the held contact points, in N.
-    contact_force_state : (k, 2, nq + nv) float
-        Its derivative with respect to (q, v).
-    contact_force_torque : (k, 2, nu) float
-        Its derivative with respect to the joint torques.
-    """
+    """d/dt (δq, δv) = A (δq, δv) + B δΓ about a state and torque."""
 
     A: Floats
+    """(nq + nv, nq + nv) Derivative of (v, v̇) with respect to (q, v)."""
     B: Floats
+    """(nq + nv, nu) Derivative of (v, v̇) with respect to the joint torques."""
     state_derivative: Floats
+    """(nq + nv,) (v, v̇) at the state itself, zero at an equilibrium."""
     contact_force: Floats
+    """(k, 2) Force (normal, tangent) of the ground on the robot at the held contact points, in
+    N."""
     contact_force_state: Floats
+    """(k, 2, nq + nv) Its derivative with respect to (q, v)."""
     contact_force_torque: Floats
+    """(k, 2, nu) Its derivative with respect to the joint torques."""
 
 
 def linearize(

@@ -2,34 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.dynamics import kernels
 from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.query import of_position, of_state
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 
 
 @dataclass(frozen=True)
 class LinkPoses:
-    """Poses of all links in the world.
-
-    Attributes
-    ----------
-    origin : (nl, 2) float
-        Position (x, z) of each link frame, in metres.
-    angle : (nl,) float
-        Rotation of each link about +y from the reference configuration, in rad.
-    center_of_mass : (nl, 2) float
-        Position (x, z) of each link's centre of mass, in metres.
-    """
+    """Poses of all links in the world."""
 
     origin: Floats
+    """(nl, 2) Position (x, z) of each link frame, in metres."""
     angle: Floats
+    """(nl,) Rotation of each link about +y from the reference configuration, in rad."""
     center_of_mass: Floats
+    """(nl, 2) Position (x, z) of each link's centre of mass, in metres."""
 
 
 @of_position("LinkPoses: In m and rad.")
@@ -44,21 +36,14 @@ def link_poses(at: Evaluation) -> LinkPoses:
 
 @dataclass(frozen=True)
 class LinkVelocities:
-    """Velocities of all links in the world.
-
-    Attributes
-    ----------
-    origin : (nl, 2) float
-        Velocity (x, z) of each link frame's origin, in m/s.
-    angular : (nl,) float
-        Angular velocity of each link about +y, in rad/s.
-    center_of_mass : (nl, 2) float
-        Velocity (x, z) of each link's centre of mass, in m/s.
-    """
+    """Velocities of all links in the world."""
 
     origin: Floats
+    """(nl, 2) Velocity (x, z) of each link frame's origin, in m/s."""
     angular: Floats
+    """(nl,) Angular velocity of each link about +y, in rad/s."""
     center_of_mass: Floats
+    """(nl, 2) Velocity (x, z) of each link's centre of mass, in m/s."""
 
 
 @of_state("LinkVelocities: In m/s and rad/s.")

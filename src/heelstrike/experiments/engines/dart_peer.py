@@ -11,9 +11,9 @@ from heelstrike.experiments.engines.links import links, space
 from heelstrike.experiments.engines.peer import Engine, Floats, Peer
 from heelstrike.experiments.engines.scenario import Scenario
 
-RADIUS = 1e-4
+LEAST_RADIUS = 1e-4
 """Least radius of a contact point, in m: its collision detectors want spheres of some size."""
-MASSLESS = 1e-12
+LEAST_MASS = 1e-12
 """Mass (kg) and inertia (kg m²) that stand for none."""
 
 
@@ -99,7 +99,7 @@ def _skeleton(scenario: Scenario) -> Any:
     dynamics = dartpy.dynamics
     skeleton = dynamics.Skeleton("robot")
     bodies: list[Any] = []
-    for link in links(robot, least_radius=RADIUS):
+    for link in links(robot, least_radius=LEAST_RADIUS):
         parent = bodies[link.parent] if link.parent >= 0 else None
         kind = "Revolute" if link.hinge else "Prismatic"
         properties = getattr(dynamics, f"{kind}JointProperties")()
@@ -109,8 +109,8 @@ def _skeleton(scenario: Scenario) -> Any:
         place = dartpy.math.Isometry3()
         place.set_translation(link.place)
         joint.setTransformFromParentBodyNode(place)
-        inertia = np.diag([max(link.inertia, MASSLESS)] * 3)
-        body.setInertia(dynamics.Inertia(max(link.mass, MASSLESS), link.center, inertia))
+        inertia = np.diag([max(link.inertia, LEAST_MASS)] * 3)
+        body.setInertia(dynamics.Inertia(max(link.mass, LEAST_MASS), link.center, inertia))
         joint.setDampingCoefficient(0, link.damping)
         if np.isfinite(link.lower) or np.isfinite(link.upper):
             joint.setPositionLowerLimit(0, link.lower)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot import Robot
 from heelstrike.robot.loops import refuse_loops
 
@@ -17,41 +17,30 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Link:
-    """A link and the joint that it hangs on; vectors are (3,), in link axes.
-
-    Attributes
-    ----------
-    name : str
-    parent : int
-        -1 for the world.
-    hinge : bool
-        Whether its joint is a hinge; a slide otherwise.
-    axis, place : (3,) float
-        Axis of the joint, and where it is on the parent.
-    mass, inertia : float
-        Mass, and moment of inertia about the centre of mass (the same about all axes, of which
-        only y plays a part).
-    center : (3,) float
-        Centre of mass.
-    lower, upper, damping, armature : float
-        Of the joint, whose coordinate is zero in the reference position of the robot.
-    points : tuple of ((3,) float, float)
-        Centre and radius of the contact points.
-    """
+    """A link and the joint that it hangs on; vectors are (3,), in link axes."""
 
     name: str
     parent: int
+    """-1 for the world."""
     hinge: bool
+    """Whether its joint is a hinge; a slide otherwise."""
     axis: Floats
     place: Floats
+    """axis, place: (3,) Axis of the joint, and where it is on the parent."""
     mass: float
     center: Floats
+    """(3,) Centre of mass."""
     inertia: float
+    """mass, inertia: Mass, and moment of inertia about the centre of mass (the same about all axes,
+    of which only y plays a part)."""
     lower: float
     upper: float
     damping: float
     armature: float
+    """lower, upper, damping, armature: Of the joint, whose coordinate is zero in the reference
+    position of the robot."""
     points: tuple[tuple[Floats, float], ...]
+    """Centre (3,) and radius of the contact points."""
 
 
 def links(robot: Robot, *, least_radius: float = 0.0) -> list[Link]:

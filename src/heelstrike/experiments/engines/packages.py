@@ -5,10 +5,11 @@ from __future__ import annotations
 import importlib
 import importlib.util
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from types import ModuleType
 from typing import TYPE_CHECKING
+
+from heelstrike.field_texts import dataclass
 
 if TYPE_CHECKING:
     from heelstrike.experiments.engines.peer import Engine
@@ -16,23 +17,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Package:
-    """Where an engine comes from.
-
-    Attributes
-    ----------
-    title : str
-        Its name.
-    module, distribution : str
-        What is imported, and what is installed.
-    adapter : str or None
-        Module of this package that asks it to simulate and has an `Engine` named ``ENGINE``; None
-        if there is none.
-    """
+    """Where an engine comes from."""
 
     title: str
+    """Its name."""
     module: str
     distribution: str
+    """module, distribution: What is imported, and what is installed."""
     adapter: str | None
+    """Module of this package that asks it to simulate and has an `Engine` named ``ENGINE``; None if
+    there is none."""
 
 
 PACKAGES = {

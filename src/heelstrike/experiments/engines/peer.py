@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from time import perf_counter
 from typing import Any, ClassVar
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.experiments.engines.scenario import Scenario
+from heelstrike.field_texts import dataclass
 from heelstrike.robot import Robot, State
 from heelstrike.sim import TimeStepping
 
@@ -38,21 +39,14 @@ class InvalidRunError(Exception):
 
 @dataclass(frozen=True)
 class Touching:
-    """How a robot touches the ground.
-
-    Attributes
-    ----------
-    active : int
-        Contact points that the engine's solver was given.
-    force : float
-        Sum of their normal forces, in N.
-    depth : float
-        Deepest penetration, in m; negative or zero where there is none.
-    """
+    """How a robot touches the ground."""
 
     active: int
+    """Contact points that the engine's solver was given."""
     force: float
+    """Sum of their normal forces, in N."""
     depth: float
+    """Deepest penetration, in m; negative or zero where there is none."""
 
 
 class Peer(ABC):
@@ -215,22 +209,15 @@ class Peer(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Engine:
-    """An engine that simulates.
-
-    Attributes
-    ----------
-    label : str
-        Name in tables and figures, with the way its steps are timed.
-    note : str
-        What its times include.
-    peer : callable
-        Makes the peer of a scenario with a step, in the fastest way that is valid, or another way
-        that further keywords name.
-    """
+    """An engine that simulates."""
 
     label: str
+    """Name in tables and figures, with the way its steps are timed."""
     note: str
+    """What its times include."""
     peer: Callable[..., Peer]
+    """Makes the peer of a scenario with a step, in the fastest way that is valid, or another way
+    that further keywords name."""
 
 
 def check_flight(engine: Engine, robot: Robot) -> float:

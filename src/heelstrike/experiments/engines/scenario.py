@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from heelstrike.contact.ground import Ground
 from heelstrike.control.joint_feedback import JointFeedback
+from heelstrike.field_texts import dataclass
 from heelstrike.robot import Robot, State
 from heelstrike.sim import Run, simulate
 from heelstrike.sim.method import Method
@@ -18,31 +18,21 @@ NEVER = 2**62
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A robot, where it starts, and what drives it, on level ground without restitution.
-
-    Attributes
-    ----------
-    name : str
-    robot : Robot
-    state : State
-        Where it starts.
-    duration : float
-        Seconds.
-    feedback : JointFeedback or None
-        Its control; None for none.
-    contacts : int or None
-        Contact points that must be active throughout, if it shall stand.
-    friction : float
-        Coefficient of the ground.
-    """
+    """A robot, where it starts, and what drives it, on level ground without restitution."""
 
     name: str
+    """What tables call it."""
     robot: Robot
     state: State
+    """Where it starts."""
     duration: float
+    """Seconds."""
     feedback: JointFeedback | None = None
+    """Its control; None for none."""
     contacts: int | None = None
+    """Contact points that must be active throughout, if it shall stand."""
     friction: float = 0.75
+    """Coefficient of the ground."""
 
     @property
     def ground(self) -> Ground:

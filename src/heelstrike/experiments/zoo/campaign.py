@@ -8,7 +8,7 @@ import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -24,6 +24,7 @@ from heelstrike.experiments.zoo.results import (
     Settings,
     load_results,
 )
+from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, load_gait
 from heelstrike.gait.gait import fingerprint
 from heelstrike.robot import Robot, builtin_robots, load_robot
@@ -40,22 +41,15 @@ LOOK_EVERY = 0.1
 
 @dataclass
 class Progress:
-    """How far a campaign is.
-
-    Attributes
-    ----------
-    cells, finished : int
-        Cells asked for, and those that are there.
-    doing : dict of str to float
-        What is going on, and how much of it is done, from 0 to 1.
-    files : tuple of Path
-        Files written since it was told last.
-    """
+    """How far a campaign is."""
 
     cells: int
     finished: int = 0
+    """cells, finished: Cells asked for, and those that are there."""
     doing: dict[str, float] = field(default_factory=dict)
+    """What is going on, and how much of it is done, from 0 to 1."""
     files: tuple[Path, ...] = ()
+    """Files written since it was told last."""
 
 
 def zoo(

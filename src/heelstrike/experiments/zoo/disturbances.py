@@ -7,7 +7,7 @@ so that each is searched over the same range of what its body feels.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -26,6 +26,7 @@ from heelstrike.analysis.stability.trial import Trial
 from heelstrike.contact.ground import Ground
 from heelstrike.experiments.laws import BRAVO7_STEP, BRAVO7_WEIGHT
 from heelstrike.experiments.walk import typical_step
+from heelstrike.field_texts import dataclass
 from heelstrike.robot import Robot
 
 PUSH, SLOPE, STEP, ROUGH, MASS = 150.0, 15.0, 0.10, 0.05, 50.0
@@ -40,66 +41,43 @@ PATCH = 2.0
 
 @dataclass(frozen=True)
 class Effort:
-    """How finely sizes are searched.
-
-    Attributes
-    ----------
-    strides, halvings : int
-        As of :func:`heelstrike.analysis.stability.largest.largest`.
-    """
+    """How finely sizes are searched."""
 
     strides: int = 10
     halvings: int = 3
+    """strides, halvings: As of :func:`heelstrike.analysis.stability.largest.largest`."""
 
 
 @dataclass(frozen=True)
 class Chance:
-    """What chance decides in one trial.
-
-    Attributes
-    ----------
-    phase : float
-        When in a step a push begins, from 0 to 1.
-    seed : int
-        Of rough ground.
-    """
+    """What chance decides in one trial."""
 
     phase: float
+    """When in a step a push begins, from 0 to 1."""
     seed: int
+    """Of rough ground."""
 
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A disturbance of the zoo.
-
-    Attributes
-    ----------
-    name : str
-        What it is called.
-    heading : str
-        The same in a table.
-    unit : str
-        Of its sizes.
-    told : str
-        What it is, in a line.
-    measure : callable
-        Finds how large it may be in a trial.
-    by_chance : bool
-        Whether chance has a part in it; if not, one trial says all.
-    standing : bool
-        Whether a robot that stands meets it, too.
-    less : bool
-        Whether less of it is better.
-    """
+    """A disturbance of the zoo."""
 
     name: str
+    """What it is called."""
     heading: str
+    """The same in a table."""
     unit: str
+    """Of its sizes."""
     told: str
+    """What it is, in a line."""
     measure: Callable[[Trial, Chance, Effort], Largest]
+    """Finds how large it may be in a trial."""
     by_chance: bool = False
+    """Whether chance has a part in it; if not, one trial says all."""
     standing: bool = False
+    """Whether a robot that stands meets it, too."""
     less: bool = False
+    """Whether less of it is better."""
 
 
 def _push(sign: float, trial: Trial, chance: Chance, effort: Effort) -> Largest:

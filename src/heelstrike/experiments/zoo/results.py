@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from pathlib import Path
 from typing import Any
 
 from heelstrike import __version__
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.zoo.disturbances import DISTURBANCES, Disturbance
+from heelstrike.field_texts import dataclass
 from heelstrike.json_checksum import Entries, json_text, reading_json
 from heelstrike.whole_file import write_whole
 
@@ -29,56 +30,39 @@ Key = tuple[str, str, str]
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """All that the numbers hang on beside robots, controllers and disturbances.
-
-    Attributes
-    ----------
-    seed : int
-        Of all that chance decides.
-    trials : int
-        Phases of pushes and shapes of the ground that are tried.
-    strides, halvings : int
-        How finely sizes are searched.
-    method : str
-        Way through time.
-    version : str
-        Version of heelstrike.
-    """
+    """All that the numbers hang on beside robots, controllers and disturbances."""
 
     seed: int = 0
+    """Of all that chance decides."""
     trials: int = 4
+    """Phases of pushes and shapes of the ground that are tried."""
     strides: int = 10
     halvings: int = 3
+    """strides, halvings: How finely sizes are searched."""
     method: str = ""
+    """Way through time."""
     version: str = __version__
+    """Version of heelstrike."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """How large a disturbance a controller withstands on a robot.
-
-    Attributes
-    ----------
-    robot, controller, disturbance : str
-        Their names.
-    withstood : tuple of float
-        Of each trial, the size such that the walk recovers from it and from all smaller ones tried.
-    failed : tuple of float
-        Of each trial, the smallest size from which it does not; infinite if there was none.
-    walks : int
-        Walks simulated.
-    word, reason : str
-        Why there is nothing, in a word and in full; nothing if there is.
-    """
+    """How large a disturbance a controller withstands on a robot."""
 
     robot: str
     controller: str
     disturbance: str
+    """robot, controller, disturbance: Their names."""
     withstood: tuple[float, ...] = ()
+    """Of each trial, the size such that the walk recovers from it and from all smaller ones
+    tried."""
     failed: tuple[float, ...] = ()
+    """Of each trial, the smallest size from which it does not; infinite if there was none."""
     walks: int = 0
+    """Walks simulated."""
     word: str = ""
     reason: str = ""
+    """word, reason: Why there is nothing, in a word and in full; nothing if there is."""
 
     @property
     def key(self) -> Key:
@@ -115,47 +99,31 @@ class Cell:
 
 @dataclass(frozen=True, kw_only=True)
 class Animal:
-    """A robot of the zoo, and the gait on which it is disturbed.
-
-    Attributes
-    ----------
-    robot : str
-        Its name.
-    fingerprint : str
-        What tells its numbers from others.
-    mass : float
-        In kg.
-    step_length, step_duration : float
-        Of its gait, in m and s; zero if it has none.
-    """
+    """A robot of the zoo, and the gait on which it is disturbed."""
 
     robot: str
+    """Its name."""
     fingerprint: str
+    """What tells its numbers from others."""
     mass: float
+    """In kg."""
     step_length: float = 0.0
     step_duration: float = 0.0
+    """step_length, step_duration: Of its gait, in m and s; zero if it has none."""
 
 
 @dataclass
 class Results:
-    """The cells that are finished.
-
-    Attributes
-    ----------
-    settings : Settings
-        Those of all cells.
-    animals : dict of str to Animal
-        Robots by name.
-    cells : dict of (str, str, str) to Cell
-        By robot, controller and disturbance, in the order in which they were finished.
-    disturbances : sequence of Disturbance
-        Those that cells are of, in the order of the table.
-    """
+    """The cells that are finished."""
 
     settings: Settings
+    """Those of all cells."""
     animals: dict[str, Animal] = field(default_factory=dict)
+    """Robots by name."""
     cells: dict[Key, Cell] = field(default_factory=dict)
+    """By robot, controller and disturbance, in the order in which they were finished."""
     disturbances: Sequence[Disturbance] = DISTURBANCES
+    """Those that cells are of, in the order of the table."""
 
     def put(self, *cells: Cell) -> None:
         """Add cells.

@@ -10,7 +10,7 @@ Legs that would be too short for it make the hips sink. Joints follow by inverse
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -22,6 +22,7 @@ from heelstrike import dynamics
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import leg_joints
 from heelstrike.errors import GaitError
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.gait.phased.series import fitted
 from heelstrike.gait.phased.surface import Surface, make_invariant
@@ -110,35 +111,26 @@ class StepFamily:
     """A gait and its like, for slopes and with the hips held back or brought forward.
 
     All numbers of a gait in between are quadratic in slope and shift, through nine gaits.
-
-    Attributes
-    ----------
-    gait : PhasedGait
-        The gait in the middle, for level ground.
-    slope : float
-        Steepest slope that the family is for, up and down (tangent).
-    shift : float
-        How far the hips are held back or brought forward at most (m), besides what the slope needs.
-    middle, half : (3, 3) float
-        Middle of the range of the phase and half its width (rad), by powers of the slope, as part
-        of the steepest, and of the shift, likewise.
-    coefficients : (3, 3, terms, nu) float
-        Chebyshev series of the joints, likewise.
-    rate : float
-        Rate of the phase just after touchdown of the walk that repeats on level ground (rad/s).
-    energy : (3, levels) float
-        Chebyshev series over a step of σ²/2 of the walk that repeats, σ the angular momentum about
-        the stance foot, by powers of the slope ((kg m²/s)²).
     """
 
     gait: PhasedGait
+    """The gait in the middle, for level ground."""
     slope: float
+    """Steepest slope that the family is for, up and down (tangent)."""
     shift: float
+    """How far the hips are held back or brought forward at most (m), besides what the slope
+    needs."""
     middle: Floats
     half: Floats
+    """middle, half: (3, 3) Middle of the range of the phase and half its width (rad), by powers of
+    the slope, as part of the steepest, and of the shift, likewise."""
     coefficients: Floats
+    """(3, 3, terms, nu) Chebyshev series of the joints, likewise."""
     rate: float
+    """Rate of the phase just after touchdown of the walk that repeats on level ground (rad/s)."""
     energy: Floats
+    """(3, levels) Chebyshev series over a step of σ²/2 of the walk that repeats, σ the angular
+    momentum about the stance foot, by powers of the slope ((kg m²/s)²)."""
 
     @classmethod
     def around(cls, gait: PhasedGait, *, slope: float = 0.15, shift: float = 0.1) -> StepFamily:

@@ -9,7 +9,7 @@ walkers*, IEEE Transactions on Automatic Control 48(1).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -19,6 +19,7 @@ from scipy.special import comb
 from heelstrike import dynamics
 from heelstrike.arguments import check_fields
 from heelstrike.errors import GaitError
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.phased.series import fitted, interpolated
 from heelstrike.robot.robot import Robot
@@ -27,7 +28,7 @@ from heelstrike.robot.sides.mirror import Mirror
 Floats = NDArray[np.float64]
 
 # A contact point with a smaller radius (m) is a point; files of MuJoCo's format want a positive.
-POINT = 1e-9
+POINT_FOOT = 1e-9
 # Instants of a step at which a gait in time is looked at, for each coefficient that is fitted.
 INSTANTS = 8
 
@@ -36,19 +37,6 @@ INSTANTS = 8
 class PhasedGait:
     """Joint positions over a phase of the robot, for a robot that stands on points.
 
-    Attributes
-    ----------
-    robot : Robot
-        A floating robot with two mirrored feet of one contact point each, all joints actuated.
-    stance_foot : int
-        Index in ``robot.feet`` of the foot that stands; on the other one everything is mirrored.
-    phase : (nv,) float
-        The phase is θ = phase · q, in rad. It must contain the trunk's pitch and neither x nor z.
-    phase_range : (2,) float
-        θ at the beginning and at the end of a step.
-    coefficients : (terms, nu) float
-        Chebyshev series of the actuated joints over the range, those of T₀ first (rad).
-
     Raises
     ------
     GaitError
@@ -56,10 +44,17 @@ class PhasedGait:
     """
 
     robot: Robot
+    """A floating robot with two mirrored feet of one contact point each, all joints actuated."""
     stance_foot: int = 0
+    """Index in ``robot.feet`` of the foot that stands; on the other one everything is mirrored."""
     phase: Floats
+    """(nv,) The phase is θ = phase · q, in rad. It must contain the trunk's pitch and neither x nor
+    z."""
     phase_range: tuple[float, float]
+    """θ at the beginning and at the end of a step."""
     coefficients: Floats
+    """(terms, nu) Chebyshev series of the actuated joints over the range, those of T₀ first
+    (rad)."""
 
     def __post_init__(self) -> None:
         check_fields(self, GaitError)
@@ -382,7 +377,7 @@ def check_robot(robot: Robot) -> None:
             f"{robot.name!r} " + (f"has none at {', '.join(free)}" if free else "moves its trunk")
         )
     for foot in robot.feet:
-        if len(foot.contacts) != 1 or robot.model.contact_radius[foot.contacts[0]] > POINT:
+        if len(foot.contacts) != 1 or robot.model.contact_radius[foot.contacts[0]] > POINT_FOOT:
             raise GaitError(
                 f"virtual constraints are for point feet; foot {foot.name!r} of robot "
                 f"{robot.name!r} is none. ComputedTorque walks on flat feet."

@@ -7,8 +7,6 @@ tangent, the surface is invariant under the impact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.typing import NDArray
@@ -18,6 +16,7 @@ from heelstrike import dynamics
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import GaitError
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.phased.phased_gait import PhasedGait
 
 Floats = NDArray[np.float64]
@@ -31,39 +30,27 @@ NODES = 96
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Touchdown:
-    """What the impact at the end of a step does to motion along the surface, per unit of θ̇ before.
-
-    Attributes
-    ----------
-    before : float
-        Phase at which the swing foot meets the ground (rad).
-    after : float
-        Phase just after, of the foot that then stands (rad).
-    position : (nq,) float
-        Relabelled position just after, that foot at the origin.
-    velocity : (nv,) float
-        Relabelled velocity just after, for θ̇ = 1 before.
-    rate : float
-        θ̇ just after, for θ̇ = 1 before.
-    momentum : float
-        Factor of the angular momentum about the foot that stands: σ⁺ = momentum · σ⁻.
-    impulse : (2,) float
-        Impulse of the ground (normal, tangential) on the landing foot, for θ̇ = 1 (N s per rad/s).
-    lift : float
-        Speed at which the other foot leaves the ground, for θ̇ = 1 (m/s per rad/s).
-    approach : float
-        Rate of the swing foot's gap before, for θ̇ = 1 (m/s per rad/s).
-    """
+    """What the impact that ends a step does to motion along the surface, per unit of θ̇ before."""
 
     before: float
+    """Phase at which the swing foot meets the ground (rad)."""
     after: float
+    """Phase just after, of the foot that then stands (rad)."""
     position: Floats
+    """(nq,) Relabelled position just after, that foot at the origin."""
     velocity: Floats
+    """(nv,) Relabelled velocity just after, for θ̇ = 1 before."""
     rate: float
+    """θ̇ just after, for θ̇ = 1 before."""
     momentum: float
+    """Factor of the angular momentum about the foot that stands: σ⁺ = momentum · σ⁻."""
     impulse: Floats
+    """(2,) Impulse of the ground (normal, tangential) on the landing foot, for θ̇ = 1 (N s per
+    rad/s)."""
     lift: float
+    """Speed at which the other foot leaves the ground, for θ̇ = 1 (m/s per rad/s)."""
     approach: float
+    """Rate of the swing foot's gap before, for θ̇ = 1 (m/s per rad/s)."""
 
 
 class Surface:

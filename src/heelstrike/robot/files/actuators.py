@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.posture import BALL
 from heelstrike.robot.files.ros.drives import EFFORT, Drive, drives_of
@@ -24,26 +23,19 @@ LINEAR_ACTIVATION = (0, 1, 2, 3)  # none, integrator, filter, exact filter
 
 @dataclass(frozen=True)
 class Actuators:
-    """Which coordinates are driven, and how hard.
-
-    Attributes
-    ----------
-    joint : (nu,) int
-        Coordinate that each actuator drives.
-    lower, upper : (nu,) float
-        Limits of the torque or force at the joint; infinite where there are none.
-    names : tuple of str
-        Names of the actuators.
-    armature, damping : (nv,) float
-        Rotor inertia and damping of the motors, seen at the joints.
-    """
+    """Which coordinates are driven, and how hard."""
 
     joint: Integers
+    """(nu,) Coordinate that each actuator drives."""
     lower: Floats
     upper: Floats
+    """lower, upper: (nu,) Limits of the torque or force at the joint; infinite where there are
+    none."""
     names: tuple[str, ...]
+    """Names of the actuators."""
     armature: Floats
     damping: Floats
+    """armature, damping: (nv,) Rotor inertia and damping of the motors, seen at the joints."""
 
 
 def read_actuators(file: MujocoFile) -> Actuators:

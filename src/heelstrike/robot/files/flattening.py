@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.options import FORWARD, Options
 from heelstrike.robot.files.posture import (
@@ -45,59 +46,39 @@ X, Y, Z = np.eye(3)
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One degree of freedom of the planar robot.
-
-    Attributes
-    ----------
-    name : str
-        Name of its joint.
-    body : int
-        Body of the file that it moves.
-    hinge : bool
-        Whether it turns about y, or slides in x–z.
-    axis, anchor : (3,) float
-        Axis and place in the world, in the reference configuration.
-    reference : float
-        Its value there.
-    joint : int
-        Joint of the file, -1 if it is one of a root that the file has not.
-    sense : float
-        -1 if it counts the other way round than that joint.
-    """
+    """One degree of freedom of the planar robot."""
 
     name: str
+    """Name of its joint."""
     body: int
+    """Body of the file that it moves."""
     hinge: bool
+    """Whether it turns about y, or slides in x–z."""
     axis: Floats
     anchor: Floats
+    """axis, anchor: (3,) Axis and place in the world, in the reference configuration."""
     reference: float
+    """Its value there."""
     joint: int = -1
+    """Joint of the file, -1 if it is one of a root that the file has not."""
     sense: float = 1.0
+    """-1 if it counts the other way round than that joint."""
 
 
 @dataclass(frozen=True)
 class Plane:
-    """A file seen in the plane.
-
-    Attributes
-    ----------
-    model : mujoco.MjModel
-        The compiled file, turned forward, its axes snapped into the plane.
-    pose : mujoco.MjData
-        World poses of joints, bodies and geoms in the reference configuration.
-    coordinates : tuple of Coordinate
-        What moves, in the order of the file.
-    locked : tuple of LockedJoint
-        What does not.
-    remarks : tuple of str
-        What the user should know.
-    """
+    """A file seen in the plane."""
 
     model: Any
+    """``mujoco.MjModel``: the compiled file, turned forward, its axes snapped into the plane."""
     pose: Any
+    """``mujoco.MjData``: world poses of joints, bodies and geoms in the reference configuration."""
     coordinates: tuple[Coordinate, ...]
+    """What moves, in the order of the file."""
     locked: tuple[LockedJoint, ...]
+    """What does not."""
     remarks: tuple[str, ...]
+    """What the user should know."""
 
 
 def flatten(model: Any, options: Options, label: str, *, hanging: bool = False) -> Plane:

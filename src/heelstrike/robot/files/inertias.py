@@ -21,7 +21,7 @@ from heelstrike.robot.warning import warn
 Floats = NDArray[np.float64]
 
 MASSLESS = 1e-14  # kg, kg m²; no link that is meant to weigh anything weighs less
-MARGIN = 1e-9  # share of the largest moment by which parsers may judge otherwise than we do
+MOMENT_MARGIN = 1e-9  # share of the largest moment by which parsers may judge otherwise than we do
 
 
 def stated_tensor(body: Any) -> Floats | None:
@@ -59,7 +59,7 @@ def take_out(spec: Any) -> list[tuple[Any, Floats]]:
         if tensor is None or not np.all(np.isfinite(tensor)):
             continue
         low, middle, high = np.linalg.eigvalsh(tensor)
-        if low > MARGIN * high and low + middle >= (1.0 + MARGIN) * high:
+        if low > MOMENT_MARGIN * high and low + middle >= (1.0 + MOMENT_MARGIN) * high:
             continue
         taken.append((body, tensor))
         body.fullinertia[0] = np.nan
@@ -100,7 +100,7 @@ def put_back(
         name, place = body.name or f"body {body.id}", body.id
         normal = pose.ximat[place].reshape(3, 3)[1]
         moment = float(normal @ tensor @ normal)
-        if moment < -MARGIN * _size(tensor) - MASSLESS:
+        if moment < -MOMENT_MARGIN * _size(tensor) - MASSLESS:
             raise RobotError(
                 f"{label}: body {name!r} has the moment of inertia {moment:.6g} kg m² about the "
                 "normal of the plane in which the robot moves. It must not be negative."

@@ -8,44 +8,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.posture import followers
 from heelstrike.robot.model import POWERS, Floats, Integers
+from heelstrike.tolerances import ONE_POINT
 
 MOST_JOINTS = 1000
 LATCH, BRAKE = "latch", "brake"
 """What custom data of latches and brakes are called."""
-SAME_PLACE = 1e-9
-"""Metres up to which two hinges are one: in space an axis takes two points."""
 
 
 @dataclass(frozen=True)
 class Links:
-    """The kinematic tree and inertia of a robot.
-
-    Attributes
-    ----------
-    numbers : dict of str to array
-        Numbers of `Model`: the tree and the inertia of its links.
-    origin : (nl, 2) float
-        World position of the link frames in the reference configuration.
-    of_body : (nbody,) int
-        Link that each body of the file belongs to; -1 for what is fixed to the world.
-    names : tuple of str
-        Body that each link moves.
-    """
+    """The kinematic tree and inertia of a robot."""
 
     numbers: dict[str, Any]
+    """Numbers of `Model`: the tree and the inertia of its links."""
     origin: Floats
+    """(nl, 2) World position of the link frames in the reference configuration."""
     of_body: Integers
+    """(nbody,) Link that each body of the file belongs to; -1 for what is fixed to the world."""
     names: tuple[str, ...]
+    """Body that each link moves."""
 
     @property
     def axis(self) -> Floats:
@@ -136,7 +127,7 @@ def read_loops(file: MujocoFile, links: Links) -> dict[str, Any]:
     """Return what holds beside the joints, as numbers of :class:`~heelstrike.robot.model.Model`."""
     loops: dict[tuple[Any, ...], tuple[Any, Any]] = {}
     for ends, places in _connections(file, links):
-        rounded = np.round(np.ravel(places) / SAME_PLACE).astype(np.int64)
+        rounded = np.round(np.ravel(places) / ONE_POINT).astype(np.int64)
         loops.setdefault((*ends, *rounded.tolist()), (ends, places))
     couplings = list(_couplings(file))
     latches = list(_latches(file, links))

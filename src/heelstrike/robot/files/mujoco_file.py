@@ -6,7 +6,7 @@ import textwrap
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.flattening import Coordinate, flatten
 from heelstrike.robot.files.inertias import put_back, refuse_missing, stated_tensor, take_out
 from heelstrike.robot.files.options import Options
@@ -46,33 +47,22 @@ LONGEST_REASON = 600  # letters of MuJoCo's own words in a message
 
 @dataclass(frozen=True)
 class MujocoFile:
-    """A parsed MJCF or URDF file, seen in the plane.
-
-    Attributes
-    ----------
-    model : mujoco.MjModel
-        The compiled file.
-    pose : mujoco.MjData
-        World poses of joints, bodies and geoms in the reference configuration.
-    coordinates : tuple of Coordinate
-        What moves in the plane, in the order of the robot's coordinates.
-    locked : tuple of LockedJoint
-        Joints of the file that do not.
-    xml : Element
-        The file as it is written, included ones in place, without what plays no part in motion.
-    source : str
-        What to call the file in messages.
-    flexible : bool
-        Whether it had flexible bodies, which are left out.
-    """
+    """A parsed MJCF or URDF file, seen in the plane."""
 
     model: Any
+    """``mujoco.MjModel``: the compiled file."""
     pose: Any
+    """``mujoco.MjData``: world poses of joints, bodies and geoms in the reference configuration."""
     coordinates: tuple[Coordinate, ...]
+    """What moves in the plane, in the order of the robot's coordinates."""
     locked: tuple[LockedJoint, ...]
+    """Joints of the file that do not."""
     xml: Element
+    """The file as it is written, included ones in place, without what plays no part in motion."""
     source: str
+    """What to call the file in messages."""
     flexible: bool = False
+    """Whether it had flexible bodies, which are left out."""
 
     @property
     def is_urdf(self) -> bool:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TypedDict
 
 from heelstrike.arguments import check_fields, refusal
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
 
 FORWARD = {"x": 0, "y": 1, "-x": 2, "-y": 3}
 """Ways that a robot may walk in its file, in quarter turns from +x about z."""
@@ -63,13 +64,6 @@ class LoadOptions(TypedDict, total=False):
 class Options:
     """The same, checked.
 
-    Attributes
-    ----------
-    floating, projected, forward, pose, package_path, mirror, xacro
-        See :class:`LoadOptions`.
-    lenient : bool
-        Let masses pass that MuJoCo refuses, to look at the robot; see `inspect_robot`.
-
     Raises
     ------
     RobotError
@@ -83,7 +77,9 @@ class Options:
     package_path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = ()
     mirror: str | None = None
     xacro: bool | Mapping[str, str] = False
+    """floating, projected, forward, pose, package_path, mirror, xacro: See :class:`LoadOptions`."""
     lenient: bool = False
+    """Let masses pass that MuJoCo refuses, to look at the robot; see `inspect_robot`."""
 
     def __post_init__(self) -> None:
         check_fields(self, RobotError)

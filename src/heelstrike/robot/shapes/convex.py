@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.tolerances import LEVEL_SOLE, ON_A_LINE
+
 Floats = NDArray[np.float64]
 
-FLAT = 1e-9
-"""Metres; points no further than this from a line are on it."""
-LEVEL = 1e-4
-"""Metres above the lowest corner within which others are as low."""
 STEEPEST = 1.0
 """Slope of the steepest edge on which a foot is expected to roll: 45 degrees."""
 COARSE = 0.01
@@ -22,10 +20,10 @@ def convex_hull(points: Floats) -> Floats:
     center = points.mean(axis=0)
     along = np.linalg.svd(points - center, full_matrices=False)[2] if len(points) > 1 else np.eye(2)
     across = (points - center) @ along[-1]
-    if len(points) < 3 or np.ptp(across) < FLAT:
+    if len(points) < 3 or np.ptp(across) < ON_A_LINE:
         on_line = (points - center) @ along[0]
         ends = points[[np.argmin(on_line), np.argmax(on_line)]]
-        return ends[:1] if np.ptp(on_line) < FLAT else ends
+        return ends[:1] if np.ptp(on_line) < ON_A_LINE else ends
     from scipy.spatial import ConvexHull
 
     return np.asarray(points[ConvexHull(points).vertices], dtype=np.float64)
@@ -56,11 +54,11 @@ def lowest_chain(points: Floats) -> Floats:
     # The lower ones of the hull's corners: those below the line from the first to the last.
     first, last = hull[0], hull[-1]
     run = last[0] - first[0]
-    if run < FLAT:
+    if run < ON_A_LINE:
         return hull[:1]
     line = first[1] + (hull[:, 0] - first[0]) * (last[1] - first[1]) / run
-    lower = hull[hull[:, 1] <= line + FLAT]
-    low = np.flatnonzero(lower[:, 1] <= lower[:, 1].min() + LEVEL)
+    lower = hull[hull[:, 1] <= line + ON_A_LINE]
+    low = np.flatnonzero(lower[:, 1] <= lower[:, 1].min() + LEVEL_SOLE)
     back, front = int(low[0]), int(low[-1])
     least = COARSE * float(np.ptp(points, axis=0).max())
     behind = _outwards(lower[back::-1], least)[::-1]
@@ -71,11 +69,11 @@ def lowest_chain(points: Floats) -> Floats:
 def touches_first(points: Floats, radius: Floats) -> NDArray[np.bool_]:
     """Which of the discs about points (n, 2) flat ground meets first at some tilt up to 45 degrees.
 
-    Those that come as near as the lowest of them do, to `LEVEL`, count.
+    Those that come as near as the lowest of them do, to `LEVEL_SOLE`, count.
     """
     tilt = np.arctan(STEEPEST) * np.linspace(-1.0, 1.0, 91)
     depth = points @ np.array([np.sin(tilt), -np.cos(tilt)]) + radius[:, None]
-    return np.any(depth >= depth.max(axis=0) - LEVEL, axis=1)
+    return np.any(depth >= depth.max(axis=0) - LEVEL_SOLE, axis=1)
 
 
 def nearest_points(a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -99,7 +97,7 @@ def _apart(a: Floats, b: Floats) -> bool:
     axes = np.concatenate((across, edges, [b.mean(axis=0) - a.mean(axis=0)]))
     ours, theirs = a @ axes.T, b @ axes.T
     gap = np.maximum(ours.min(axis=0) - theirs.max(axis=0), theirs.min(axis=0) - ours.max(axis=0))
-    return bool(np.any(gap > FLAT * np.hypot(*axes.T)))
+    return bool(np.any(gap > ON_A_LINE * np.hypot(*axes.T)))
 
 
 def _nearest_on(polygon: Floats, points: Floats) -> tuple[Floats, Floats]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from heelstrike.robot.shapes.convex import FLAT, Floats, convex_hull
+from heelstrike.field_texts import dataclass
+from heelstrike.robot.shapes.convex import Floats, convex_hull
+from heelstrike.tolerances import ON_A_LINE
 
 ROUND = 16
 """Corners of a disc that is drawn."""
@@ -14,22 +14,15 @@ ROUND = 16
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """A convex shape on a link, seen in the plane: a polygon, or what a disc covers within one.
-
-    Attributes
-    ----------
-    link : int
-        The link that it is fixed to.
-    corners : (k, 2) float
-        Corners (x, z) of the polygon in the frame of the link, in m; one for a disc, two for a
-        capsule.
-    radius : float
-        Radius of the disc, in m; 0 for the polygon itself.
-    """
+    """A convex shape on a link, seen in the plane: a polygon, or what a disc covers within one."""
 
     link: int
+    """The link that it is fixed to."""
     corners: Floats
+    """(k, 2) Corners (x, z) of the polygon in the frame of the link, in m; one for a disc, two for
+    a capsule."""
     radius: float
+    """Radius of the disc, in m; 0 for the polygon itself."""
 
     def rim(self) -> Floats:
         """Corners (m, 2) of a polygon around all of it, in the frame of the link (m)."""
@@ -47,7 +40,7 @@ def without_hidden(outlines: list[Outline]) -> tuple[Outline, ...]:
     for i in sorted(range(len(rims)), key=lambda i: -float(np.ptp(rims[i], axis=0).max())):
         larger = [rims[k] for k in kept if outlines[k].link == outlines[i].link]
         size = np.ptp(rims[i], axis=0).max()
-        if size > FLAT and not any(_inside(rims[i], rim) for rim in larger):
+        if size > ON_A_LINE and not any(_inside(rims[i], rim) for rim in larger):
             kept.append(i)
     return tuple(outlines[i] for i in sorted(kept))
 
@@ -58,4 +51,4 @@ def _inside(points: Floats, polygon: Floats) -> bool:
         return False
     edge = np.roll(polygon, -1, axis=0) - polygon
     away = points[:, None] - polygon
-    return bool(np.all(edge[:, 0] * away[..., 1] - edge[:, 1] * away[..., 0] >= -FLAT))
+    return bool(np.all(edge[:, 0] * away[..., 1] - edge[:, 1] * away[..., 0] >= -ON_A_LINE))

@@ -11,14 +11,14 @@ from heelstrike.robot.model import NUMBERS, SCALES, Floats, Integers, Model, lab
 from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.robot.sides.symmetry import (
     FLOOR,
-    ROUND_OFF,
-    SAME_PLACE,
+    MIRRORED_NUMBER,
     differences,
     named_mirror,
     same,
     text_of,
 )
 from heelstrike.robot.warning import warn
+from heelstrike.tolerances import MIRRORED_PLACE
 
 SHOWN = 6  # how many differences a message lists
 
@@ -91,18 +91,23 @@ def _images(model: Model, mirror: Mirror) -> Iterator[tuple[str, Floats, Integer
     joints = np.arange(model.nv)
     for name, number in NUMBERS.items():
         if number.alike:
-            yield name, getattr(model, name)[mirror.joint], joints, FLOOR.get(name, ROUND_OFF)
+            yield name, getattr(model, name)[mirror.joint], joints, FLOOR.get(name, MIRRORED_NUMBER)
     lower, upper = mirror.ranges(model.lower, model.upper)
-    yield "lower", lower, joints, ROUND_OFF
-    yield "upper", upper, joints, ROUND_OFF
+    yield "lower", lower, joints, MIRRORED_NUMBER
+    yield "upper", upper, joints, MIRRORED_NUMBER
     # Where one side alone has a spring, its rest is that of both; where none has, there is none.
     sprung = model.stiffness > 0.0
     rest = np.where(sprung[mirror.joint] | ~sprung, mirror.position(model.rest), model.rest)
-    yield "rest", np.where(sprung | sprung[mirror.joint], rest, model.rest), joints, ROUND_OFF
+    yield "rest", np.where(sprung | sprung[mirror.joint], rest, model.rest), joints, MIRRORED_NUMBER
     driven = mirror.among(model.actuator_joint)
     ends = driven.velocity(model.torque_lower), driven.velocity(model.torque_upper)
-    yield "torque_lower", np.minimum(*ends), model.actuator_joint, ROUND_OFF
-    yield "torque_upper", np.maximum(*ends), model.actuator_joint, ROUND_OFF
+    yield "torque_lower", np.minimum(*ends), model.actuator_joint, MIRRORED_NUMBER
+    yield "torque_upper", np.maximum(*ends), model.actuator_joint, MIRRORED_NUMBER
     for name in ("contact_position", "contact_radius", *SCALES):
         values = mirror.at_contacts(getattr(model, name))
-        yield name, values, model.contact_link, ROUND_OFF if name in SCALES else SAME_PLACE
+        yield (
+            name,
+            values,
+            model.contact_link,
+            MIRRORED_NUMBER if name in SCALES else MIRRORED_PLACE,
+        )

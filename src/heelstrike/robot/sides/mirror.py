@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.state import State
 
@@ -19,26 +20,18 @@ class Mirror:
     Applied twice it changes nothing. Vectors over the coordinates may be numbers, symbols in an
     array or columns of CasADi; those over the actuators are mirrored by
     ``mirror.among(model.actuator_joint)``.
-
-    Attributes
-    ----------
-    joint : (nv,) int
-        Counterpart of every coordinate and its link (itself for the trunk's).
-    sign : (nv,) float
-        +1, or -1 where the two joints turn in opposite senses.
-    contact : (nc,) int
-        Counterpart of every contact point.
-    foot : (nf,) int
-        Counterpart of every foot.
-    reference : (nq,) float
-        The robot's `Model.reference`, about which positions are mirrored.
     """
 
     joint: Integers
+    """(nv,) Counterpart of every coordinate and its link (itself for the trunk's)."""
     sign: Floats
+    """(nv,) +1, or -1 where the two joints turn in opposite senses."""
     contact: Integers
+    """(nc,) Counterpart of every contact point."""
     foot: Integers
+    """(nf,) Counterpart of every foot."""
     reference: Floats = field(default_factory=lambda: np.zeros(0))
+    """(nq,) The robot's `Model.reference`, about which positions are mirrored."""
 
     def among(self, coordinates: Sequence[int] | Integers) -> Mirror:
         """Return the mirror of vectors that have some of the coordinates only.

@@ -13,16 +13,14 @@ from numpy.typing import ArrayLike
 from heelstrike.robot.model import NUMBERS, SCALES, Floats, Integers, Model, label
 from heelstrike.robot.robot import Foot
 from heelstrike.robot.sides.mirror import Mirror
+from heelstrike.tolerances import MIRRORED_PLACE
 
 TOLERANCE = 1e-4
 """Relative difference up to which numbers of left and right are the same: files round, and those
 who draw the parts round each side for itself."""
 
-SAME_PLACE = 1e-5
-"""Metres up to which places on the left and on the right are the same."""
-
-ROUND_OFF = 1e-9  # of other numbers, in their units
-FLOOR = {"offset": SAME_PLACE, "center_of_mass": SAME_PLACE}
+MIRRORED_NUMBER = 1e-9  # of other numbers, in their units
+FLOOR = {"offset": MIRRORED_PLACE, "center_of_mass": MIRRORED_PLACE}
 
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
@@ -225,7 +223,7 @@ def _differing_joints(model: Model, mirror: Mirror, names: Sequence[str]) -> Ite
         if not same(model.axis[i], mirror.sign[i] * model.axis[j]):
             yield f"axis {pair} (not parallel)"
         compared: list[tuple[Any, ...]] = [
-            (label(name), *getattr(model, name)[[i, j]], FLOOR.get(name, ROUND_OFF))
+            (label(name), *getattr(model, name)[[i, j]], FLOOR.get(name, MIRRORED_NUMBER))
             for name, number in NUMBERS.items()
             if number.alike
         ]
@@ -265,8 +263,8 @@ def _differing_contacts(model: Model, mirror: Mirror, names: Sequence[str]) -> I
         if model.contact_link[j] != other or link > other:
             continue  # no counterpart at all (told above), or told from the other side
         compared = [
-            ("contact points", *model.contact_position[[i, j]], SAME_PLACE),
-            ("radius of the contact points", *model.contact_radius[[i, j]], SAME_PLACE),
+            ("contact points", *model.contact_position[[i, j]], MIRRORED_PLACE),
+            ("radius of the contact points", *model.contact_radius[[i, j]], MIRRORED_PLACE),
             *((label(name), *getattr(model, name)[[i, j]]) for name in SCALES),
         ]
         yield from _unequal(compared, f"of {names[link]} and {names[other]}")
@@ -280,7 +278,7 @@ def _differing_loops(model: Model, mirror: Mirror, names: Sequence[str]) -> Iter
         ends, places = model.loop_link[other], model.loop_position[other]
         return any(
             np.array_equal(image[model.loop_link[one]], ends[::way])
-            and same(model.loop_position[one], places[::way], SAME_PLACE)
+            and same(model.loop_position[one], places[::way], MIRRORED_PLACE)
             for way in (1, -1)
         )
 
@@ -341,7 +339,7 @@ def _unequal(compared: Iterable[tuple[Any, ...]], pair: str) -> Iterator[str]:
             yield f"{what} {pair} ({text_of(here)}, {text_of(there)})"
 
 
-def same(a: ArrayLike, b: ArrayLike, floor: float = ROUND_OFF) -> bool:
+def same(a: ArrayLike, b: ArrayLike, floor: float = MIRRORED_NUMBER) -> bool:
     """Whether numbers are equal but for rounding; what is infinite equals only itself.
 
     Those of a vector are measured by its largest.

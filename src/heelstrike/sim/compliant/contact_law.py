@@ -12,7 +12,6 @@ gap, positive when leaving; forces act on the robot.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import acos, acosh, exp, log1p, sqrt
 
 import numpy as np
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 from heelstrike.arguments import check_fields
 from heelstrike.compiler.compilation import kernel
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.compliant.law import FrictionLaw, NormalLaw
 
 Floats = NDArray[np.float64]
@@ -37,16 +37,6 @@ class HuntCrossley(NormalLaw):
 
     ``F = k δⁿ (1 + 3/2 α δ̇)``, never pulling, with penetration δ. The force begins and ends at
     zero, without the jump that a linear damper makes at the first touch.
-
-    Parameters
-    ----------
-    stiffness : float
-        k in N/mⁿ, for each contact point.
-    dissipation : float
-        α in s/m. A mass that hits the ground at speed v leaves it at e v with e ≈ 1 − α v for
-        small α v; :meth:`restitution` gives e in full.
-    exponent : float
-        n ≥ 1; 3/2 is Hertz's theory of the sphere on a plane.
 
     Raises
     ------
@@ -65,8 +55,12 @@ class HuntCrossley(NormalLaw):
     """
 
     stiffness: float = 4e8
+    """k in N/mⁿ, for each contact point."""
     dissipation: float = 50.0
+    """α in s/m. A mass that hits the ground at speed v leaves it at e v with e ≈ 1 − α v for small
+    α v; :meth:`restitution` gives e in full."""
     exponent: float = 1.5
+    """n ≥ 1; 3/2 is Hertz's theory of the sphere on a plane."""
 
     def __post_init__(self) -> None:
         check_fields(self, SimulationError)
@@ -204,13 +198,6 @@ class HuntCrossley(NormalLaw):
 class KelvinVoigt(NormalLaw):
     """Linear spring and damper side by side: ``F = max(0, k δ + c δ̇)`` with penetration δ.
 
-    Parameters
-    ----------
-    stiffness : float
-        k in N/m, for each contact point.
-    damping : float
-        c in N s/m, for each contact point.
-
     Raises
     ------
     SimulationError
@@ -222,7 +209,9 @@ class KelvinVoigt(NormalLaw):
     """
 
     stiffness: float = 5e6
+    """k in N/m, for each contact point."""
     damping: float = 3e4
+    """c in N s/m, for each contact point."""
 
     def __post_init__(self) -> None:
         check_fields(self, SimulationError)
@@ -367,11 +356,6 @@ class RegularisedFriction(FrictionLaw):
     It never holds: what should stick creeps, at ``v_s r / √(1 − r²)`` when it needs the fraction r
     of the friction there is.
 
-    Parameters
-    ----------
-    speed : float
-        v_s in m/s, at which 71 % of the friction is there.
-
     Raises
     ------
     SimulationError
@@ -379,6 +363,7 @@ class RegularisedFriction(FrictionLaw):
     """
 
     speed: float = 1e-4
+    """v_s in m/s, at which 71 % of the friction is there."""
 
     def __post_init__(self) -> None:
         _positive("regularisation speed", self.speed, "m/s")
@@ -441,13 +426,6 @@ class BristleFriction(FrictionLaw):
     beyond, the force is μ F_n against the motion and the anchor is dragged along. A point at rest
     stays at rest.
 
-    Parameters
-    ----------
-    stiffness : float
-        k in N/m, for each contact point.
-    damping : float
-        c in N s/m, for each contact point; it must not be zero.
-
     Raises
     ------
     SimulationError
@@ -455,7 +433,9 @@ class BristleFriction(FrictionLaw):
     """
 
     stiffness: float = 5e6
+    """k in N/m, for each contact point."""
     damping: float = 1e4
+    """c in N s/m, for each contact point; it must not be zero."""
 
     def __post_init__(self) -> None:
         _positive("bristle stiffness", self.stiffness, "N/m")

@@ -42,40 +42,27 @@ AS_NEAR = 1e-6
 
 
 class Corners(Bundle):
-    """The points that are in concave corners.
-
-    Attributes
-    ----------
-    sides : int
-        How many sides of points there are on this ground: nc, or twice that if it has corners.
-    first, second : (nc,) int
-        The faces that each point in a corner is on, -1 for the others.
-    contacts : Contacts
-        The points on their second faces; the gap is infinite where there is none.
-    friction : (nc,) float
-        Coefficients there.
-    joins : (nc,) int
-        Whether both faces of a point pushed it since the last sample, or its frame has changed.
-    frame : (nc, 2) float
-        Normal of each point at the last sample, in whose frame forces are told.
-    center : (nc, 2) float
-        Centre of each disc then.
-    force : (nc, 2) float
-        Impulse of both faces since then, in world axes (N s).
-    moment : (nc,) float
-        Its moment about the centre of the disc (N m s).
-    """
+    """The points that are in concave corners."""
 
     sides: int = cell(int)
+    """How many sides of points there are on this ground: nc, or twice that if it has corners."""
     first: Integers = array("nc", of=int)
     second: Integers = array("nc", of=int)
+    """first, second: The faces that each point in a corner is on, -1 for the others."""
     contacts: Contacts = part(Contacts)
+    """The points on their second faces; the gap is infinite where there is none."""
     friction: Floats = array("nc")
+    """Coefficients there."""
     joins: Integers = array("nc", of=int)
+    """Whether both faces of a point pushed it since the last sample, or its frame has changed."""
     frame: Floats = array("nc", "axes")
+    """Normal of each point at the last sample, in whose frame forces are told."""
     center: Floats = array("nc", "axes")
+    """Centre of each disc then."""
     force: Floats = array("nc", "axes")
+    """Impulse of both faces since then, in world axes (N s)."""
     moment: Floats = array("nc")
+    """Its moment about the centre of the disc (N m s)."""
 
 
 def allocate_corners(robot: Robot) -> Corners:

@@ -31,7 +31,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
-from heelstrike.dynamics.dense import solve_to_rank
+from heelstrike.dynamics.dense import solve_to_rank, substitute, triangulate
 from heelstrike.dynamics.kernels import (
     bias_force,
     factorize,
@@ -86,167 +86,117 @@ NO_BEND = 1e-30
 
 
 class Laws(Bundle):
-    """The contact laws as the kernels see them.
-
-    Attributes
-    ----------
-    normal, friction, stop : Bundle
-        Their numbers.
-    normal_code, friction_code, stop_code : int
-        Where their machine code is.
-    joint_speed : float
-        Speed around which dry friction of the joints is smoothed (rad/s, m/s).
-    """
+    """The contact laws as the kernels see them."""
 
     normal: Bundle = part(Bundle, address=True)
     friction: Bundle = part(Bundle, address=True)
     stop: Bundle = part(Bundle, address=True)
+    """normal, friction, stop: Their numbers."""
     normal_code: int = number(int)
     friction_code: int = number(int)
     stop_code: int = number(int)
+    """normal_code, friction_code, stop_code: Where their machine code is."""
     joint_speed: float = number(float)
+    """Speed around which dry friction of the joints is smoothed (rad/s, m/s)."""
 
 
 class Rates(Bundle):
-    """What acts at a state, and how fast the state changes.
-
-    Attributes
-    ----------
-    acceleration : (nv,) float
-        Rate of v.
-    normal, friction, stop : NormalForces, FrictionForces, NormalForces
-        Of contacts and joint stops; the bends of the bristles with their rates.
-    stop_force : (nv,) float
-        Forces of the joint stops, with their signs.
-    dry_force, dry_by_speed : (nv,) float
-        Dry friction in the joints, and its derivative.
-    loop : (loop_rows,) float
-        Forces of the loops along their rows.
-    """
+    """What acts at a state, and how fast the state changes."""
 
     acceleration: Floats = array("nv")
+    """Rate of v."""
     normal: NormalForces = part(NormalForces)
     friction: FrictionForces = part(FrictionForces)
     stop: NormalForces = part(NormalForces)
+    """normal, friction, stop: Of contacts and joint stops; the bends of the bristles with their
+    rates."""
     stop_force: Floats = array("nv")
+    """Forces of the joint stops, with their signs."""
     dry_force: Floats = array("nv")
     dry_by_speed: Floats = array("nv")
+    """dry_force, dry_by_speed: Dry friction in the joints, and its derivative."""
     loop: Floats = array("loop_rows")
+    """Forces of the loops along their rows."""
 
 
 class CompliantWorkspace(Bundle):
-    """State of the bristles and the scratch of a step.
-
-    Attributes
-    ----------
-    now, base : Rates
-        At the state evaluated last, and at the start of the step.
-    force : (2 nc, 2) float
-        Contact forces at the state evaluated last, in newtons: of the points, then of their second
-        faces.
-    base_force : (2 nc, 2) float
-        The same at the start of the step.
-    corners : Corners
-        Which points are in concave corners.
-    place : (nc, 2) float
-        Where the resultants of both faces acted since the last sample.
-    now_words, base_words : (any,) int
-        The memory of both.
-    torque_by_q, torque_by_v : (nu, nv) float
-        Derivatives of the controller's torques.
-    age : int
-        Steps since these were found.
-    trial_command, trial_torque : (nu,) float
-        Commands and torques of a perturbed state.
-    base_q, base_v : (nv,) float
-    base_rows : (4 nc, nv) float
-    base_matrix : (nv, nv) float
-        State, contact Jacobian and A at the start of the step.
-    force_by_q : (nv, nv) float
-        ∂f/∂q of a step, bristles eliminated.
-    system : (nv, nv) float
-        A − g ∂f/∂v − g² ∂f/∂q, then its triangular factors.
-    order : (nv,) int
-        Row exchanges of the factors.
-    loop_rows : (loop_rows, nv) float
-    loop_response : (loop_rows, nv) float
-    loop_matrix : (loop_rows, loop_rows) float
-        Jacobian of the loops at the start of the step, what the system makes of its rows, and the
-        products of both.
-    stage_q, stage_v : (4, nv) float
-    stage_bristle : (4, 2 nc) float
-        The stages u_i.
-    right_q, right_v : (nv,) float
-    right_bristle : (2 nc,) float
-        Right-hand side of a stage.
-    impulse : (2 nc, 2) float
-    stop_impulse, dry_impulse : (nv,) float
-    loop_impulse : (loop_rows,) float
-        Impulses of contacts, joint stops, dry friction and loops since the last sample, in N s
-        (N m s).
-    touched, left : (nc,) float
-        When a contact point last came to the ground and left it since the last sample; negative
-        if it did not.
-    laws : Laws
-    step, rtol, atol : float
-        Seconds between two samples; tolerated errors of a step, relative and absolute.
-    proposed : float
-        Length of the next step as far as accuracy allows (s).
-    patience : int
-        Tries of the steps of a sample after which torques of a law that switches are held.
-    held_since, held_for, held_wrong : float
-        When that began within the sample (s), for how long in all (s), and the most that the
-        torques' next jump would have changed an acceleration by, times how long they were held
-        (m/s, rad/s).
-    row : int
-        Row of the record for this sample, -1 for none.
-    """
+    """State of the bristles and the scratch of a step."""
 
     now: Rates = part(Rates)
     base: Rates = part(Rates)
+    """now, base: At the state evaluated last, and at the start of the step."""
     force: Floats = array("2 nc", "components")
+    """Contact forces at the state evaluated last, in newtons: of the points, then of their second
+    faces."""
     base_force: Floats = array("2 nc", "components")
+    """The same at the start of the step."""
     corners: Corners = part(Corners)
+    """Which points are in concave corners."""
     place: Floats = array("nc", "axes")
+    """Where the resultants of both faces acted since the last sample."""
     now_words: Integers = array("words", of=int, address=True)
     base_words: Integers = array("words", of=int, address=True)
+    """now_words, base_words: The memory of both."""
     torque_by_q: Floats = array("nu", "nv")
     torque_by_v: Floats = array("nu", "nv")
+    """torque_by_q, torque_by_v: Derivatives of the controller's torques."""
     trial_command: Floats = array("nu")
     trial_torque: Floats = array("nu")
+    """trial_command, trial_torque: Commands and torques of a perturbed state."""
     age: int = cell(int)
+    """Steps since these were found."""
     base_q: Floats = array("nv")
     base_v: Floats = array("nv")
     base_rows: Floats = array("4 nc", "nv")
     base_matrix: Floats = array("nv", "nv")
+    """State, contact Jacobian and A at the start of the step."""
     force_by_q: Floats = array("nv", "nv")
+    """∂f/∂q of a step, bristles eliminated."""
     system: Floats = array("nv", "nv")
+    """A − g ∂f/∂v − g² ∂f/∂q, then its triangular factors."""
     order: Integers = array("nv", of=int)
+    """Row exchanges of the factors."""
     loop_rows: Floats = array("loop_rows", "nv")
     loop_response: Floats = array("loop_rows", "nv")
     loop_matrix: Floats = array("loop_rows", "loop_rows")
+    """Jacobian of the loops at the start of the step, what the system makes of its rows, and the
+    products of both."""
     stage_q: Floats = array("stages", "nv")
     stage_v: Floats = array("stages", "nv")
     stage_bristle: Floats = array("stages", "2 nc")
+    """The stages u_i."""
     right_q: Floats = array("nv")
     right_v: Floats = array("nv")
     right_bristle: Floats = array("2 nc")
+    """Right-hand side of a stage."""
     impulse: Floats = array("2 nc", "components")
     stop_impulse: Floats = array("nv")
     dry_impulse: Floats = array("nv")
     loop_impulse: Floats = array("loop_rows")
+    """Impulses of contacts, joint stops, dry friction and loops since the last sample, in N s (N m
+    s)."""
     touched: Floats = array("nc")
     left: Floats = array("nc")
+    """touched, left: When a contact point last came to the ground and left it since the last
+    sample; negative if it did not."""
     laws: Laws = part(Laws)
     step: float = number(float)
     rtol: float = number(float)
     atol: float = number(float)
+    """step, rtol, atol: Seconds between two samples; tolerated errors of a step, relative and
+    absolute."""
     proposed: float = cell(float)
+    """Length of the next step as far as accuracy allows (s)."""
     patience: int = cell(int)
+    """Tries of the steps of a sample after which torques of a law that switches are held."""
     held_since: float = cell(float)
     held_for: float = cell(float)
     held_wrong: float = cell(float)
+    """held_since, held_for, held_wrong: When that began within the sample (s), for how long in all
+    (s), and the most that the torques' next jump would have changed an acceleration by, times how
+    long they were held (m/s, rad/s)."""
     row: int = cell(int)
+    """Row of the record for this sample, -1 for none."""
 
 
 def compliant_workspace(
@@ -579,50 +529,12 @@ def factorize_step(
     for i in range(nv):
         for j in range(nv):
             system[i, j] -= g * g * by_q[i, j]
-    eliminate(nv, system, work.order)
+    triangulate(nv, nv, False, system, work.order)
     for row in range(work.loop_rows.shape[0]):
         copy_words(work.loop_rows[row], work.loop_response[row])
         substitute(nv, system, work.order, work.loop_response[row])
         for other in range(work.loop_rows.shape[0]):
             work.loop_matrix[other, row] = dot(work.loop_rows[other], work.loop_response[row])
-
-
-@kernel
-def eliminate(size: int, matrix: Floats, order: Integers) -> None:
-    """Replace a matrix by its triangular factors, exchanging rows."""
-    for k in range(size):
-        best = k
-        for i in range(k + 1, size):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        order[k] = best
-        if best != k:
-            for j in range(size):
-                kept = matrix[k, j]
-                matrix[k, j] = matrix[best, j]
-                matrix[best, j] = kept
-        for i in range(k + 1, size):
-            matrix[i, k] /= matrix[k, k]
-            for j in range(k + 1, size):
-                matrix[i, j] -= matrix[i, k] * matrix[k, j]
-
-
-@kernel
-def substitute(size: int, matrix: Floats, order: Integers, x: Floats) -> None:
-    """Replace x by the solution of the system that was eliminated."""
-    for k in range(size):
-        best = order[k]
-        if best != k:
-            kept = x[k]
-            x[k] = x[best]
-            x[best] = kept
-    for i in range(size):
-        for j in range(i):
-            x[i] -= matrix[i, j] * x[j]
-    for i in range(size - 1, -1, -1):
-        for j in range(i + 1, size):
-            x[i] -= matrix[i, j] * x[j]
-        x[i] /= matrix[i, i]
 
 
 @kernel

@@ -23,51 +23,38 @@ from heelstrike.robot.model import Floats, Integers
 
 
 class NormalForces(Bundle):
-    """Normal forces of contact points, or of joints beyond the ends of their ranges.
-
-    Attributes
-    ----------
-    gap, speed : (n,) float
-        Gap, negative in the ground, and its rate, positive when leaving.
-    force, by_gap, by_speed : (n,) float
-        What the law says: force and derivatives.
-    """
+    """Normal forces of contact points, or of joints beyond the ends of their ranges."""
 
     gap: Floats = array("n")
     speed: Floats = array("n")
+    """gap, speed: Gap, negative in the ground, and its rate, positive when leaving."""
     force: Floats = array("n")
     by_gap: Floats = array("n")
     by_speed: Floats = array("n")
+    """force, by_gap, by_speed: What the law says: force and derivatives."""
 
 
 class FrictionForces(Bundle):
-    """Tangential forces of contact points.
-
-    Attributes
-    ----------
-    friction, normal, speed, bend : (nc,) float
-        Coefficient, normal force, sliding speed, bend of the bristle.
-    force, by_normal, by_speed, by_bend : (nc,) float
-        What the law says: force and derivatives.
-    rate, rate_by_normal, rate_by_speed, rate_by_bend : (nc,) float
-        Likewise, of the bend.
-    slides : (nc,) int
-        Whether each point slides.
-    """
+    """Tangential forces of contact points."""
 
     friction: Floats = array("nc")
     normal: Floats = array("nc")
     speed: Floats = array("nc")
     bend: Floats = array("nc")
+    """friction, normal, speed, bend: Coefficient, normal force, sliding speed, bend of the
+    bristle."""
     force: Floats = array("nc")
     by_normal: Floats = array("nc")
     by_speed: Floats = array("nc")
     by_bend: Floats = array("nc")
+    """force, by_normal, by_speed, by_bend: What the law says: force and derivatives."""
     rate: Floats = array("nc")
     rate_by_normal: Floats = array("nc")
     rate_by_speed: Floats = array("nc")
     rate_by_bend: Floats = array("nc")
+    """rate, rate_by_normal, rate_by_speed, rate_by_bend: Likewise, of the bend."""
     slides: Integers = array("nc", of=int)
+    """Whether each point slides."""
 
 
 class ContactLaw:

@@ -11,7 +11,7 @@ where the force really changes fast, after an impact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
@@ -91,25 +92,13 @@ SHRINK = 0.2
 GROW = 5.0
 
 
+NEARLY_OVER = 1e-9
+"""A step that leaves less than this part of what remains takes all of it."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Compliant(Method):
     """Ground that gives way: contact forces from a law instead of a contact problem.
-
-    Parameters
-    ----------
-    law : HuntCrossley, KelvinVoigt or another NormalLaw
-        Normal force from penetration and its rate, for each contact point.
-    friction : RegularisedFriction, BristleFriction or another FrictionLaw
-        Tangential force; its coefficient μ is the ground's. Only a bristle holds a foot in place.
-    stop : HuntCrossley, KelvinVoigt or another NormalLaw
-        Torque of a joint beyond the end of its range, from the angle and its rate (with N m and
-        rad in the place of N and m for a hinge).
-    step : float
-        Time in seconds between two samples: calls of the controller and rows of the record. The
-        integration's own steps are never longer and as short as they need to be.
-    rtol, atol : float
-        Tolerated error of a step of the integration in positions (m, rad) and velocities (m/s,
-        rad/s), relative and absolute; for the bends of bristles (m) too.
 
     Raises
     ------
@@ -139,11 +128,21 @@ class Compliant(Method):
     """
 
     law: NormalLaw = field(default_factory=HuntCrossley)
+    """HuntCrossley, KelvinVoigt or another NormalLaw. Normal force from penetration and its rate,
+    for each contact point."""
     friction: FrictionLaw = field(default_factory=BristleFriction)
+    """RegularisedFriction, BristleFriction or another FrictionLaw. Tangential force; its
+    coefficient μ is the ground's. Only a bristle holds a foot in place."""
     stop: NormalLaw = field(default_factory=lambda: KelvinVoigt(stiffness=1e5, damping=1e2))
+    """HuntCrossley, KelvinVoigt or another NormalLaw. Torque of a joint beyond the end of its
+    range, from the angle and its rate (with N m and rad in the place of N and m for a hinge)."""
     step: float = 1e-3
+    """Time in seconds between two samples: calls of the controller and rows of the record. The
+    integration's own steps are never longer and as short as they need to be."""
     rtol: float = 1e-5
     atol: float = 1e-7
+    """rtol, atol: Tolerated error of a step of the integration in positions (m, rad) and velocities
+    (m/s, rad/s), relative and absolute; for the bends of bristles (m) too."""
 
     def __post_init__(self) -> None:
         check_fields(self, SimulationError)
@@ -310,7 +309,7 @@ def sample(
     while elapsed < span:
         held = elapsed < held_until
         remaining = (held_until if held else span) - elapsed
-        final = h >= remaining * (1.0 - 1e-9)
+        final = h >= remaining * (1.0 - NEARLY_OVER)
         taken = remaining if final else h
         error = attempt_step(
             controller, control, model, ground, start + elapsed, taken, held, memory, work

@@ -12,12 +12,13 @@ import math
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.ground import FLAT, GroundModel, line_contact, turn_at
+from heelstrike.contact.ground import GroundModel, line_contact, turn_at
 from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import Surface
+from heelstrike.tolerances import STRAIGHT_GROUND
 
 NO_FACE = -1
 
@@ -93,7 +94,7 @@ def is_beside(face: int, other: int) -> bool:
 def is_concave(ground: GroundModel, corner: int) -> bool:
     """Whether the ground turns upwards at a corner between two segments."""
     inner = 0 < corner < ground.friction.shape[0]
-    return bool(inner and turn_at(ground, corner) > FLAT)
+    return bool(inner and turn_at(ground, corner) > STRAIGHT_GROUND)
 
 
 @kernel

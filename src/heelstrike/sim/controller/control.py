@@ -33,53 +33,40 @@ OVERRAN = 2
 
 
 class Control(Bundle):
-    """The numbers of a controller, and how it is asked.
-
-    Attributes
-    ----------
-    parameters : (n,) int
-        Words of its parameters; guarded.
-    kept, spare : (m,) int
-        Words of its memory and log, and of others for the calls that it shall forget; guarded.
-    between_parameters, between_kept : int
-        Where in these there are guard words.
-    logged : (k,) int
-        Where among the words of `kept` those of the log are.
-    parameters_at, kept_at, spare_at, log_at, spare_log_at : int
-        Where the tables of the bundles are.
-    state, contacts, robot
-        What it is shown.
-    believes : int
-        Whether the robot it is shown is another than the one that moves.
-    continuous : int
-        Whether it acts within the steps too; otherwise its torques are held.
-    voltage : int
-        Whether it commands voltages; otherwise torques.
-    in_python : int
-        Whether the loop has to come back for its torques.
-    conduct : int
-        What it has done that it may not.
-    """
+    """The numbers of a controller, and how it is asked."""
 
     parameters: Integers = array("words", of=int)
+    """Words of its parameters; guarded."""
     kept: Integers = array("memory", of=int)
     spare: Integers = array("memory", of=int)
+    """kept, spare: Words of its memory and log, and of others for the calls that it shall forget;
+    guarded."""
     between_parameters: Integers = array("p", of=int, address=True)
     between_kept: Integers = array("m", of=int, address=True)
+    """between_parameters, between_kept: Where in these there are guard words."""
     logged: Integers = array("logged", of=int, address=True)
+    """Where among the words of `kept` those of the log are."""
     parameters_at: int = number(int)
     kept_at: int = number(int)
     spare_at: int = number(int)
     log_at: int = number(int)
     spare_log_at: int = number(int)
+    """parameters_at, kept_at, spare_at, log_at, spare_log_at: Where the tables of the bundles
+    are."""
     state: ControlState = part(ControlState, address=True)
     contacts: Contacts = part(Contacts, address=True)
     robot: ControlledRobot = part(ControlledRobot, address=True)
+    """state, contacts, robot: What it is shown."""
     believes: int = number(int)
+    """Whether the robot it is shown is another than the one that moves."""
     continuous: int = cell(int)
+    """Whether it acts within the steps too; otherwise its torques are held."""
     voltage: int = cell(int)
+    """Whether it commands voltages; otherwise torques."""
     in_python: int = cell(int)
+    """Whether the loop has to come back for its torques."""
     conduct: int = cell(int)
+    """What it has done that it may not."""
 
 
 class ReadyLaw:

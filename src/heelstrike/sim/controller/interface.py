@@ -16,24 +16,16 @@ ARGUMENTS = ("t", "state", "contacts", "robot", "parameters", "memory", "log", "
 
 
 class Contacts(Bundle):
-    """Contact points of a robot as a controller sees them.
-
-    Attributes
-    ----------
-    position : (nc, 2) float
-        World position of each contact point (the lowest point of its disc), in metres.
-    normal : (nc, 2) float
-        Ground normal under each point.
-    gap : (nc,) float
-        Distance to the ground, in metres; negative when penetrating.
-    force : (nc, 2) float
-        Force on the robot, (normal, tangent), of the step before, in newtons.
-    """
+    """Contact points of a robot as a controller sees them."""
 
     position: Floats = array("nc", "axes")
+    """World position of each contact point (the lowest point of its disc), in metres."""
     normal: Floats = array("nc", "axes")
+    """Ground normal under each point."""
     gap: Floats = array("nc")
+    """Distance to the ground, in metres; negative when penetrating."""
     force: Floats = array("nc", "components")
+    """Force on the robot, (normal, tangent), of the step before, in newtons."""
 
 
 @runtime_checkable

@@ -46,84 +46,58 @@ NO_ENDING = -1
 
 
 class ControlState(Bundle):
-    """Where the robot is and how it moves, copied for its controller.
-
-    Attributes
-    ----------
-    q, v : (nq,), (nv,) float
-        Position and velocity of the coordinates (m, rad; m/s, rad/s).
-    joint_position, joint_velocity : (nu,) float
-        Those of the actuated joints, in the order of the actuators.
-    kinematics : Workspace
-        What follows from them, ready for the queries of :class:`ControlledRobot`.
-    """
+    """Where the robot is and how it moves, copied for its controller."""
 
     q: Floats = array("nq")
     v: Floats = array("nv")
+    """q, v: Position and velocity of the coordinates (m, rad; m/s, rad/s)."""
     joint_position: Floats = array("nu")
     joint_velocity: Floats = array("nu")
+    """joint_position, joint_velocity: Those of the actuated joints, in the order of the
+    actuators."""
     kinematics: Workspace = part(Workspace)
+    """What follows from them, ready for the queries of :class:`ControlledRobot`."""
 
 
 class ControlledRobot(Bundle):
     """A robot and its dynamics, for use within a controller.
 
     Every query writes its answer into the array that it is given last.
-
-    Attributes
-    ----------
-    model : Model
-        Its numbers; ``robot.model.actuator_joint[i]`` is the coordinate that actuator i drives.
-    nq, nv, nu, nc, nl, nf : int
-        Positions, velocities, actuators, contact points, links and feet.
-    mass : float
-        Of the whole robot (kg).
-    period : float
-        Seconds between two calls; zero if the controller acts continuously.
-    trial : int
-        Whether the method only tries a state within a step: what is written to memory and log in
-        such a call is forgotten, and a plan is best left as it is.
-    ending : int
-        Which ending of its own the law has come to, see :meth:`stop`; -1 for none.
-    foot_link, foot_contact : (nf,) int
-        Link of each foot, and the first of its contact points.
-    foot_sole : (nf, 2, 2) float
-        Heel and toe of each foot, the ends of its sole, in the foot's axes (m); twice the same of a
-        point foot.
-    contact_foot : (nc,) int
-        Foot that each contact point belongs to, -1 for none.
-    leg_joint : (nf, longest) int
-        Actuated joints that move one foot alone, from the hip down; -1 where there are no more.
-    unactuated : (n,) int
-        Coordinates without an actuator.
-    estimate : ControlState
-        A second state for controllers that estimate the first, to be filled at each call; see
-        :meth:`update`.
-    motor : (nv,) int
-        Actuator of each coordinate, -1 for none. Like the rest of robots with closed loops or
-        coupled joints only.
-    acceleration, force, passive, other, columns, reaching, loops, tied, tied_row, shares
-        Scratch of the queries.
     """
 
     model: Model = part(Model, address=True)
+    """Its numbers; ``robot.model.actuator_joint[i]`` is the coordinate that actuator i drives."""
     nq: int = number(int)
     nv: int = number(int)
     nu: int = number(int)
     nc: int = number(int)
     nl: int = number(int)
     nf: int = number(int)
+    """nq, nv, nu, nc, nl, nf: Positions, velocities, actuators, contact points, links and feet."""
     mass: float = number(float)
+    """Of the whole robot (kg)."""
     period: float = cell(float)
+    """Seconds between two calls; zero if the controller acts continuously."""
     trial: int = cell(int)
+    """Whether the method only tries a state within a step: what is written to memory and log in
+    such a call is forgotten, and a plan is best left as it is."""
     ending: int = cell(int)
+    """Which ending of its own the law has come to, see :meth:`stop`; -1 for none."""
     foot_link: Integers = array("nf", of=int)
     foot_contact: Integers = array("nf", of=int)
+    """foot_link, foot_contact: Link of each foot, and the first of its contact points."""
     foot_sole: Floats = array("nf", 2, 2)
+    """Heel and toe of each foot, the ends of its sole, in the foot's axes (m); twice the same of a
+    point foot."""
     contact_foot: Integers = array("nc", of=int)
+    """Foot that each contact point belongs to, -1 for none."""
     leg_joint: Integers = array("nf", "longest", of=int)
+    """Actuated joints that move one foot alone, from the hip down; -1 where there are no more."""
     unactuated: Integers = array("free", of=int)
+    """Coordinates without an actuator."""
     estimate: ControlState = part(ControlState)
+    """A second state for controllers that estimate the first, to be filled at each call; see
+    :meth:`update`."""
     acceleration: Floats = array("nv")
     force: Floats = array("nv")
     passive: Floats = array("nv")
@@ -131,10 +105,14 @@ class ControlledRobot(Bundle):
     columns: Floats = array("nv", 3)
     reaching: Reaching = part(Reaching)
     motor: Integers = array("ties", of=int)
+    """Actuator of each coordinate, -1 for none. Like the rest of robots with closed loops or
+    coupled joints only."""
     loops: LoopRows = part(LoopRows)
     tied: Floats = array("tied_rows", "nv + 1")
     tied_row: Integers = array("ties", of=int)
     shares: Floats = array("shared", "shared")
+    """acceleration, force, passive, other, columns, reaching, loops, tied, tied_row, shares:
+    Scratch of the queries."""
 
     @kernel
     def stop(self, ending: int) -> None:

@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.dynamics.dense import NO_PIVOT, solve_positive
+from heelstrike.dynamics.dense import solve_positive
 from heelstrike.dynamics.kernels import inverse_dynamics, passive_force
 from heelstrike.dynamics.loops import find_rows
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.tolerances import NO_PIVOT
 
 if TYPE_CHECKING:
     from heelstrike.sim.controller.robot import ControlledRobot, ControlState

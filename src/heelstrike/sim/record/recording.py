@@ -15,6 +15,7 @@ from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.memory import Memory, Tally
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.run import QUANTITIES
+from heelstrike.tolerances import STANDING_SPEED
 
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
 LIFTOFF = int(EventKind.LIFTOFF)
@@ -27,8 +28,11 @@ JOINT_STICK = int(EventKind.JOINT_STICK)
 # A contact point has left the ground when its gap exceeds this (m), and slips above this (m/s).
 LIFTOFF_GAP = 1e-7
 SLIP_SPEED = 1e-6
-# A point that comes down faster than this (m/s) when the run begins touches down; others stand.
-STANDING_SPEED = 1e-6
+
+
+FARTHEST, FASTEST = 1e9, 1e6
+"""Coordinate (m, rad) and velocity (m/s, rad/s) of a robot that has diverged: no digit of a
+millimetre is left of the one, and no step is as short as the other asks for."""
 
 
 @dissolved_kernel
@@ -210,5 +214,5 @@ def sound(memory: Memory) -> bool:
     """Whether the state is finite and not absurd."""
     good = 0
     for i in range(memory.v.shape[0]):
-        good += (abs(memory.q[i]) < 1e9) & (abs(memory.v[i]) < 1e6)
+        good += (abs(memory.q[i]) < FARTHEST) & (abs(memory.v[i]) < FASTEST)
     return good == memory.v.shape[0]

@@ -21,8 +21,8 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import QUANTITIES, Run
+from heelstrike.tolerances import SAME_ROW
 from heelstrike.view.drawing import legs
-from heelstrike.view.live.history import SAME
 from heelstrike.view.page.motion import frames as drawn
 from heelstrike.view.style import in_words
 
@@ -145,7 +145,7 @@ class Layout:
         for push in pushes:
             if push.end <= since[0] or push.start >= until[-1]:
                 continue
-            acted = (push.start < until - SAME) & (push.end > since + SAME)
+            acted = (push.start < until - SAME_ROW) & (push.end > since + SAME_ROW)
             for row in np.flatnonzero(acted & (used < MOST_PUSHES)).tolist():
                 link, place = push.place(self.robot)
                 pose = motion.link_origin[row, link], motion.link_angle[row, link]

@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.sim.run import QUANTITIES, Event, Run
+from heelstrike.tolerances import SAME_ROW
 
 Floats = NDArray[np.float64]
 
 MOST_ROWS = 100_000
 """Rows that are kept; some 60 MB of bravo7."""
 MOST_EVENTS = 5000
-SAME = 1e-9
-"""Seconds by which two times may differ and be the same."""
 
 
 class History:
@@ -56,12 +55,12 @@ class History:
         self._run = run
         if not len(run.time):
             return []
-        self._end = self._first + int(np.searchsorted(self.time, run.time[0] - SAME))
+        self._end = self._first + int(np.searchsorted(self.time, run.time[0] - SAME_ROW))
         self._make_room(run)
         for name, rows in self._rows.items():
             rows[self._end : self._end + len(run.time)] = getattr(run, name)
         self._end += len(run.time)
-        newest = takewhile(lambda e: e.time >= run.time[0] - SAME, reversed(self.events))
+        newest = takewhile(lambda e: e.time >= run.time[0] - SAME_ROW, reversed(self.events))
         known = {(e.time, e.kind, e.contact) for e in newest}
         new = [e for e in run.events if (e.time, e.kind, e.contact) not in known]
         self.events = (self.events + new)[-MOST_EVENTS:]
@@ -69,18 +68,18 @@ class History:
 
     def cut(self, time: float) -> None:
         """Forget what is later than a time (s)."""
-        self._end = self._first + int(np.searchsorted(self.time, time + SAME))
-        self.events = [event for event in self.events if event.time <= time + SAME]
+        self._end = self._first + int(np.searchsorted(self.time, time + SAME_ROW))
+        self.events = [event for event in self.events if event.time <= time + SAME_ROW]
 
     def row_at(self, time: float) -> int:
         """Index of the last row that is not later than a time (s), or of the first row."""
-        return max(int(np.searchsorted(self.time, time + SAME)) - 1, 0)
+        return max(int(np.searchsorted(self.time, time + SAME_ROW)) - 1, 0)
 
     def part(self, first: int, last: int) -> Run:
         """Rows from one index to another, the last one included, as a run with their events."""
         assert self._run is not None
         rows: dict[str, Any] = {name: self._kept(name)[first : last + 1] for name in self._rows}
-        begin, end = rows["time"][0] - SAME, rows["time"][-1] + SAME
+        begin, end = rows["time"][0] - SAME_ROW, rows["time"][-1] + SAME_ROW
         events = []
         for event in reversed(self.events):
             if event.time < begin:

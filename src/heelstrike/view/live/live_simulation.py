@@ -25,7 +25,7 @@ MOST_SNAPSHOTS = 400
 """Of some 0.2 MB each."""
 MOST_PUSHES = 2000
 
-STANDS = 1e-3
+SEEN_TO_STAND = 1e-3
 """Metres above the ground up to which a robot stands on it."""
 
 Hold = tuple[int, tuple[float, float], tuple[float, float]]
@@ -143,7 +143,7 @@ class LiveSimulation:
         q[moved] = np.clip(position, low, high)
         state = robot.closed(State(q, now.v), keep=[moved])
         if robot.nc:
-            stood = float(simulation.contacts.gap.min()) < STANDS
+            stood = float(simulation.contacts.gap.min()) < SEEN_TO_STAND
             gap = contact_kinematics(robot, state.q, state.v, simulation.ground).gap
             if stood or gap.min() < 0.0:
                 with suppress(RobotError):  # nothing lifts it

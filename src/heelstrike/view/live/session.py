@@ -22,9 +22,10 @@ from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Event, Run
+from heelstrike.tolerances import SAME_ROW
 from heelstrike.view.live.board import Board
 from heelstrike.view.live.frames import Layout
-from heelstrike.view.live.history import SAME, History
+from heelstrike.view.live.history import History
 from heelstrike.view.live.light import light_of
 from heelstrike.view.live.live_simulation import LiveSimulation
 from heelstrike.view.live.stage import Stage
@@ -34,7 +35,7 @@ from heelstrike.view.style import in_words
 
 UPDATES = 64.0
 """Updates a second that are offered to viewers."""
-LONGEST = 0.1
+LONGEST_LAG = 0.1
 """Seconds of the clock that are made up for at most; what cannot keep up is slower."""
 RATES = (0.001, 100.0)
 """Slowest and fastest, in simulated seconds a second."""
@@ -222,7 +223,11 @@ class Session:
         times = sorted(
             event.time for event in self.history.events if not kinds or _kind(event) in kinds
         )
-        wanted = [t for t in times if (t > self.cursor + SAME if ahead else t < self.cursor - SAME)]
+        wanted = [
+            t
+            for t in times
+            if (t > self.cursor + SAME_ROW if ahead else t < self.cursor - SAME_ROW)
+        ]
         if not wanted:
             raise RefusedError(
                 f"there is no {'later' if ahead else 'earlier'} event of this kind so far"
@@ -386,9 +391,9 @@ class Session:
             self.playing = False
             self._tell()
             return
-        self._goal += self.rate * min(elapsed, LONGEST)
+        self._goal += self.rate * min(elapsed, LONGEST_LAG)
         end = float(self.history.time[-1])
-        if self._goal <= end + SAME:
+        if self._goal <= end + SAME_ROW:
             self._move(self._goal)
         elif self.live is not None and self.live.can_go_on:
             self._simulate(elapsed)
@@ -405,7 +410,7 @@ class Session:
         self._advance(min(self._goal, before + max(self._span, step)))
         gained, took = self.live.time - before, clock_time.perf_counter() - began
         self._span = gained * SLOW / took if took > SLOW else min(2.0 * self._span, 1e3)
-        self._goal = min(self._goal, self.live.time + max(self.rate * LONGEST, step))
+        self._goal = min(self._goal, self.live.time + max(self.rate * LONGEST_LAG, step))
         self._gained, self._elapsed = self._gained + gained, self._elapsed + elapsed
         if self._elapsed >= 0.5:
             self._reached = self._gained / self._elapsed
@@ -473,7 +478,7 @@ class Session:
     @property
     def _at_end(self) -> bool:
         times = self.history.time
-        return not len(times) or self.cursor >= float(times[-1]) - SAME
+        return not len(times) or self.cursor >= float(times[-1]) - SAME_ROW
 
     @property
     def _pushes(self) -> tuple[Push, ...]:
@@ -495,7 +500,7 @@ class Session:
         """Return in words what happened at a time (s), and where."""
         places: dict[str, list[str]] = {}
         for event in self.history.events:
-            if abs(event.time - time) <= SAME:
+            if abs(event.time - time) <= SAME_ROW:
                 places.setdefault(kind_in_words(event), []).append(self._where(event))
         told = [f"{kind} ({', '.join(filter(None, each))})" for kind, each in places.items()]
         return f"at {time:.6g} s: {'; '.join(told)}".replace(" ()", "")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import ControllerError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.simulation import Simulation
@@ -23,35 +23,24 @@ FRICTION = "friction"
 
 @dataclass(frozen=True)
 class Control:
-    """Something that a viewer can set: one of several words, or a number within bounds.
-
-    Attributes
-    ----------
-    name, label : str
-        By which it is known, and what people read.
-    value : float or str
-        What it is at first.
-    options : tuple of str
-        The words; none for a number.
-    low, high, step : float
-        Bounds of a number and the distance between two that a slider offers.
-    unit : str
-    at_once : bool
-        Whether it acts at once; otherwise the simulation begins anew.
-    resets : tuple of str
-        Controls that have their first values again when this one is set.
-    """
+    """Something that a viewer can set: one of several words, or a number within bounds."""
 
     name: str
     label: str
+    """name, label: By which it is known, and what people read."""
     value: Value
+    """What it is at first."""
     options: tuple[str, ...] = ()
+    """The words; none for a number."""
     low: float = 0.0
     high: float = 1.0
     step: float = 0.01
+    """low, high, step: Bounds of a number and the distance between two that a slider offers."""
     unit: str = ""
     at_once: bool = False
+    """Whether it acts at once; otherwise the simulation begins anew."""
     resets: tuple[str, ...] = ()
+    """Controls that have their first values again when this one is set."""
 
     def accepts(self, value: Any) -> bool:
         """Whether a value is one that it can have."""

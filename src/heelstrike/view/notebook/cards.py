@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from heelstrike.field_texts import dataclass
 from heelstrike.view.notebook.pictures import (
     curves_picture,
     ground_picture,
@@ -115,18 +117,12 @@ def limit_cycle_card(cycle: LimitCycle) -> str:
 
 @dataclass(frozen=True)
 class Film:
-    """A run as a page that a notebook shows in place.
-
-    Attributes
-    ----------
-    text : str
-        The page.
-    height : int
-        Of its frame, in pixels.
-    """
+    """A run as a page that a notebook shows in place."""
 
     text: str = field(repr=False)
+    """The page."""
     height: int
+    """Of its frame, in pixels."""
 
     def _repr_html_(self) -> str:
         return (
@@ -139,6 +135,23 @@ class Film:
 def film(run: Run, gait: Gait | None, height: int) -> Film:
     """Make the film of a run for a notebook; see :meth:`heelstrike.Run.show`."""
     return Film(page(run, gait), height)
+
+
+CARDS: dict[str, Callable[[Any], str]] = {
+    "Robot": robot_card,
+    "Gait": gait_card,
+    "Run": run_card,
+    "Summary": summary_card,
+    "Ground": ground_card,
+    "LimitCycle": limit_cycle_card,
+}
+"""What shows an object, by the name of its class: to know these by themselves would import them."""
+
+
+def card(shown: object) -> str:
+    """Return what a notebook shows of an object, as HTML."""
+    names = (kind.__name__ for kind in type(shown).__mro__)
+    return next(CARDS[name] for name in names if name in CARDS)(shown)
 
 
 def _card(title: str, content: str, drawn: str) -> str:

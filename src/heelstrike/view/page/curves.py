@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from heelstrike.analysis.friction import friction_use
 from heelstrike.analysis.support import foot_sums
 from heelstrike.analysis.tracking import reference_motion
 from heelstrike.analysis.zero_moment_point import ZeroMomentPoint, zero_moment_point_limits
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
 from heelstrike.sim.run import Run
 from heelstrike.view.contact_figures import ROOM_ABOUT_POINTS
@@ -34,55 +35,36 @@ ROOM = 0.08
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One curve: values in the rows shown, and its look.
-
-    Attributes
-    ----------
-    values : (n,) float
-    label : str
-    foot : int
-        Whose colour it has, -1 for none.
-    dash : int
-        Kind of line, 0 for a whole one.
-    color : int, optional
-        A colour of the palette instead of a foot's.
-    """
+    """One curve: values in the rows shown, and its look."""
 
     values: Floats
+    """(n,)"""
     label: str
     foot: int = -1
+    """Whose colour it has, -1 for none."""
     dash: int = 0
+    """Kind of line, 0 for a whole one."""
     color: int | None = None
+    """A colour of the palette instead of a foot's."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plot:
-    """Traces on common axes, as ``drawing.js`` has them.
-
-    Attributes
-    ----------
-    title, unit : str
-    traces : sequence of Trace
-    limits : sequence of (str, float)
-        Levels drawn as limits.
-    span : tuple of float, optional
-        Ends of the y axis; those of the curves by default.
-    steps : bool
-        Whether values are held from row to row.
-    note : str
-        What else there is to say.
-    group : str
-        What it belongs to.
-    """
+    """Traces on common axes, as ``drawing.js`` has them."""
 
     title: str
     unit: str
     traces: Sequence[Trace]
     limits: Sequence[tuple[str, float]] = ()
+    """Levels drawn as limits."""
     span: tuple[float, float] | None = None
+    """Ends of the y axis; those of the curves by default."""
     steps: bool = False
+    """Whether values are held from row to row."""
     note: str = ""
+    """What else there is to say."""
     group: str = field(default="", kw_only=True)
+    """What it belongs to."""
 
     def described(self) -> dict[str, Any]:
         """Return all but the values, for JSON."""

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from heelstrike.analysis.friction import friction_coefficient
 from heelstrike.analysis.motion import Motion, in_world
 from heelstrike.analysis.support import pushing
-from heelstrike.analysis.zero_moment_point import TOUCHING, ZeroMomentPoint
+from heelstrike.analysis.zero_moment_point import ZeroMomentPoint
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import center_of_mass_velocity
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Run
+from heelstrike.tolerances import STANDING_GAP
 from heelstrike.view.page.rows import Rows, means
 
 Floats = NDArray[np.float64]
@@ -68,7 +69,7 @@ def support_ends(run: Run) -> Floats:
     """First and last of the points on the ground in every row, (nt, 4): x, z, x, z in m."""
     if not run.robot.nc:
         return np.full((len(run.time), 4), np.nan)
-    touching = (run.gap <= TOUCHING) | pushing(run)
+    touching = (run.gap <= STANDING_GAP) | pushing(run)
     on_ground = run.contact_point - run.gap[..., None] * run.contact_normal
     row = np.arange(len(run.time))
     x = on_ground[..., 0]

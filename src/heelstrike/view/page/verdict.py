@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from heelstrike.analysis.actuation import distance_travelled
 from heelstrike.analysis.diagnosis.changes import Change, Lever, Tried, changes
@@ -12,6 +11,7 @@ from heelstrike.analysis.diagnosis.falls import Fall, first_cause
 from heelstrike.analysis.diagnosis.limits import Limit, limits
 from heelstrike.analysis.diagnosis.symptoms import Cause, Symptom
 from heelstrike.analysis.support import walking_steps
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import has_length, soles
@@ -26,35 +26,24 @@ SHOWN = 4
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a run comes to.
-
-    Attributes
-    ----------
-    good : bool
-        Whether it lasted as long as it was asked to, stayed up, every contact problem was certified
-        and nothing puts its numbers in doubt.
-    headline : str
-        Does it walk, how close to its limits or why it fell, what to change: in one line.
-    limits : tuple of Limit
-        Those that were reached in the order of time, then the others, the closest first; of a fall
-        up to its first cause.
-    advice : tuple of str
-        What to change, what helps most first; nothing if nothing has to.
-    fall : Fall or None
-        Why it fell, what came first in time first.
-    changes : tuple of Change
-        The advice as data that a program can follow.
-    tried : tuple of Tried
-        What was tried beside the run.
-    """
+    """What a run comes to."""
 
     good: bool
+    """Whether it lasted as long as it was asked to, stayed up, every contact problem was certified
+    and nothing puts its numbers in doubt."""
     headline: str
+    """Does it walk, how close to its limits or why it fell, what to change: in one line."""
     limits: tuple[Limit, ...]
+    """Those that were reached in the order of time, then the others, the closest first; of a fall
+    up to its first cause."""
     advice: tuple[str, ...]
+    """What to change, what helps most first; nothing if nothing has to."""
     fall: Fall | None = None
+    """Why it fell, what came first in time first."""
     changes: tuple[Change, ...] = ()
+    """The advice as data that a program can follow."""
     tried: tuple[Tried, ...] = ()
+    """What was tried beside the run."""
 
 
 def judge(run: Run, gait: Gait | None = None, *, tried: Sequence[Tried] = ()) -> Verdict:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from xml.etree.ElementTree import Element
 
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
 
 REDUCTION = ("mechanicalReduction", "mechanical_reduction", "drake:gear_ratio")
 INERTIA = ("motorInertia", "rotorInertia", "motor_inertia", "rotor_inertia", "drake:rotor_inertia")
@@ -21,25 +22,17 @@ LARGEST = 1e10  # an effort limit that stands for none
 
 @dataclass
 class Drive:
-    """The motor of a joint.
-
-    Attributes
-    ----------
-    commands : set of str
-        What it is commanded in: effort, position, velocity; empty if the file does not say.
-    armature : float
-        Inertia of its motors as the joint feels it, ``reduction**2 * inertia`` (kg m²).
-    motors : int
-        How many transmissions drive the joint.
-    lower, upper : float
-        Limits of its torque at the joint (N m, N) by ``ros2_control``.
-    """
+    """The motor of a joint."""
 
     commands: set[str] = field(default_factory=set)
+    """What it is commanded in: effort, position, velocity; empty if the file does not say."""
     armature: float = 0.0
+    """Inertia of its motors as the joint feels it, ``reduction**2 * inertia`` (kg m²)."""
     motors: int = 0
+    """How many transmissions drive the joint."""
     lower: float = -math.inf
     upper: float = math.inf
+    """lower, upper: Limits of its torque at the joint (N m, N) by ``ros2_control``."""
 
 
 def drives_of(robot: Element, label: str) -> dict[str, Drive]:

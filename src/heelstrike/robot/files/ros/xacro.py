@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 
-LONGEST = 60.0
+LONGEST_EXPANSION = 60.0
 """Seconds after which a file counts as one that never ends."""
 
 LARGEST = 16 * 2**20
@@ -67,12 +67,12 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Sequence[Path],
             input=json.dumps(order).encode(),
             capture_output=True,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            timeout=LONGEST,
+            timeout=LONGEST_EXPANSION,
             check=False,
         )
     except subprocess.TimeoutExpired:
         raise RobotError(
-            f"{label}: xacro has not finished with this file after {LONGEST:.0f} s."
+            f"{label}: xacro has not finished with this file after {LONGEST_EXPANSION:.0f} s."
         ) from None
     except OSError as error:
         raise RobotError(f"{label}: no process can be started to expand it: {error}.") from error

@@ -23,8 +23,7 @@ from heelstrike.robot.files.saving.text import (
 from heelstrike.robot.files.shapes import COUNT, PREFIX
 from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats
 from heelstrike.robot.robot import Robot
-
-SAME_PLACE = 1e-6  # metres; nearer joints need no line between them
+from heelstrike.tolerances import NO_BONE
 
 
 def mjcf(robot: Robot) -> Element:
@@ -189,7 +188,7 @@ def _write_shapes(robot: Robot, link: int, origin: Floats, body: Element) -> Non
     model = robot.model
     for child in np.flatnonzero(model.parent == link):
         reach = origin[child] - origin[link]
-        if np.hypot(*reach) > SAME_PLACE:
+        if np.hypot(*reach) > NO_BONE:
             bone = {"type": "capsule", "size": "0.02", "fromto": "0 0 0 " + point(reach)}
             SubElement(body, "geom", bone)
     names = _geom_names(robot)

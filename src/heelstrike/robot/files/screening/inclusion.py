@@ -8,11 +8,12 @@ or the same one again and again.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.packages import find_model
 from heelstrike.robot.files.screening.xml_tree import MOST_ELEMENTS, Node, xml_tree
 
@@ -31,46 +32,31 @@ MOST_FILES = 500
 
 @dataclass
 class Reading:
-    """What has been read for one robot.
-
-    Attributes
-    ----------
-    label : str
-        What to call the main file in messages.
-    files, characters, elements : int
-        How much has been read, repetitions included.
-    models : dict of str to Node
-        The other models (``<asset><model>``) of the robot, by names for the parser's eyes.
-    packages : sequence of Path
-        Folders of packages and models, or that hold such.
-    """
+    """What has been read for one robot."""
 
     label: str
+    """What to call the main file in messages."""
     files: int = 0
     characters: int = 0
     elements: int = 0
+    """files, characters, elements: How much has been read, repetitions included."""
     models: dict[str, Node] = field(default_factory=dict)
+    """The other models (``<asset><model>``) of the robot, by names for the parser's eyes."""
     packages: Sequence[Path] = ()
+    """Folders of packages and models, or that hold such."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a file stands: what relative paths in it mean.
-
-    Attributes
-    ----------
-    main : Path
-        Folder of the main file, sought first.
-    own : Path
-        Folder of the file itself.
-    above : tuple of Path
-        The files that are being read, from the main file to this one; all but the main file by
-        their resolved paths.
-    """
+    """Where a file stands: what relative paths in it mean."""
 
     main: Path
+    """Folder of the main file, sought first."""
     own: Path
+    """Folder of the file itself."""
     above: tuple[Path, ...] = ()
+    """The files that are being read, from the main file to this one; all but the main file by their
+    resolved paths."""
 
 
 def read_tree(source: Path | str, reading: Reading) -> tuple[Node, Place, str]:

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.screening.inclusion import Place, Reading, read_model, read_tree
 from heelstrike.robot.files.screening.mechanics_only import leave_mechanics
 from heelstrike.robot.files.screening.mesh_files import name_mesh_files
@@ -61,30 +61,20 @@ _DELICATE = {"mesh", "plugin", "composite", "model", "attach"}
 
 @dataclass(frozen=True)
 class Screened:
-    """A robot file that may be parsed.
-
-    Attributes
-    ----------
-    xml : Node
-        Its tree, with what it includes in place, without what plays no part in motion.
-    text : str
-        The text of this tree; that of the file itself, where the two are the same.
-    models : dict of str to bytes
-        Texts of the models that it joins to itself, by the names under which the text has them.
-    delicate : bool
-        Whether it holds what parsers have died of, so that it should be tried apart first.
-    flexible : bool
-        Whether it had flexible bodies.
-    massless : bool
-        Whether bodies without mass may move, as in formats other than MJCF.
-    """
+    """A robot file that may be parsed."""
 
     xml: Node
+    """Its tree, with what it includes in place, without what plays no part in motion."""
     text: str
+    """The text of this tree; that of the file itself, where the two are the same."""
     models: dict[str, bytes]
+    """Texts of the models that it joins to itself, by the names under which the text has them."""
     delicate: bool
+    """Whether it holds what parsers have died of, so that it should be tried apart first."""
     flexible: bool
+    """Whether it had flexible bodies."""
     massless: bool = False
+    """Whether bodies without mass may move, as in formats other than MJCF."""
 
 
 class _Weight(NamedTuple):

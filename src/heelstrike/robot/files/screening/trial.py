@@ -20,11 +20,11 @@ from typing import Any
 
 from heelstrike.errors import RobotError
 
-LONGEST = 300.0
+LONGEST_TRIAL = 300.0
 """Seconds after which a file counts as one that never ends. Large meshes take ten, on a machine
 that does nothing else."""
 
-POINT = 1e-12
+POINT_SIZE = 1e-12
 """Metres; sizes of zero become this, which is nothing to everybody but a parser."""
 
 _SIZES = {2: 1, 3: 2, 4: 3, 5: 2, 6: 3}
@@ -71,7 +71,7 @@ def lift_sizes(spec: Any) -> None:
             sizes = 1
         for k in range(sizes):
             if geom.size[k] == 0.0:
-                geom.size[k] = POINT
+                geom.size[k] = POINT_SIZE
 
 
 def _trouble(order: bytes) -> str:
@@ -85,11 +85,11 @@ def _trouble(order: bytes) -> str:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            timeout=LONGEST,
+            timeout=LONGEST_TRIAL,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return f"has not finished with this file after {LONGEST:.0f} s"
+        return f"has not finished with this file after {LONGEST_TRIAL:.0f} s"
     except OSError:
         return ""  # a system without processes
     return "crashes on this file" if done.returncode else ""

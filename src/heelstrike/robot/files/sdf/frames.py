@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.sdf.elements import Floats, error, transform, word
 
 MODEL, WORLD = "__model__", "world"
@@ -14,18 +15,12 @@ MODEL, WORLD = "__model__", "world"
 
 @dataclass
 class Frames:
-    """Frames of a model by name, found when they are asked for.
-
-    Attributes
-    ----------
-    label : str
-        What to call the file in messages.
-    given : dict of str to (element, name, pose)
-        Element of each, the frame that it is given in, and its pose there.
-    """
+    """Frames of a model by name, found when they are asked for."""
 
     label: str
+    """What to call the file in messages."""
     given: dict[str, tuple[Element, str, Floats]]
+    """Element of each, the frame that it is given in, and its pose there."""
     found: dict[str, Floats] = field(default_factory=dict)
 
     def pose(self, name: str, asking: Element) -> Floats:
