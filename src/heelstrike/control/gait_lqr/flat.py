@@ -25,6 +25,7 @@ from heelstrike import dynamics
 from heelstrike.control.computed_torque import pitch_of
 from heelstrike.control.gait_lqr.orbit import SMALL
 from heelstrike.control.gait_lqr.transverse import PERIODS, SETTLED
+from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.model import Floats
@@ -51,7 +52,6 @@ class FlatStance:
         self.robot, self.foot = robot, robot.feet[foot]
         self.swing = robot.feet[1 - foot]
         self.driven = robot.model.actuator_joint
-        self.free = np.setdiff1d(np.arange(robot.nv), self.driven)
         self._pitch = pitch_of(robot)
 
     def position(self, joints: Floats) -> Floats:
@@ -72,36 +72,25 @@ class FlatStance:
 
     def velocity(self, q: Floats, rates: Floats) -> Floats:
         """Velocities (nv,), the foot at rest."""
-        rows = self._rows(q)
         v = np.zeros(self.robot.nv)
         v[self.driven] = rates
-        v[self.free] = -np.linalg.lstsq(rows[:, self.free], rows[:, self.driven] @ rates)[0]
-        return v
-
-    def _rows(self, q: Floats) -> Floats:
-        jacobian = dynamics.contact_jacobian(self.robot, q)[list(self.foot.contacts)]
-        return np.asarray(jacobian.reshape(-1, self.robot.nv))
+        return HeldRobot.on(self.robot, q, self.foot.contacts).velocity(v)
 
     def acceleration(self, joints: Floats, rates: Floats, torque: Floats) -> Floats:
         """Accelerations of the joints (nu,), under torques."""
         q = self.position(joints)
         v = self.velocity(q, rates)
-        found = dynamics.linearize(
-            self.robot, q, v, torque, contacts=list(self.foot.contacts)
-        ).state_derivative
-        return np.asarray(found[self.robot.nv :][self.driven])
+        return self.rate(q, v, torque, self.foot.contacts)[self.driven]
 
     def stopped(self, q: Floats, v: Floats, points: Sequence[int]) -> Floats:
         """Velocities (nv,) just after a plastic impact of contact points."""
-        robot = self.robot
-        rows = dynamics.contact_jacobian(robot, q)[list(points)].reshape(-1, robot.nv)
-        moved = np.linalg.solve(dynamics.mass_matrix(robot, q), rows.T)
-        return np.asarray(v - moved @ (np.linalg.pinv(rows @ moved, rcond=1e-9) @ (rows @ v)))
+        return HeldRobot.on(self.robot, q, points).stopped(v)[0]
 
     def rate(self, q: Floats, v: Floats, torque: Floats, points: Sequence[int]) -> Floats:
         """Accelerations (nv,) while contact points stay in place."""
-        found = dynamics.linearize(self.robot, q, v, torque, contacts=list(points))
-        return np.asarray(found.state_derivative[self.robot.nv :])
+        robot = self.robot
+        force = dynamics.applied_force(robot, q, v, torque) - dynamics.bias_force(robot, q, v)
+        return HeldRobot.on(robot, q, points, v).accelerated(force)[0]
 
     def relabelled(self, q: Floats, v: Floats) -> Floats:
         """Joints (2 nu,) with legs exchanged."""
