@@ -371,7 +371,7 @@ def evaluate(
     rub_joints(work.laws.joint_speed, memory, now)
     if control.continuous == 1 and how != HELD:
         if how == ACCEPTED:
-            show_forces(model, work.force, work.corners, memory.contacts)
+            show_forces(work.force, work.corners, memory.contacts)
         q, v, command = memory.q, memory.v, memory.command
         if how == TRIED:
             consult(controller, time, q, v, model, memory, control, command)
@@ -438,7 +438,7 @@ def push_contacts(model: Model, memory: Memory, work: CompliantWorkspace) -> Non
             normal.speed[contact] = row_product(memory.assembly.jacobian, 2 * contact, memory.v)
     copy_words(memory.surface.friction[: model.nc], friction.friction)
     copy_words(memory.reaction.slip, friction.speed)
-    if work.corners.sides > model.nc:
+    if work.corners.doubled > 0:
         meet_second_faces(model, memory, work)
     call_at(laws.normal_code, (address_of(laws.normal), normal))
     copy_words(normal.force, friction.normal)
@@ -453,8 +453,8 @@ def meet_second_faces(model: Model, memory: Memory, work: CompliantWorkspace) ->
     """Gaps and speeds of the points on their second faces, with their Jacobian rows."""
     seconds, jacobian = work.corners.contacts, memory.assembly.jacobian
     normal, friction = work.now.normal, work.now.friction
-    for contact in range(model.nc, work.corners.sides):
-        point = contact - model.nc
+    for point in range(work.corners.doubled):
+        contact = work.corners.other[point]
         normal.gap[contact] = seconds.gap[point]
         friction.friction[contact] = work.corners.friction[point]
         friction.speed[contact] = 0.0
