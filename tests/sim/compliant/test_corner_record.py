@@ -15,7 +15,7 @@ def test_no_force_in_a_corner_is_where_the_point_is() -> None:
     build.contact(build.floating_base("disc", mass=1.0, inertia=0.1), (0.0, 0.0), radius=0.05)
     robot = build.build()
     corners = allocate_corners(robot)
-    corners.sides = 2
+    corners.doubled = 1
     corners.joins[0] = 1
     corners.center[0] = 0.7, 0.2
     corners.frame[0] = -0.6, 0.8

@@ -5,7 +5,7 @@ are does not change within a step, so that forces stay smooth where the nearer f
 other; the bristle of the face that a point leaves the corner on goes with it. The record has the
 resultant of both, in the frame of the row, where it leaves the disc.
 
-The second sides of the points are numbered on from the points.
+Sides are the points, and after them their second faces; `other` says which of them these are.
 """
 
 from __future__ import annotations
@@ -45,7 +45,11 @@ class Corners(Bundle):
     """The points that are in concave corners."""
 
     sides: int = cell(int)
-    """How many sides of points there are on this ground: nc, or twice that if it has corners."""
+    doubled: int = cell(int)
+    """sides, doubled: How many sides of points there are on this ground, and how many points have
+    a second one: all, if it has corners."""
+    other: Integers = array("nc", of=int)
+    """Second side of each point."""
     first: Integers = array("nc", of=int)
     second: Integers = array("nc", of=int)
     """first, second: The faces that each point in a corner is on, -1 for the others."""
@@ -70,7 +74,8 @@ def allocate_corners(robot: Robot) -> Corners:
     extents = {**robot.model.extents, "components": 2}
     none = np.full(robot.nc, NO_FACE)
     return Corners.allocate(
-        extents, sides=robot.nc, first=none, second=none.copy(),
+        extents, sides=robot.nc, other=np.arange(robot.nc, 2 * robot.nc),
+        first=none, second=none.copy(),
         contacts=Contacts.allocate(extents, gap=np.full(robot.nc, np.inf)),
     )  # fmt: skip
 
@@ -81,10 +86,8 @@ def observe_sides(
 ) -> None:
     """Kinematics, velocities and contact points of a state, on both faces of corners."""
     observe(model, ground, q, v, memory)
-    if corners.sides == model.nc:
-        return
     tree, seconds = memory.equations.tree, corners.contacts
-    for point in range(model.nc):
+    for point in range(corners.doubled):
         seconds.gap[point] = np.inf
         face, other = corners.first[point], corners.second[point]
         if other == NO_FACE:
@@ -128,8 +131,7 @@ def misses_corner(
 
     Points fast enough go through the neighbourhood of a corner within a step.
     """
-    for second in range(model.nc, corners.sides):
-        point = second - model.nc
+    for point in range(corners.doubled):
         if contacts.gap[point] >= ENTERS:
             continue
         x, z = center_of(model, contacts, point)
@@ -185,8 +187,8 @@ def choose_sides(
 
     The bends of the bristles are those now, the forces those at the beginning of the step.
     """
-    for second in range(model.nc, corners.sides):
-        point = second - model.nc
+    for point in range(corners.doubled):
+        second = corners.other[point]
         radius = model.contact_radius[point]
         x, z = center_of(model, contacts, point)
         if corners.second[point] == NO_FACE:
@@ -214,11 +216,11 @@ def choose_sides(
 
 
 @kernel
-def show_forces(model: Model, forces: Floats, corners: Corners, contacts: Contacts) -> None:
+def show_forces(forces: Floats, corners: Corners, contacts: Contacts) -> None:
     """Let controllers see the forces of the points now, of both faces where there are two."""
     copy_words(forces, contacts.force)
-    for second in range(model.nc, corners.sides):
-        point = second - model.nc
+    for point in range(corners.doubled):
+        second = corners.other[point]
         if corners.second[point] != NO_FACE:
             other = out_of_frame(
                 corners.contacts.normal[point], (forces[second, 0], forces[second, 1])
@@ -231,8 +233,7 @@ def show_forces(model: Model, forces: Floats, corners: Corners, contacts: Contac
 @kernel
 def begin_joining(model: Model, contacts: Contacts, corners: Corners) -> None:
     """Keep the frames of the points at a sample, and forget what pushed them before."""
-    for second in range(model.nc, corners.sides):
-        point = second - model.nc
+    for point in range(corners.doubled):
         corners.joins[point] = 0
         corners.moment[point] = 0.0
         corners.center[point, 0], corners.center[point, 1] = center_of(model, contacts, point)
@@ -244,8 +245,8 @@ def begin_joining(model: Model, contacts: Contacts, corners: Corners) -> None:
 @kernel
 def join(model: Model, step: float, forces: Floats, contacts: Contacts, corners: Corners) -> None:
     """Add half a step's impulse of the forces of all sides to those of both faces."""
-    for second in range(model.nc, corners.sides):
-        point = second - model.nc
+    for point in range(corners.doubled):
+        second = corners.other[point]
         radius = model.contact_radius[point]
         for side in range(2):
             force = forces[second if side == 1 else point]
@@ -265,7 +266,7 @@ def tell_resultants(model: Model, corners: Corners, impulse: Floats, place: Floa
     Where the resultant's line of action leaves the disc; that of forces that nearly cancel may miss
     it. No force acts where the frame has its contact point.
     """
-    for point in range(corners.sides - model.nc):
+    for point in range(corners.doubled):
         if corners.joins[point] == 0:
             continue
         x, z = corners.force[point, 0], corners.force[point, 1]

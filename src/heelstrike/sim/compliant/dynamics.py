@@ -54,6 +54,7 @@ from heelstrike.sim.compliant.law import FrictionForces, NormalForces
 from heelstrike.sim.compliant.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
 from heelstrike.sim.contacts.geometry import contact_rows, row_product, weigh
 from heelstrike.sim.contacts.loops import find_loops, push_loops, respond, rows_of, speed_along
+from heelstrike.sim.contacts.rows import DRY_JOINT
 from heelstrike.sim.controller.asking import ask, consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.guard import guarded
@@ -320,7 +321,7 @@ def evaluate(
     rub_joints(work.laws.joint_speed, memory, now)
     if control.continuous == 1 and how != HELD:
         if how == ACCEPTED:
-            show_forces(model, work.force, work.corners, memory.contacts)
+            show_forces(work.force, work.corners, memory.contacts)
         q, v, command = memory.q, memory.v, memory.command
         if how == TRIED:
             consult(controller, time, q, v, model, memory, control, command)
@@ -387,7 +388,7 @@ def push_contacts(model: Model, memory: Memory, work: CompliantWorkspace) -> Non
             normal.speed[contact] = row_product(memory.assembly.jacobian, 2 * contact, memory.v)
     copy_words(memory.surface.friction[: model.nc], friction.friction)
     copy_words(memory.reaction.slip, friction.speed)
-    if work.corners.sides > model.nc:
+    if work.corners.doubled > 0:
         meet_second_faces(model, memory, work)
     call_at(laws.normal_code, (address_of(laws.normal), normal))
     copy_words(normal.force, friction.normal)
@@ -402,8 +403,8 @@ def meet_second_faces(model: Model, memory: Memory, work: CompliantWorkspace) ->
     """Gaps and speeds of the points on their second faces, with their Jacobian rows."""
     seconds, jacobian = work.corners.contacts, memory.assembly.jacobian
     normal, friction = work.now.normal, work.now.friction
-    for contact in range(model.nc, work.corners.sides):
-        point = contact - model.nc
+    for point in range(work.corners.doubled):
+        contact = work.corners.other[point]
         normal.gap[contact] = seconds.gap[point]
         friction.friction[contact] = work.corners.friction[point]
         friction.speed[contact] = 0.0
@@ -450,8 +451,9 @@ def pull_back(model: Model, latch: int, memory: Memory, stop: NormalForces) -> N
 @kernel
 def rub_joints(scale: float, memory: Memory, now: Rates) -> None:
     """Dry friction of the joints, smoothed around zero speed."""
-    for place in range(memory.dry_joint.shape[0]):
-        j = memory.dry_joint[place]
+    rows = memory.rows
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        j = rows.owner[dry]
         limit = memory.breakaway[j]
         size = sqrt(memory.v[j] * memory.v[j] + scale * scale)
         now.dry_force[j] = -limit * memory.v[j] / size

@@ -236,15 +236,15 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
         tangent = base.friction.force[contact] + now.friction.force[contact]
         work.impulse[contact, 0] += 0.5 * h * normal
         work.impulse[contact, 1] += 0.5 * h * tangent
-    if work.corners.sides > model.nc:
+    if work.corners.doubled > 0:
         join(model, h, work.base_force, memory.contacts, work.corners)
         join(model, h, work.force, memory.contacts, work.corners)
     for contact in range(model.contact_link.shape[0]):
         gap = now.normal.gap[contact]
         before = base.normal.gap[contact]
-        if work.corners.sides > model.nc:
-            gap = min(gap, now.normal.gap[model.nc + contact])
-            before = min(before, base.normal.gap[model.nc + contact])
+        if work.corners.doubled > 0:
+            gap = min(gap, now.normal.gap[work.corners.other[contact]])
+            before = min(before, base.normal.gap[work.corners.other[contact]])
         memory.tally.penetration = max(memory.tally.penetration, -gap)
         if memory.reported.closed[contact] == 0 and gap < 0.0:
             memory.reported.closed[contact] = 1
@@ -268,13 +268,19 @@ def landing(model: Model, depth: float, gap_now: Floats, work: CompliantWorkspac
     long step through the air may all lie above the ground that its end lies in.
     """
     first = 1.0
-    for contact in range(work.corners.sides):
-        is_second = contact >= model.nc
-        gap = work.corners.contacts.gap[contact - model.nc] if is_second else gap_now[contact]
-        before = work.base.normal.gap[contact]
-        if before > depth and gap < -depth:
-            first = min(first, before / (before - gap))
+    before = work.base.normal.gap
+    for point in range(model.nc):
+        first = min(first, meets(depth, before[point], gap_now[point]))
+    for point in range(work.corners.doubled):
+        gap = work.corners.contacts.gap[point]
+        first = min(first, meets(depth, before[work.corners.other[point]], gap))
     return first
+
+
+@kernel
+def meets(depth: float, before: float, after: float) -> float:
+    """Part of a step after which a gap was zero, one if it did not become less than -`depth`."""
+    return before / (before - after) if before > depth and after < -depth else 1.0
 
 
 @kernel
@@ -438,7 +444,7 @@ def brake(
         steady_loops(model, memory.q, memory.equations, loops, memory.v)
         for row in range(rows_of(loops)):
             work.loop_impulse[row] = loops.unknown[row]
-            note_loop(model, row, loops.unknown[row], loops)
+            note_loop(memory.rows, row, loops.unknown[row], loops)
     note_brakes(model, time, 1.0, record, loops)
 
 
@@ -446,8 +452,8 @@ def brake(
 def finish_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     """Put the mean forces since the sample before into the memory."""
     span = work.step
-    for row in range(work.loop_impulse.shape[0]):
-        note_loop(model, row, work.loop_impulse[row] / span, memory.loops)
+    for row in range(rows_of(memory.loops)):
+        note_loop(memory.rows, row, work.loop_impulse[row] / span, memory.loops)
     tell_resultants(model, work.corners, work.impulse, work.place)
     for contact in range(work.touched.shape[0]):
         for k in range(2):
@@ -544,9 +550,11 @@ def prepare(
 ) -> None:
     """Kinematics and contact points of the state now."""
     corners = work.corners
-    corners.sides = (1 + ground.concave) * model.nc
+    points = model.nc
+    corners.doubled = points if ground.concave == 1 else 0
+    corners.sides = points + corners.doubled
     observe_sides(model, ground, memory.q, memory.v, memory, corners)
-    if corners.sides > model.nc:
+    if corners.doubled > 0:
         bend, forces = work.now.friction.bend, work.base_force
         choose_sides(model, ground, memory.contacts, corners, bend, forces)
         observe_sides(model, ground, memory.q, memory.v, memory, corners)
@@ -569,8 +577,8 @@ def report(
     clock: Clock,
 ) -> None:  # fmt: skip
     """Append a row if one is due, with the forces of this instant."""
-    for row in range(work.loop_rows.shape[0]):
-        note_loop(scene.model, row, work.now.loop[row], memory.loops)
+    for row in range(rows_of(memory.loops)):
+        note_loop(memory.rows, row, work.now.loop[row], memory.loops)
     work.row = note_row_when_due(memory, clock, record)
     if work.row >= 0:
         now = work.now
@@ -608,12 +616,12 @@ def move(
             model, work.row, memory.contacts.force, reaction.stop_torque, reaction.friction_torque,
             memory, record,
         )  # fmt: skip
-        for contact in range(work.corners.sides - model.nc):
+        for contact in range(work.corners.doubled):
             if work.corners.joins[contact] == 1:
                 for i in range(2):
                     record.contact_point[work.row, contact, i] = work.place[contact, i]
     if control.continuous == 1:
-        show_forces(model, work.force, work.corners, memory.contacts)
+        show_forces(work.force, work.corners, memory.contacts)
     clock.time = clock.start + (clock.index + 1) * step
     return DONE
 

@@ -360,7 +360,7 @@ def find_impulses(
         phase.impulse[contact, 0] = 0.0
         phase.impulse[contact, 1] = 0.0
     count = gather_near(model, length, bouncing, phase, memory)
-    total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
+    total = append_loops(count, memory.loops, assembly)
     free_loops(total, memory.loops, trial[model.nq :], 0.5 * length, assembly)
     for place in range(count, total):
         phase.lean[place] = 0.0

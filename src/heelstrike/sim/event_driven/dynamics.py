@@ -23,7 +23,8 @@ from heelstrike.sim.contacts.geometry import (
     row_product,
     weigh,
 )
-from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, rows_of
+from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, row_of, rows_of
+from heelstrike.sim.contacts.rows import LOOP
 from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
@@ -262,7 +263,7 @@ def gather_closed(
             gap_rows(model, equations.tree, contacts, phase, contact, count, assembly)
             assembly.candidate[count] = contact
             count += 1
-    total = append_loops(phase.closed.shape[0], count, loops, assembly)
+    total = append_loops(count, loops, assembly)
     if total > 0:
         assemble_delassus(model, total, equations, assembly)
     return count
@@ -441,8 +442,8 @@ def displacement(
 ) -> float:  # fmt: skip
     """How far a candidate is along its row from where its constraint wants it."""
     contact = memory.assembly.candidate[row // 2]
-    if contact >= phase.closed.shape[0]:
-        return memory.loops.rows.displacement[contact - phase.closed.shape[0]]
+    if memory.rows.kind[contact] >= LOOP:
+        return memory.loops.rows.displacement[row_of(contact, memory.loops)]
     if row % 2 == 0:
         return gap_now(contact, contacts, phase, state)
     if phase.first_dry <= contact < phase.first_second:
@@ -494,7 +495,7 @@ def gather_sunk(
             assembly.candidate[place] = contact
             sunk += 1
     if sunk > 0:
-        total = append_loops(phase.closed.shape[0], count + sunk, memory.loops, assembly)
+        total = append_loops(count + sunk, memory.loops, assembly)
         assemble_delassus(model, total, memory.equations, assembly)
     return sunk
 

@@ -106,7 +106,7 @@ def collide(
     if count + rows_of(memory.loops) == 0:
         return True, 0.0, 0.0
     find_loops(model, state[: model.nq], v, equations.tree, memory.loops)
-    total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
+    total = append_loops(count, memory.loops, assembly)
     free_loops(total, memory.loops, v, 0.0, assembly)
     clear_rounding(count, total, free)
     assemble_delassus(model, total, equations, assembly)
@@ -118,7 +118,7 @@ def collide(
         work = impulse[row] * row_product(jacobian, row, v)
         made += work
         through += abs(work)
-    note_loops(model, total, impulse, memory.loops)
+    note_loops(memory.rows, total, 1.0, impulse, memory.loops)
     add_impulses(model, assembly, phase, equations, v)
     for place in range(count):
         contact = assembly.candidate[place]

@@ -32,6 +32,7 @@ from heelstrike.sim.contacts.faces import NO_FACE, locate_on_face, take_surface
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import close_loops, rows_of, steady_loops
+from heelstrike.sim.contacts.rows import SECOND_FACE, lay_out_rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
@@ -71,7 +72,7 @@ from heelstrike.sim.event_driven.rows import (
 )
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
-from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, contact_capacity
+from heelstrike.sim.memory import Assembly, Memory, Reported, Surface
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
 from heelstrike.sim.record.record import Record
@@ -220,7 +221,7 @@ class EventDriven(Method):
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
         others = 2 * robot.model.latches + robot.model.brakes
-        contacts = contact_capacity(robot) + robot.nc
+        contacts = int(lay_out_rows(robot.model).end[SECOND_FACE])
         return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contacts + others + 8
 
     def check(self, setting: Setting) -> None:

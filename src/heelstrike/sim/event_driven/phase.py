@@ -9,9 +9,9 @@ from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
+from heelstrike.sim.contacts.rows import SECOND_FACE, dry_joints, lay_out_rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
-from heelstrike.sim.memory import contact_capacity, dry_joints
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -275,7 +275,7 @@ def allocate_phase(robot: Robot) -> Phase:
     lower = np.flatnonzero(np.isfinite(model.lower))
     upper = np.flatnonzero(np.isfinite(model.upper))
     dry = dry_joints(model)
-    firsts, loops = contact_capacity(robot), most_rows(model)
+    firsts, loops = int(lay_out_rows(model).first[SECOND_FACE]), most_rows(model)
     contacts = firsts + robot.nc
     forces = 2 * contacts + loops
     saddle = SaddlePoint.allocate(

@@ -113,13 +113,13 @@ def write_right(
         count = 0
         for place in range(loops):
             impulse[2 * place] = 0.0
-        note_loops(model, loops, impulse, memory.loops)
+        note_loops(memory.rows, loops, 1.0, impulse, memory.loops)
     elif count + loops > 0:
         solve_accelerations(count, model, trial, memory, phase)
         note_residual(residual, memory.tally)
         if loops == 0 and phase.deficient == 1:
             show_who_carries(count, memory.surface.friction, phase, assembly)
-        note_loops(model, count + loops, impulse, memory.loops)
+        note_loops(memory.rows, count + loops, 1.0, impulse, memory.loops)
     row, friction_torque = record.rows, record.friction_torque[record.rows]
     note_row(time, memory, record)
     note_state(model, row, trial, record)
