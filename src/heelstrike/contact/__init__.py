@@ -15,7 +15,7 @@ from heelstrike.contact.queries.inverse_dynamics import (
     contact_inverse_dynamics,
 )
 from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
-from heelstrike.contact.queries.linearization import (
+from heelstrike.contact.linearized.motion import (
     ActiveContacts,
     ImpactLinearization,
     PhaseLinearization,

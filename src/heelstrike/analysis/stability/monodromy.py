@@ -22,7 +22,7 @@ from heelstrike.analysis.stability.variation import Variation
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
-from heelstrike.contact.queries.linearization import (
+from heelstrike.contact.linearized.motion import (
     ActiveContacts,
     linearize_contact,
     linearize_impact,

@@ -11,7 +11,7 @@ from numpy.polynomial import Polynomial, legendre
 from numpy.typing import NDArray
 
 from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
-from heelstrike.contact.queries.linearization import ActiveContacts, linearize_contact
+from heelstrike.contact.linearized.motion import ActiveContacts, linearize_contact
 from heelstrike.errors import SimulationError
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.in_python import AskedLaw

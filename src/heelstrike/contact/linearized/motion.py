@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.linearized.slopes import plane
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.places import write_point_rows
@@ -142,7 +143,7 @@ def linearize_contact(
     """
     position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
     gamma = joint_vector(robot, "torque", torque)
-    flow, slopes, _ = _equations(robot, _checked(robot, active), *_plane(ground))
+    flow, slopes, _ = _equations(robot, _checked(robot, active), *plane(ground))
     n, m = robot.nv, flow.size1_in(2)
     nothing = np.zeros(m)
     system = np.array(slopes(position, velocity, nothing, gamma)[0])
@@ -206,7 +207,7 @@ def linearize_impact(
     True
     """
     position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
-    _, _, slopes = _equations(robot, _checked(robot, active), *_plane(ground))
+    _, _, slopes = _equations(robot, _checked(robot, active), *plane(ground))
     n, m = robot.nv, slopes.size1_in(2)
     nothing = np.zeros(m)
     system, _, by_velocity, _ = map(np.array, slopes(position, velocity, nothing))
@@ -285,17 +286,6 @@ def _checked(robot: Robot, active: ActiveContacts) -> ActiveContacts:
             f"robot {robot.name!r} has joints 0 to {robot.nv - 1}, not {list(active.joints)}"
         )
     return active
-
-
-def _plane(ground: Ground | None) -> tuple[tuple[float, float], float, float]:
-    """Return normal, friction and restitution of ground that is one line."""
-    terrain = (Ground() if ground is None else ground).model()
-    if len(terrain.friction) > 1:
-        raise SimulationError(
-            "contact is linearised on level or sloping ground, the same everywhere"
-        )
-    nx, nz = terrain.normal[0].tolist()
-    return (nx, nz), float(terrain.friction[0]), float(terrain.restitution[0])
 
 
 def _solved(system: Floats, right: Floats, n: int) -> Floats:
