@@ -12,9 +12,9 @@ import walking
 from numpy.typing import NDArray
 
 import heelstrike as hs
-from heelstrike.analysis.stability.variation import Variation
 from heelstrike.experiments.passive import METHOD, passive_walk
 from heelstrike.sim import EventKind
+from heelstrike.sim.linearized.flow import Variation
 
 SLOPE = 0.06
 

@@ -6,13 +6,13 @@ made, and nothing else:
 - between two events the flow Φ with dΦ/dt = A(t) Φ, A = ∂ẋ/∂x under the contacts that hold
   (:func:`~heelstrike.contact.linearized.motion.linearize_contact`);
 - at an event, where g(x) = 0 and x⁺ = Δ(x⁻), a saltation. A walk with the error e⁻ meets the event
-  later by δt, at g(x⁻ + e⁻ + f⁻ δt) = 0, so that δt = −∇g e⁻ / (∇g f⁻): an error that leaves the gap
-  larger, ∇g e⁻ > 0, comes down later, since the gap falls, ∇g f⁻ < 0. It is then at
-  x⁺ + DΔ (e⁻ + f⁻ δt), where the undisturbed walk is at x⁺ + f⁺ δt. The difference is
+  later by δt, at g(x⁻ + e⁻ + f⁻ δt) = 0, so that δt = −∇g e⁻ / (∇g f⁻): one with a larger gap,
+  ∇g e⁻ > 0, comes down later, since the gap falls, ∇g f⁻ < 0. It is then at x⁺ + DΔ (e⁻ + f⁻ δt),
+  where the undisturbed walk is at x⁺ + f⁺ δt. The difference is
   e⁺ = (DΔ + (f⁺ − DΔ f⁻) ∇g / (∇g f⁻)) e⁻
   (:func:`~heelstrike.contact.linearized.motion.saltation_matrix`);
-- on a section, which is the event itself whenever that is, the undisturbed walk waits: f⁺ = 0. Every
-  clock that begins anew at an event - a controller's, a step's - makes it a section.
+- on a section, which is the event itself whenever that is, the undisturbed walk waits: f⁺ = 0.
+  Every clock that begins anew at an event, a controller's or a step's, makes it a section.
 
 At lift-off and where slip begins forces are continuous, DΔ = 1 and f⁺ = f⁻: the identity. Where a
 point comes to rest g is its sliding velocity, DΔ = 1 and f⁺ ≠ f⁻. Of points that come down in one

@@ -1,7 +1,7 @@
 """Derivatives of gaps, places and velocities of contact points by the state, exact to rounding.
 
-They are the gradients of the events of a walk (a gap or a sliding speed that vanishes), and those of
-the equations that a standing robot obeys, which leave it the errors that matter.
+They are the gradients of the events of a walk, a gap or a sliding speed that vanishes, and those of
+the equations that a standing robot obeys.
 """
 
 from __future__ import annotations
@@ -83,7 +83,11 @@ def contact_slopes(
 
 
 def following(
-    robot: Robot, q: ArrayLike, v: ArrayLike, points: Sequence[int], leading: Sequence[int]
+    robot: Robot,
+    q: ArrayLike,
+    v: ArrayLike,
+    points: Sequence[int],
+    leading: Sequence[int] | Integers,
 ) -> Floats:
     """Errors (δq, δv) of a robot on level ground, by those of some of its coordinates.
 
@@ -117,7 +121,7 @@ def following(
     return errors
 
 
-def both(robot: Robot, coordinates: Sequence[int]) -> Integers:
+def both(robot: Robot, coordinates: Sequence[int] | Integers) -> Integers:
     """Return where coordinates, then their velocities, are in a state (q, v)."""
     chosen = np.asarray(coordinates, dtype=np.int64)
     return np.concatenate([chosen, robot.nq + chosen])

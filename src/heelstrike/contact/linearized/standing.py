@@ -1,8 +1,8 @@
 """Coordinates of the states in which a robot stands as it does in one of them.
 
-Feet on the ground obey equations: points that touch it have no gap, those that stand no velocity, and
-where along the ground they are does not matter; closed loops hold, and joints are where latches have
-them. A :class:`Chart` numbers what these leave free.
+Feet on the ground obey equations: points that touch it have no gap, those that stand have no
+velocity, and where along the ground they are does not matter; closed loops hold, and joints are
+where latches have them. A :class:`Chart` numbers what these leave free.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.contact.linearized.slopes import along_the_ground, contact_slopes
+from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics import loop_displacement, loop_jacobian
 from heelstrike.robot.model import Integers
@@ -105,15 +105,24 @@ class Chart:
         self.directions = rows[rank:].T / scale[:, None]
         self._back = np.linalg.pinv(gradient, rcond=RANK_TOLERANCE) / scale[:, None]
 
-    def state(self, coordinates: Floats, equations: Floats | float = 0.0) -> tuple[Floats, float]:
-        """Return the state with some coordinates, and how far it is off the equations.
-
-        Or off what they come to elsewhere.
-        """
-        x = self._origin + self.directions @ coordinates
+    def moved(self, coordinates: Floats, origin: Floats | None = None) -> Floats:
+        """Return the state with some coordinates, as seen from the origin or from near it."""
+        begin = self._origin if origin is None else origin
+        level = self._standing.equations(begin)
+        x: Floats = begin + self.directions @ coordinates
         for _ in range(MOST):
-            change = self._back @ (self._standing.equations(x) - equations)
+            change = self._back @ (self._standing.equations(x) - level)
             x = x - change
             if np.abs(change).max(initial=0.0) <= NEAREST:
                 break
-        return x, float(np.abs(self._standing.equations(x) - equations).max(initial=0.0))
+        return x
+
+    def off(self, x: Floats) -> float:
+        """How far (m, m/s) a state is from those that stand as the origin does."""
+        apart = self._standing.equations(x) - self._standing.equations(self._origin)
+        return float(np.abs(apart).max(initial=0.0))
+
+    def coordinates(self, x: Floats) -> Floats:
+        """Coordinates of a state that stands as the origin does, of a chart without scale."""
+        found: Floats = (x - self._origin) @ self.directions
+        return found

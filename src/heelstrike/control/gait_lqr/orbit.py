@@ -134,12 +134,9 @@ def orbit_of(gait: PhasedGait) -> Orbit:
     hurry = 0.5 * Course.through(first, last, rates**2).slope()(theta)  # θ̈
     acceleration = bend * rates[:, None] ** 2 + tangent * hurry[:, None]
     v = tangent * rates[:, None]
-    torque, A, B = [], [], []
-    for k in range(NODES):
-        moved = about(gait, q[k], v[k], acceleration[k])
-        for values, value in zip((torque, A, B), moved, strict=True):
-            values.append(value)
-    courses = (q, v, np.array(torque), rates, np.array(A), np.array(B))
+    each = [about(gait, *instant) for instant in zip(q, v, acceleration, strict=True)]
+    torque, A, B = (np.array(values) for values in zip(*each, strict=True))
+    courses = (q, v, torque, rates, A, B)
     return Orbit(gait, end, *(Course.through(first, last, each) for each in courses))
 
 
