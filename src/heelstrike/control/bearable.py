@@ -14,11 +14,12 @@ from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import SOLVED, Program
 from heelstrike.control.virtual_constraints import demand, hold_foot
 from heelstrike.dynamics.frames import into_frame
-from heelstrike.dynamics.spatial import Spatial, spatial
+from heelstrike.dynamics.held import force_of_row
+from heelstrike.dynamics.spatial import Spatial
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-from heelstrike.sim.controller.stance import joint_torques, solve_three_transposed
+from heelstrike.sim.controller.stance import joint_torques
 
 # Rows: pressing, friction either way; then of each joint its motor's least and greatest torque, and
 # the low and the high end of its range.
@@ -79,13 +80,9 @@ class Bearable(Bundle):
 @kernel
 def ground_rows(robot: ControlledRobot, normal: Floats, friction: float, torque: Floats) -> Spatial:
     """Find the rows of the ground, and the torques, for a force in `robot.force`."""
-    columns, rest, force = robot.columns, robot.unactuated, robot.force
-    a, b, c = rest[0], rest[1], rest[2]
-    x, z, _ = solve_three_transposed(
-        spatial(columns, a), spatial(columns, b), spatial(columns, c),
-        (force[a], force[b], force[c]),
-    )  # fmt: skip
-    up, along = into_frame(normal, (x, z))
+    force, held = robot.force, robot.held
+    pushed = force_of_row(0, force, held), force_of_row(1, force, held)
+    up, along = into_frame(normal, pushed)
     joint_torques(robot, torque)
     return up, friction * up - along, friction * up + along
 
@@ -121,18 +118,15 @@ def borne(
 
 
 @kernel
-def find_shares(
-    state: ControlState, robot: ControlledRobot, turning: Spatial, drift: tuple[float, float],
-    bearable: Bearable,
-) -> None:  # fmt: skip
+def find_shares(state: ControlState, robot: ControlledRobot, bearable: Bearable) -> None:
     """Write how force and θ̈ change with what is wanted: they are affine in it."""
     wanted, slope = bearable.wanted, bearable.slope
-    rate = demand(state, robot, turning, drift, wanted, slope)
+    rate = demand(state, robot, wanted, slope)
     for j in range(robot.nv):
         bearable.asked[j] = robot.force[j]
     for i in range(robot.nu):
         wanted[i] += 1.0
-        bearable.turned[i] = demand(state, robot, turning, drift, wanted, slope) - rate
+        bearable.turned[i] = demand(state, robot, wanted, slope) - rate
         wanted[i] -= 1.0
         for j in range(robot.nv):
             bearable.share[j, i] = robot.force[j] - bearable.asked[j]
@@ -184,11 +178,11 @@ def bear(
 ) -> None:  # fmt: skip
     """Write `robot.force` that gives what is wanted, or the nearest that can be borne."""
     normal = contacts.normal[robot.foot_contact[foot]]
-    turning, drift = hold_foot(state, contacts, robot, phase, foot)
-    rate = demand(state, robot, turning, drift, bearable.wanted, bearable.slope)
+    hold_foot(state, contacts, robot, phase, foot)
+    rate = demand(state, robot, bearable.wanted, bearable.slope)
     if borne(state, robot, normal, rate, bounds, bearable):
         return
-    find_shares(state, robot, turning, drift, bearable)
+    find_shares(state, robot, bearable)
     write_rows(robot, normal, bounds.friction, bearable)
     find_nearest(bearable.program)
     for j in range(robot.nv):

@@ -28,11 +28,11 @@ from heelstrike.gait.polynomials import motion_in_piece, place_in_step
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller.following import follow_positions
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance import hold_still
-from heelstrike.sim.controller.tied import follow_positions
 
 # A point of the swing foot that comes down more slowly than this (m/s) has landed.
 LANDED_SPEED = 1e-3

@@ -22,31 +22,32 @@ from typing import Any
 import numpy as np
 
 from heelstrike.arguments import takes
-from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.around import PERIOD, Around, Shell, Shown, inside
-from heelstrike.dynamics.dense import solve_positive
+from heelstrike.dynamics.held import (
+    HeldRows,
+    Reaction,
+    add_loops,
+    add_place,
+    change_least,
+    find_response,
+    solve_rows,
+)
 from heelstrike.dynamics.kernels import (
     bias_force,
-    factorize,
     integrate,
-    mass_matrix,
     passive_force,
     point_position,
     solve_factorized,
 )
-from heelstrike.dynamics.loops import find_rows as find_loop_rows
-from heelstrike.dynamics.places import write_point_rows
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller.following import follow_positions, follow_speeds
 from heelstrike.sim.controller.interface import Contacts, Controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-from heelstrike.sim.controller.tied import follow_positions, follow_speeds
 
-# Two points of a flat foot hold three coordinates by four equations: their matrix is singular, and
-# gets this part of its trace added. Velocities hardly depend on it.
-SOFTNESS = 1e-9
 UP = np.array([0.0, 1.0])
 # Coordinate of a floating trunk's pitch.
 PITCH = 2
@@ -89,7 +90,7 @@ class Memory(Shown):
         Whether each contact point stands.
     anchor : (nc, 2) float
         Where it came to stand.
-    matrix, factor, force, passive, point, rows, columns, small, right
+    reaction, force, passive, point
         Scratch.
     """
 
@@ -98,15 +99,10 @@ class Memory(Shown):
     torque: Floats = array("nu")
     standing: Integers = array("nc", of=int)
     anchor: Floats = array("nc", "axes")
-    matrix: Floats = array("nv", "nv")
-    factor: Floats = array("nv", "nv")
+    reaction: Reaction = part(Reaction)
     force: Floats = array("nv")
     passive: Floats = array("nv")
     point: Floats = array("nc", "axes")
-    rows: Floats = array("held", "nv")
-    columns: Floats = array("held", "nv")
-    small: Floats = array("held", "held")
-    right: Floats = array("held")
 
 
 class Log(Bundle):
@@ -132,67 +128,31 @@ def find_points(robot: ControlledRobot, parameters: Parameters, memory: Memory) 
 
 
 @kernel
-def find_rows(robot: ControlledRobot, parameters: Parameters, memory: Memory) -> int:
-    """Write what a change of velocity takes that stops the standing points; return its rows.
-
-    After these come the rows of closed loops and couplings, at which nothing may tear either.
-    """
-    model, work, count = robot.model, memory.state.kinematics, 0
-    mass_matrix(model, work, memory.matrix)
-    factorize(model, memory.matrix, memory.factor)
+def hold_standing(robot: ControlledRobot, memory: Memory) -> None:
+    """Hold the standing points and then the loops, at which nothing may tear either."""
+    model, seen, held = robot.model, memory.state, robot.held
+    held.count = 0
     for i in range(robot.nc):
         if memory.standing[i] == 1:
-            link, at = model.contact_link[i], memory.point[i]
-            write_point_rows(model, work, link, at, parameters.up, count, memory.rows)
-            count += 2
-    if robot.loops.bias.shape[0] > 0:
-        find_loop_rows(model, memory.state.q, memory.state.v, work, robot.loops)
-    for row in range(robot.loops.bias.shape[0]):
-        for j in range(robot.nv):
-            memory.rows[count, j] = robot.loops.jacobian[row, j]
-        count += 1
-    for row in range(count):
-        for j in range(robot.nv):
-            memory.columns[row, j] = memory.rows[row, j]
-        solve_factorized(model, memory.factor, memory.columns[row])
-    return count
+            link = model.contact_link[i]
+            add_place(model, seen.kinematics, link, memory.point[i], 2, held)
+    add_loops(model, seen.q, seen.v, seen.kinematics, held)
 
 
 @kernel
-def stop_standing(robot: ControlledRobot, count: int, memory: Memory, v: Floats) -> None:
-    """Give the velocities the least change that leaves the standing points at rest."""
-    trace = 0.0
-    for row in range(count):
-        memory.right[row] = 0.0
-        for j in range(robot.nv):
-            memory.right[row] += memory.rows[row, j] * v[j]
-        for other in range(count):
-            entry = 0.0
-            for j in range(robot.nv):
-                entry += memory.rows[row, j] * memory.columns[other, j]
-            memory.small[row, other] = entry
-        trace += memory.small[row, row]
-    for row in range(count):
-        memory.small[row, row] += SOFTNESS * trace
-    solve_positive(count, memory.small, memory.right)
-    for row in range(count):
-        for j in range(robot.nv):
-            v[j] -= memory.right[row] * memory.columns[row, j]
-
-
-@kernel
-def carry_trunk(robot: ControlledRobot, count: int, memory: Memory, change: Floats) -> None:
+def carry_trunk(standing: int, held: HeldRows, change: Floats) -> None:
     """Move the trunk along with corrected joints, so that the standing points stay in the mean.
 
-    The trunk is heavy: the least change of the velocities would rather undo the corrections.
+    Their rows come first in `held`. The trunk is heavy: the least change of the velocities would
+    rather undo the corrections.
     """
-    z, x = 0.0, 0.0
-    for row in range(0, count, 2):
-        for j in range(robot.nv):
-            z += memory.rows[row, j] * change[j]
-            x += memory.rows[row + 1, j] * change[j]
-    change[0] -= 2.0 * x / count
-    change[1] -= 2.0 * z / count
+    x, z = 0.0, 0.0
+    for point in range(standing):
+        for j in range(change.shape[0]):
+            x += held.rows[2 * point, j] * change[j]
+            z += held.rows[2 * point + 1, j] * change[j]
+    change[0] -= x / standing
+    change[1] -= z / standing
 
 
 @kernel
@@ -211,19 +171,20 @@ def note_standing(
 @kernel
 def predict(robot: ControlledRobot, parameters: Parameters, memory: Memory) -> None:
     """Move the estimate on by a period."""
-    model, seen, step = robot.model, memory.state, parameters.period
-    count = find_rows(robot, parameters, memory)
+    model, seen, step, reaction = robot.model, memory.state, parameters.period, memory.reaction
+    hold_standing(robot, memory)
+    solve_rows(robot.motor, robot.held)
+    find_response(model, seen.kinematics, robot.held, reaction)
     bias_force(model, seen.kinematics, memory.force)
     passive_force(model, seen.q, seen.v, memory.passive)
     for j in range(robot.nv):
         memory.force[j] = memory.passive[j] - memory.force[j]
     for i in range(robot.nu):
         memory.force[model.actuator_joint[i]] += memory.torque[i]
-    solve_factorized(model, memory.factor, memory.force)
+    solve_factorized(model, reaction.factor, memory.force)
     for j in range(robot.nv):
         seen.v[j] += step * memory.force[j]
-    if count > 0:
-        stop_standing(robot, count, memory, seen.v)
+    change_least(robot.held, reaction, seen.v)
     integrate(model, seen.q, seen.v, step, seen.q)
 
 
@@ -260,15 +221,17 @@ def correct(
         seen.q[1] += z / count
         robot.update(seen)
         find_points(robot, parameters, memory)
-    rows = find_rows(robot, parameters, memory)
     if count > 0 and pitch >= 0:
-        carry_trunk(robot, 2 * count, memory, change)
+        hold_standing(robot, memory)
+        carry_trunk(count, robot.held, change)
     for j in range(robot.nv):
         seen.v[j] += change[j]
-    if robot.loops.bias.shape[0] > 0:
-        follow_speeds(robot, seen, 0)
-    if rows > 0:
-        stop_standing(robot, rows, memory, seen.v)
+    follow_speeds(robot, seen)
+    hold_standing(robot, memory)
+    if robot.held.count > 0:
+        solve_rows(robot.motor, robot.held)
+        find_response(robot.model, seen.kinematics, robot.held, memory.reaction)
+        change_least(robot.held, memory.reaction, seen.v)
     robot.update(seen)
 
 

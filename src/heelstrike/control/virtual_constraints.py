@@ -3,9 +3,10 @@
 Outputs y = C (q_a − h_d(θ)) say how far the joints are from the gait at the phase θ that the robot
 has. The torques make them obey ÿ = u(y, ẏ) exactly while the stance foot stays in place
 (input-output linearisation). With the accelerations of foot and joints prescribed, v̇ = a₀ + θ̈ n
-is known but for θ̈, the one motion that no motor reaches; it follows from the moment about the foot,
-mᵀ(A v̇ + H) = 0, m the turning of the robot as one body (Grizzle, Abba and Plestan 2001,
-*Asymptotically stable walking for biped robots*, IEEE Transactions on Automatic Control 46(1)).
+is known but for θ̈, the one motion that no motor reaches. The phase is a row like those of the foot
+that the ground holds (:mod:`heelstrike.dynamics.held`), but nothing pushes along it: of its force,
+which is linear in θ̈, nothing may be left (Grizzle, Abba and Plestan 2001, *Asymptotically stable
+walking for biped robots*, IEEE Transactions on Automatic Control 46(1)).
 """
 
 from __future__ import annotations
@@ -24,9 +25,8 @@ from heelstrike.control.arguments import (
     numbers_of,
     positive,
 )
-from heelstrike.dynamics.kernels import point_bias_acceleration
-from heelstrike.dynamics.places import point_columns
-from heelstrike.dynamics.spatial import Spatial, cross
+from heelstrike.dynamics.held import add_row, force_of_row, solve_rows
+from heelstrike.dynamics.spatial import Spatial
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.robot.model import Floats
@@ -34,7 +34,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-from heelstrike.sim.controller.stance import complete, force_wanted, joint_torques
+from heelstrike.sim.controller.stance import force_wanted, hold_point, joint_torques
 
 # A swing foot that meets the ground before this share of the step scuffs; after it, it lands.
 LANDS_AFTER = 0.5
@@ -193,42 +193,30 @@ def want(
 @kernel
 def hold_foot(
     state: ControlState, contacts: Contacts, robot: ControlledRobot, phase: Floats, foot: int
-) -> tuple[Spatial, tuple[float, float]]:
-    """Write `robot.columns` of a point foot; return what turns about it, and its drift J̇v."""
-    columns, drift = robot.columns, robot.other
-    contact = robot.foot_contact[foot]
-    link, place = robot.model.contact_link[contact], contacts.position[contact]
-    point_columns(robot.model, state.kinematics, link, place, columns)
-    a, b, c = robot.unactuated[0], robot.unactuated[1], robot.unactuated[2]
-    turning = cross(
-        (columns[a, 0], columns[b, 0], columns[c, 0]), (columns[a, 1], columns[b, 1], columns[c, 1])
-    )
-    # In the place of the rotation, which nothing holds: the phase.
-    for j in range(robot.nv):
-        columns[j, 2] = phase[foot, j]
-    point_bias_acceleration(state.kinematics, link, place, drift)
-    return turning, (drift[0], drift[1])
+) -> None:
+    """Hold a point foot; the phase is the last row of `robot.held`."""
+    hold_point(robot, state, contacts, foot)
+    add_row(phase[foot], robot.held)
+    solve_rows(robot.motor, robot.held)
 
 
 @kernel
 def demand(
-    state: ControlState, robot: ControlledRobot, turning: Spatial, drift: tuple[float, float],
-    accelerations: Floats, slope: Floats,
-) -> float:  # fmt: skip
+    state: ControlState, robot: ControlledRobot, accelerations: Floats, slope: Floats
+) -> float:
     """Write `robot.force` that gives joints the accelerations + θ̈ slope, the foot held; tell θ̈."""
-    wanted, force, other = robot.acceleration, robot.force, robot.other
-    along = robot.passive  # it is written anew below
-    complete(robot, (-drift[0], -drift[1], 0.0), accelerations, wanted)
-    # The moment about the foot at θ̈ = 0, and at θ̈ = 1; it is linear in θ̈.
+    whole, force, other, held = robot.acceleration, robot.force, robot.other, robot.held
+    phase, driven = held.count - 1, robot.model.actuator_joint
+    for i in range(robot.nu):
+        whole[driven[i]] = accelerations[i]
+    held.target[phase] = 0.0
     force_wanted(robot, state, force)
-    complete(robot, (0.0, 0.0, 1.0), slope, along)
-    for j in range(robot.nv):
-        wanted[j] += along[j]
+    for i in range(robot.nu):
+        whole[driven[i]] += slope[i]
+    held.target[phase] = 1.0
     force_wanted(robot, state, other)
-    a, b, c = robot.unactuated[0], robot.unactuated[1], robot.unactuated[2]
-    missing = turning[0] * force[a] + turning[1] * force[b] + turning[2] * force[c]
-    with_phase = turning[0] * other[a] + turning[1] * other[b] + turning[2] * other[c]
-    share = -missing / (with_phase - missing)
+    missing = force_of_row(phase, force, held)
+    share = -missing / (force_of_row(phase, other, held) - missing)
     for j in range(robot.nv):
         force[j] += share * (other[j] - force[j])
     return share
@@ -242,8 +230,8 @@ def virtual_constraints(
     """Joint torques that make the outputs obey ÿ = u(y, ẏ) on a point foot."""
     exchange_at_touchdown(state, contacts, robot, parameters, memory)
     want(state, robot, parameters, memory)
-    turning, drift = hold_foot(state, contacts, robot, parameters.phase, memory.stance)
-    demand(state, robot, turning, drift, memory.wanted, memory.slope)
+    hold_foot(state, contacts, robot, parameters.phase, memory.stance)
+    demand(state, robot, memory.wanted, memory.slope)
     joint_torques(robot, torque)
 
 

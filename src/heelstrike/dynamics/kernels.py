@@ -21,7 +21,7 @@ from __future__ import annotations
 from math import cos, sin
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.dynamics.places import place_of, velocity_at
+from heelstrike.dynamics.places import bias_at, place_of, velocity_at
 from heelstrike.dynamics.spatial import (
     linear_momentum_of,
     momentum_of,
@@ -295,12 +295,7 @@ def point_bias_acceleration(
     work: Workspace, link: int, position: Floats, acceleration: Floats
 ) -> None:
     """J̇ v of :func:`point_jacobian`: acceleration of the point and link at zero v̇."""
-    place = place_of(work, position)
-    w = work.velocity[link, 0]
-    vx, vz = velocity_at(work.velocity, link, place)
-    ax, az = velocity_at(work.bias_acceleration, link, place)
-    acceleration[0] = ax + w * vz
-    acceleration[1] = az - w * vx
+    acceleration[0], acceleration[1] = bias_at(work, link, place_of(work, position))
     acceleration[2] = work.bias_acceleration[link, 0]
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
-from heelstrike.dynamics.places import velocity_at
+from heelstrike.dynamics.places import bias_at, velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
 
@@ -88,11 +88,9 @@ def add_end(model: Model, work: Workspace, loop: int, end: int, rows: LoopRows) 
     displacement[along_x] += sign * world_x
     displacement[along_z] += sign * world_z
     place = world_x - work.pivot[0], world_z - work.pivot[1]
-    turn = work.velocity[link, 0]
-    vx, vz = velocity_at(work.velocity, link, place)
-    ax, az = velocity_at(work.bias_acceleration, link, place)
-    bias[along_x] += sign * (ax + turn * vz)
-    bias[along_z] += sign * (az - turn * vx)
+    bias_x, bias_z = bias_at(work, link, place)
+    bias[along_x] += sign * bias_x
+    bias[along_z] += sign * bias_z
     j = link
     while j >= 0:
         column_x, column_z = velocity_at(work.motion, j, place)

@@ -30,6 +30,15 @@ def velocity_at(motion: Floats, i: int, place: Vector) -> Vector:
 
 
 @kernel
+def bias_at(work: Workspace, link: int, place: Vector) -> Vector:
+    """Acceleration (x, z) at v̇ = 0 of the point of a link at a place."""
+    turn = work.velocity[link, 0]
+    vx, vz = velocity_at(work.velocity, link, place)
+    ax, az = velocity_at(work.bias_acceleration, link, place)
+    return ax + turn * vz, az - turn * vx
+
+
+@kernel
 def write_point_rows(
     model: Model,
     work: Workspace,

@@ -7,8 +7,8 @@ coordinate of its own next to those of the joints, and one equation of motion is
 enters: its residual is the moment that the stance ankle would have to exert. A point foot with a
 radius rolls.
 
-Here the trunk's coordinates x, z, pitch are the first three; the first two move every point alike,
-so the systems with J_u are triangular.
+Here the trunk's coordinates x, z, pitch are the first three, and follow from the others
+(:mod:`heelstrike.dynamics.held`).
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 
 from heelstrike.dynamics import kernels
 from heelstrike.dynamics.queries.following import Drive, Joints
+from heelstrike.dynamics.queries.held import HeldRobot, Place
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, traced
 from heelstrike.gait.sole import Sole, leg
 from heelstrike.robot.robot import Robot
 
-Symbols = NDArray[np.object_]
+Symbols = NDArray[Any]
 
 
 class Support:
@@ -73,41 +74,44 @@ class Support:
         self._dynamics = TracedDynamics(robot, _posture(robot, sole, posture))
         self._origin: Symbols = np.zeros(2, dtype=object)
         self._origin = self.place(sole)
-        self._jacobian = self.jacobian(sole)
+        self._held = self.held(sole)
         self.q = self._dynamics.q.copy()
         # The dynamics above is evaluated with the trunk at its reference place, which keeps its
         # coordinates out of the expressions; what is told to the outside is shifted.
         for k in range(2):
             self.q[k] = self.q[k] - self._origin[k] / robot.model.axis[k, k + 1]
-        self.v = self.moving(self._jacobian, velocity)
+        self.v = self.moving(self._held, velocity)
         self._dynamics.v = self.v
         traced(kernels.link_velocities)(robot.model, self.v, self._dynamics.work)
         if acceleration is not None:
             self._solve_forces(acceleration)
 
-    def moving(self, jacobian: Symbols, velocity: Symbols) -> Symbols:
+    def held(self, sole: Sole) -> HeldRobot:
+        """Hold a foot: the first coordinates follow from the others, whose loops are reckoned."""
+        center = self._dynamics.point_position(sole.link, sole.point)
+        place = Place(sole.link, self.place(sole) + self._origin, center, sole.held)
+        return HeldRobot(self._dynamics, [place], dependent=range(sole.held), loops=False)
+
+    def moving(self, held: HeldRobot, velocity: Symbols) -> Symbols:
         """Whole velocity (nv,) from that of the free coordinates, with a foot held that way."""
         first = self._pitched
         joints = self._joints.velocity(velocity[first:])
-        free = np.array([*velocity[:first], *joints], dtype=object)
-        return pinned(jacobian, free, np.zeros(self.sole.held))
+        return held.velocity(self._whole([*velocity[:first], *joints]))
+
+    def _whole(self, free: list[Any]) -> Symbols:
+        return np.array([*np.zeros(self.sole.held), *free], dtype=object)
 
     def free_force(self, rest: Symbols) -> Symbols:
         """Generalised force on the free coordinates, of one on pitch, if free, and all joints."""
-        first = self._pitched
-        return np.array([*rest[:first], *self._joints.force(rest[first:])], dtype=object)
+        first, free = self._pitched, rest[self.sole.held :]
+        return np.array([*free[:first], *self._joints.force(free[first:])], dtype=object)
 
     def _solve_forces(self, acceleration: Symbols) -> None:
-        dynamics, sole = self._dynamics, self.sole
-        # The centre of a disc that rolls on level ground does not accelerate by itself.
-        center = dynamics.point_position(sole.link, sole.point)
-        drift = dynamics.point_bias_acceleration(sole.link, center)[: sole.held]
-        first = self._pitched
+        dynamics, first = self._dynamics, self._pitched
         joints = self._joints.acceleration(acceleration[first:], self.v[3:])
-        free = np.array([*acceleration[:first], *joints], dtype=object)
-        a = pinned(self._jacobian, free, -drift)
+        a = self._held.acceleration(self._whole([*acceleration[:first], *joints]))
         force = dynamics.inverse_dynamics(a) - dynamics.passive_force()
-        self.wrench, rest = reaction(self._jacobian, force)
+        self.wrench, rest = self._held.reaction(force)
         self.missing, self.torque = np.split(self.free_force(rest), [first])
 
     @property
@@ -180,10 +184,10 @@ class Impact:
     """
 
     def __init__(self, before: Support, landing: Sole, velocity: Symbols) -> None:
-        jacobian = before.jacobian(landing)
-        self.v = before.moving(jacobian, velocity)
+        held = before.held(landing)
+        self.v = before.moving(held, velocity)
         momentum = before.mass_matrix() @ (self.v - before.v)
-        self.impulse, rest = reaction(jacobian, momentum)
+        self.impulse, rest = held.reaction(momentum)
         self.rest = before.free_force(rest)
 
 
@@ -201,31 +205,3 @@ def _posture(robot: Robot, sole: Sole, position: Symbols) -> Symbols:
         missing = sole.angle - foot_angle(robot, sole, q)
         q[2] = model.reference[2] + missing / model.axis[2, 0]
     return q
-
-
-def pinned(jacobian: Symbols, free: Symbols, target: NDArray[Any]) -> Symbols:
-    """Complete velocities (or accelerations) so that J v = target (paper eq. 32-34).
-
-    `jacobian` is (held, nv) with rows (x, z) or (x, z, rotation), `free` (nv - held,), `target`
-    (held,).
-    """
-    x, z, *turn = target - jacobian[:, len(jacobian) :] @ free
-    pitch = [missing / jacobian[2, 2] for missing in turn]
-    for angle in pitch:
-        x, z = x - jacobian[0, 2] * angle, z - jacobian[1, 2] * angle
-    return np.array([x / jacobian[0, 0], z / jacobian[1, 1], *pitch, *free], dtype=object)
-
-
-def reaction(jacobian: Symbols, force: Symbols) -> tuple[Symbols, Symbols]:
-    """Wrench F on the pinned foot with J_uᵀ F = f_u, and f_a − J_aᵀ F (paper eq. 36, 37).
-
-    J_u are the columns of the `held` coordinates of the trunk that follow from the others.
-    """
-    held = len(jacobian)
-    x, z = force[0] / jacobian[0, 0], force[1] / jacobian[1, 1]
-    moment = [
-        (turn - jacobian[0, 2] * x - jacobian[1, 2] * z) / jacobian[2, 2] for turn in force[2:held]
-    ]
-    wrench = np.array([x, z, *moment], dtype=object)
-    rest: Symbols = force[held:] - jacobian[:, held:].T @ wrench
-    return wrench, rest

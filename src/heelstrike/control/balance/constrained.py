@@ -1,15 +1,16 @@
 """The robot on its stance foot, as functions of the accelerations of its joints alone.
 
-While the ground holds the stance foot, J v̇ + J̇v = 0 gives the accelerations of the trunk; its
-equations of motion then give the wrench of the ground, and those of the joints the torques (paper
-eq. 32-37). All three are affine in the accelerations of the joints, which are therefore the only
-unknowns of a whole-body controller: what they contribute are the columns found here.
+While the ground holds the stance foot (:mod:`heelstrike.dynamics.held`), the accelerations of the
+trunk, the wrench of the ground and the torques follow from the accelerations of the joints. All
+three are affine in these, which are therefore the only unknowns of a whole-body controller: what
+they contribute are the columns found here.
 """
 
 from __future__ import annotations
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
+from heelstrike.dynamics.held import FREE, force_of_row, given, left_to_motors
 from heelstrike.dynamics.kernels import (
     bias_force,
     mass_matrix,
@@ -17,10 +18,9 @@ from heelstrike.dynamics.kernels import (
     point_bias_acceleration,
 )
 from heelstrike.dynamics.places import point_columns
-from heelstrike.dynamics.spatial import power, scaled, solve_three, spatial
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-from heelstrike.sim.controller.stance import solve_three_transposed
+from heelstrike.sim.controller.stance import hold_sole
 
 
 class Constrained(Bundle):
@@ -37,7 +37,7 @@ class Constrained(Bundle):
         Torques of the actuators: torque a + hold.
     rows, shift : (3, nu) and (3,) float
         Acceleration of a point (x, z, rotation): rows a + shift; see :func:`point_task`.
-    mass, inertia, force, columns, bias : float
+    mass, force, columns : float
         Scratch.
     """
 
@@ -50,10 +50,8 @@ class Constrained(Bundle):
     rows: Floats = array(3, "nu")
     shift: Floats = array(3)
     mass: Floats = array("nv", "nv")
-    inertia: Floats = array("nv", "nu")
     force: Floats = array("nv")
     columns: Floats = array("nv", 3)
-    bias: Floats = array(3)
 
 
 @kernel
@@ -61,66 +59,48 @@ def constrain(
     robot: ControlledRobot, state: ControlState, link: int, sole: Floats, on: Constrained
 ) -> None:
     """Find what depends on the accelerations of the joints while a foot is held at its sole."""
-    find_motion(robot, state, link, sole, on)
+    hold_sole(robot, state, link, sole)
+    find_motion(robot, on)
     find_forces(robot, state, on)
 
 
 @kernel
-def find_motion(
-    robot: ControlledRobot, state: ControlState, link: int, sole: Floats, on: Constrained
-) -> None:
-    """Find `motion` and `drift`; `columns` is then the Jacobian of the stance foot."""
-    columns, rest, driven = on.columns, robot.unactuated, robot.model.actuator_joint
-    point_columns(robot.model, state.kinematics, link, sole, columns)
-    point_bias_acceleration(state.kinematics, link, sole, on.bias)
-    a, b, c = rest[0], rest[1], rest[2]
-    first, second, third = spatial(columns, a), spatial(columns, b), spatial(columns, c)
+def find_motion(robot: ControlledRobot, on: Constrained) -> None:
+    """Find `motion` and `drift`."""
+    held, driven = robot.held, robot.model.actuator_joint
     for j in range(robot.nv):
-        on.drift[j] = 0.0
+        row = held.row[j]
+        on.drift[j] = 0.0 if row == FREE else given(row, held)
         for i in range(robot.nu):
-            on.motion[j, i] = 0.0
-    on.drift[a], on.drift[b], on.drift[c] = solve_three(
-        first, second, third, (-on.bias[0], -on.bias[1], -on.bias[2])
-    )
+            on.motion[j, i] = 0.0 if row == FREE else -held.solved[row, driven[i]]
     for i in range(robot.nu):
-        joint = driven[i]
-        on.motion[joint, i] = 1.0
-        on.motion[a, i], on.motion[b, i], on.motion[c, i] = solve_three(
-            first, second, third, scaled(spatial(columns, joint), -1.0)
-        )
+        on.motion[driven[i], i] = 1.0
 
 
 @kernel
 def find_forces(robot: ControlledRobot, state: ControlState, on: Constrained) -> None:
     """Find wrench and torques by the motion, from the equations A v̇ + H = forces."""
-    rest, driven, columns = robot.unactuated, robot.model.actuator_joint, on.columns
-    a, b, c = rest[0], rest[1], rest[2]
-    first, second, third = spatial(columns, a), spatial(columns, b), spatial(columns, c)
+    rest, driven, held, force = robot.unactuated, robot.model.actuator_joint, robot.held, on.force
     mass_matrix(robot.model, state.kinematics, on.mass)
-    bias_force(robot.model, state.kinematics, on.force)
+    bias_force(robot.model, state.kinematics, force)
     passive_force(robot.model, state.q, state.v, robot.passive)
     for j in range(robot.nv):
-        total = on.force[j] - robot.passive[j]
-        for k in range(3):
-            total += on.mass[j, rest[k]] * on.drift[rest[k]]
-        on.force[j] = total
-        for i in range(robot.nu):
-            total = on.mass[j, driven[i]]
-            for k in range(3):
-                total += on.mass[j, rest[k]] * on.motion[rest[k], i]
-            on.inertia[j, i] = total
-    force, inertia = on.force, on.inertia
-    load = solve_three_transposed(first, second, third, (force[a], force[b], force[c]))
-    on.load[0], on.load[1], on.load[2] = load
+        force[j] -= robot.passive[j]
+        for k in range(rest.shape[0]):
+            force[j] += on.mass[j, rest[k]] * on.drift[rest[k]]
     for j in range(robot.nu):
-        on.hold[j] = force[driven[j]] - power(spatial(columns, driven[j]), load)
+        on.hold[j] = left_to_motors(driven[j], force, held)
+    for k in range(3):
+        on.load[k] = force_of_row(k, force, held)
     for i in range(robot.nu):
-        share = solve_three_transposed(
-            first, second, third, (inertia[a, i], inertia[b, i], inertia[c, i])
-        )
-        on.wrench[0, i], on.wrench[1, i], on.wrench[2, i] = share
+        for j in range(robot.nv):
+            force[j] = on.mass[j, driven[i]]
+            for k in range(rest.shape[0]):
+                force[j] += on.mass[j, rest[k]] * on.motion[rest[k], i]
         for j in range(robot.nu):
-            on.torque[j, i] = inertia[driven[j], i] - power(spatial(columns, driven[j]), share)
+            on.torque[j, i] = left_to_motors(driven[j], force, held)
+        for k in range(3):
+            on.wrench[k, i] = force_of_row(k, force, held)
 
 
 @kernel

@@ -20,10 +20,10 @@ from heelstrike.dynamics import (
     inverse_dynamics,
     link_poses,
     passive_force,
-    point_bias_acceleration,
-    point_jacobian,
     point_position,
 )
+from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.dynamics.queries.held import HeldRobot, Place
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.sole import Sole, leg, sole
 from heelstrike.robot.model import Floats
@@ -137,6 +137,13 @@ def _cubics(phases: Floats, values: Floats) -> Floats:
     return np.ascontiguousarray(coefficients)
 
 
+def _on(robot: Robot, q: Floats, v: Floats, stance: Sole) -> HeldRobot:
+    """The robot with its stance sole held."""
+    at = Evaluation(robot, q, v)
+    link, position = at.point(stance.link, stance.point)
+    return HeldRobot(at, [Place(link, position, position, 3)])
+
+
 def _instant(robot: Robot, gait: Gait, feet: tuple[Sole, Sole], t: float) -> dict[str, float]:
     """What the gait does at a time of its first step."""
     stance, swing = feet
@@ -146,15 +153,14 @@ def _instant(robot: Robot, gait: Gait, feet: tuple[Sole, Sole], t: float) -> dic
     sign = robot.model.axis[2, 0]
     q[2] += sign * (stance.angle - link_poses(robot, q).angle[stance.link])
     q[:2] -= point_position(robot, q, stance.link, stance.point)
-    jacobian = point_jacobian(robot, q, stance.link, stance.point)
     v, acceleration = np.zeros(robot.nv), np.zeros(robot.nv)
     v[joints] = gait.in_step(t, order=1)
-    v[:3] = np.linalg.solve(jacobian[:, :3], -jacobian @ v)
-    drift = point_bias_acceleration(robot, q, v, stance.link, stance.point)
+    v = _on(robot, q, v, stance).velocity(v)
     acceleration[joints] = gait.in_step(t, order=2)
-    acceleration[:3] = np.linalg.solve(jacobian[:, :3], -jacobian @ acceleration - drift)
+    on = _on(robot, q, v, stance)
+    acceleration = on.acceleration(acceleration)
     force = inverse_dynamics(robot, q, v, acceleration) - passive_force(robot, q, v)
-    wrench = np.linalg.solve(jacobian[:, :3].T, force[:3])
+    wrench, _ = on.reaction(force)
     poses = link_poses(robot, q)
     x, height = center_of_mass(robot, q)
     foot = point_position(robot, q, swing.link, swing.point)

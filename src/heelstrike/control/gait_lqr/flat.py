@@ -26,12 +26,12 @@ from heelstrike.contact import (
     ActiveContacts,
     PhaseLinearization,
     linearize_contact,
-    linearize_impact,
 )
 from heelstrike.contact.linearized.slopes import both, contact_slopes, exchanged, following
 from heelstrike.contact.linearized.strikes import strikes
 from heelstrike.control.computed_torque import pitch_of
 from heelstrike.control.gait_lqr.transverse import PERIODS, SETTLED
+from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.model import Floats
@@ -57,10 +57,8 @@ class FlatStance:
     def __init__(self, robot: Robot, foot: int) -> None:
         self.robot, self.foot = robot, robot.feet[foot]
         self.swing = robot.feet[1 - foot]
-        self.sole = ActiveContacts(resting=tuple(self.foot.contacts))
         self.driven = robot.model.actuator_joint
         self.rows = both(robot, self.driven)
-        self.free = np.setdiff1d(np.arange(robot.nv), self.driven)
         self._pitch = pitch_of(robot)
 
     def position(self, joints: Floats) -> Floats:
@@ -79,37 +77,29 @@ class FlatStance:
         order = np.argsort(at_rest[list(self.foot.contacts), 0])
         return places[order[0]], places[order[-1]]
 
-    def velocity(self, q: Floats, rates: Floats) -> Floats:
-        """Velocities (nv,), the foot at rest."""
-        rows = self._rows(q)
-        v = np.zeros(self.robot.nv)
+    def state(self, joints: Floats, rates: Floats) -> tuple[Floats, Floats]:
+        """Coordinates (nq,) and velocities (nv,), the foot at rest."""
+        q, v = self.position(joints), np.zeros(self.robot.nv)
         v[self.driven] = rates
-        v[self.free] = -np.linalg.lstsq(rows[:, self.free], rows[:, self.driven] @ rates)[0]
-        return v
-
-    def _rows(self, q: Floats) -> Floats:
-        jacobian = dynamics.contact_jacobian(self.robot, q)[list(self.foot.contacts)]
-        return np.asarray(jacobian.reshape(-1, self.robot.nv))
+        return q, HeldRobot.on(self.robot, q, self.foot.contacts).velocity(v)
 
     def errors(self, joints: Floats, rates: Floats) -> Floats:
         """Errors of all coordinates by those of the joints, (nq + nv, 2 nu)."""
-        q = self.position(joints)
-        v = self.velocity(q, rates)
-        return following(self.robot, q, v, self.foot.contacts, self.driven)
+        contacts = self.foot.contacts
+        return following(self.robot, *self.state(joints, rates), contacts, self.driven)
 
     def held(self, torque: Floats, joints: Floats, rates: Floats) -> PhaseLinearization:
         """The equations of motion about a state, under torques."""
-        q = self.position(joints)
-        return linearize_contact(self.robot, q, self.velocity(q, rates), torque, self.sole)
+        sole = ActiveContacts(resting=tuple(self.foot.contacts))
+        return linearize_contact(self.robot, *self.state(joints, rates), torque, sole)
 
     def after(self, joints: Floats, rates: Floats) -> Floats:
         """Joints (2 nu,) just after a plastic impact of the swing sole, legs exchanged."""
         mirror = self.robot.mirror
         assert mirror is not None  # see pitch_of
-        q = self.position(joints)
-        struck = ActiveContacts(resting=tuple(self.swing.contacts))
-        v = linearize_impact(self.robot, q, self.velocity(q, rates), struck).velocity
-        return np.concatenate([mirror.position(q), mirror.velocity(v)])[self.rows]
+        q, v = self.state(joints, rates)
+        stopped, _ = HeldRobot.on(self.robot, q, self.swing.contacts).stopped(v)
+        return np.concatenate([mirror.position(q), mirror.velocity(stopped)])[self.rows]
 
 
 class FlatOrbit:
@@ -230,8 +220,7 @@ class FlatOrbit:
         points = stance.swing.contacts
         (second,) = {points[0], points[-1]} - {first}
         joints, rates, _ = self.joints(self.gait.step_duration)
-        q = stance.position(joints)
-        v = stance.velocity(q, rates)
+        q, v = stance.state(joints, rates)
         assert robot.mirror is not None  # see pitch_of
         driven = robot.mirror.among(stance.driven)
         gap = contact_slopes(robot, q, v).gap

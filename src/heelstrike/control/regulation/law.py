@@ -32,15 +32,13 @@ from heelstrike.control.regulation.numbers import (
     Memory,
     Parameters,
 )
-from heelstrike.dynamics.kernels import point_bias_acceleration
-from heelstrike.dynamics.places import point_columns
-from heelstrike.dynamics.spatial import spatial
+from heelstrike.dynamics.held import complete, force_of_row
 from heelstrike.gait.polynomials import motion_in_piece, place_in_step
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-from heelstrike.sim.controller.stance import complete, joint_torques, solve_three_transposed
+from heelstrike.sim.controller.stance import hold_sole, joint_torques
 
 
 @kernel
@@ -88,15 +86,15 @@ def find_forces(
     state: ControlState, robot: ControlledRobot, foot: int, disturbance: Floats, choice: Choice
 ) -> None:
     """Find what motors and ground must supply, as nothing is chosen, and for s̈ = 1 and w = 1."""
-    link, drift = robot.foot_link[foot], robot.other
-    origin = state.kinematics.origin[link]
-    point_columns(robot.model, state.kinematics, link, origin, robot.columns)
-    point_bias_acceleration(state.kinematics, link, origin, drift)
-    target = (-drift[0], -drift[1], -drift[2])
+    link, held = robot.foot_link[foot], robot.held
+    hold_sole(robot, state, link, state.kinematics.origin[link])
     for case in range(3):
-        complete(robot, target, choice.joints[case], robot.acceleration)
+        for i in range(robot.nu):
+            robot.acceleration[robot.model.actuator_joint[i]] = choice.joints[case, i]
+        complete(held, robot.acceleration)
         robot.inverse_dynamics(state, robot.acceleration, choice.force[case])
-        target = (0.0, 0.0, 0.0)
+        for row in range(held.count):
+            held.target[row] = 0.0
     robot.passive_force(state, robot.passive)
     robot.bias_force(state, robot.force)
     for j in range(robot.nv):
@@ -109,8 +107,8 @@ def find_forces(
 def find_conditions(
     state: ControlState, robot: ControlledRobot, parameters: Parameters, foot: int, choice: Choice
 ) -> None:
-    """Find what must not be negative of the ground's wrench, `robot.columns` being the foot's."""
-    link, rest, columns = robot.foot_link[foot], robot.unactuated, robot.columns
+    """Find what must not be negative of the ground's wrench, the foot being in `robot.held`."""
+    link, held = robot.foot_link[foot], robot.held
     ends, angle = robot.foot_sole[foot], state.kinematics.angle[link]
     cosine, sine = np.cos(angle), np.sin(angle)
     along_x, along_z = ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
@@ -120,13 +118,10 @@ def find_conditions(
         (cosine * along_x + sine * along_z) / length,
         (cosine * along_z - sine * along_x) / length,
     )
-    a, b, c = rest[0], rest[1], rest[2]
     for case in range(3):
         force, rows = choice.force[case], choice.conditions
-        fx, fz, moment = solve_three_transposed(
-            spatial(columns, a), spatial(columns, b), spatial(columns, c),
-            (force[a], force[b], force[c]),
-        )  # fmt: skip
+        fx, fz = force_of_row(0, force, held), force_of_row(1, force, held)
+        moment = force_of_row(2, force, held)
         for end in range(2):
             inwards = parameters.margin if end == 0 else -parameters.margin
             x = cosine * ends[end, 0] + sine * ends[end, 1] + inwards * ahead[0]

@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 from heelstrike import dynamics
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
+from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.errors import GaitError
 from heelstrike.gait.phased.phased_gait import PhasedGait
 
@@ -104,8 +105,11 @@ class Surface:
         v = np.zeros(robot.nv)
         v[robot.model.actuator_joint] = gait.joints(theta, order=1)
         v[2] = (1.0 - gait.phase[3:] @ v[3:]) / gait.phase[2]
-        v[:2] = -(self._rows(self.position(theta), self._stance) @ v)
-        return v
+        return self._on_its_foot(self.position(theta)).velocity(v)
+
+    def _on_its_foot(self, q: Floats) -> HeldRobot:
+        """The robot with its stance foot held, where the trunk is following from the rest."""
+        return HeldRobot.on(self.robot, q, [self._stance], dependent=(0, 1))
 
     def _rows(self, q: Floats, contact: int) -> Floats:
         """Jacobian (2, nv) of a contact point, x and z."""
@@ -116,8 +120,7 @@ class Surface:
         """Velocity (nv,) of the robot as one body that turns about its stance foot at 1 rad/s."""
         v = np.zeros(self.robot.nv)
         v[2] = self.robot.model.axis[2, 0]
-        v[:2] = -(self._rows(q, self._stance) @ v)
-        return v
+        return self._on_its_foot(q).velocity(v)
 
     def inertia(self, theta: float) -> float:
         """Angular momentum about the stance foot for a rate 1 of the phase (kg m²)."""
@@ -167,10 +170,8 @@ class Surface:
         mirror = robot.mirror
         assert mirror is not None
         q, v = self.position(before), self.tangent(before)
-        mass = dynamics.mass_matrix(robot, q)
         rows = self._rows(q, self._swing)
-        impulse = np.linalg.solve(rows @ np.linalg.solve(mass, rows.T), -rows @ v)
-        after = v + np.linalg.solve(mass, rows.T @ impulse)
+        after, impulse = HeldRobot.on(robot, q, [self._swing]).stopped(v)
         q_after, v_after = mirror.position(q), mirror.velocity(after)
         q_after[:2] -= dynamics.contact_positions(robot, q_after)[self._stance]
         inertia = dynamics.mass_matrix(robot, q_after)

@@ -10,6 +10,7 @@ import numpy as np
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame, out_of_frame
+from heelstrike.dynamics.held import HeldRows
 from heelstrike.dynamics.inverse_kinematics import Reaching, leg_joints, reach
 from heelstrike.dynamics.kernels import (
     bias_force,
@@ -30,15 +31,14 @@ from heelstrike.dynamics.kernels import (
     point_position,
     point_velocity,
 )
-from heelstrike.dynamics.loops import LoopRows, count_rows
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.spatial import momentum_of, power, spatial
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import sole
-from heelstrike.sim.controller import stance
-from heelstrike.sim.controller import tied as following
+from heelstrike.sim.controller import following, stance
 from heelstrike.sim.controller.interface import Contacts
 
 NO_ENDING = -1
@@ -100,9 +100,10 @@ class ControlledRobot(Bundle):
         A second state for controllers that estimate the first, to be filled at each call; see
         :meth:`update`.
     motor : (nv,) int
-        Actuator of each coordinate, -1 for none. Like the rest of robots with closed loops or
-        coupled joints only.
-    acceleration, force, passive, other, columns, reaching, loops, tied, tied_row, shares
+        Actuator of each coordinate, -1 for none.
+    held : HeldRows
+        What a foot and the loops hold, of the last query that needed it.
+    acceleration, force, passive, other, three, reaching, shares
         Scratch of the queries.
     """
 
@@ -128,13 +129,11 @@ class ControlledRobot(Bundle):
     force: Floats = array("nv")
     passive: Floats = array("nv")
     other: Floats = array("nv")
-    columns: Floats = array("nv", 3)
+    three: Floats = array(3)
     reaching: Reaching = part(Reaching)
-    motor: Integers = array("ties", of=int)
-    loops: LoopRows = part(LoopRows)
-    tied: Floats = array("tied_rows", "nv + 1")
-    tied_row: Integers = array("ties", of=int)
-    shares: Floats = array("shared", "shared")
+    motor: Integers = array("nv", of=int)
+    held: HeldRows = part(HeldRows)
+    shares: Floats = array("nu", "nu")
 
     @kernel
     def stop(self, ending: int) -> None:
@@ -241,7 +240,7 @@ class ControlledRobot(Bundle):
 
         That of the centre of its disc, which rolls on the ground.
         """
-        model, center, found = self.model, self.other, self.columns[0]
+        model, center, found = self.model, self.other, self.three
         link, radius = model.contact_link[contact], model.contact_radius[contact]
         normal = contacts.normal[contact]
         for i in range(2):
@@ -331,7 +330,7 @@ class ControlledRobot(Bundle):
     @kernel
     def center_of_mass_velocity(self, state: ControlState, velocity: Floats) -> None:
         """Velocity (x, z) of the centre of mass."""
-        found = self.columns[0]  # three numbers
+        found = self.three
         momentum(self.model, state.kinematics, found)
         mass, _, _ = first_moments(self.model, state.kinematics)
         velocity[0] = found[0] / mass
@@ -364,7 +363,8 @@ class ControlledRobot(Bundle):
 
 def extents_of(robot: Robot) -> dict[str, int]:
     """Sizes of a robot by the names under which arrays of controllers are declared."""
-    held = 2 * robot.nc + count_rows(robot.model)  # rows of all that ground and loops can hold
+    # Rows of all that ground and loops can hold; a flat foot and one of a law's own at the least.
+    held = max(2 * robot.nc, 4) + count_rows(robot.model)
     return {**robot.model.extents, "components": 2, "held": held}
 
 
@@ -391,16 +391,14 @@ def controlled_robot(robot: Robot) -> ControlledRobot:
         Its sizes and queries, and a state to ask about.
     """
     driven = set(robot.model.actuator_joint.tolist())
-    legs, rows = leg_joints(robot), count_rows(robot.model)
+    legs = leg_joints(robot)
     view = ControlledRobot.allocate(
-        {**extents_of(robot), "loop_rows": rows}, model=robot.model, nf=len(robot.feet),
-        free=robot.nv - len(driven), longest=max(map(len, legs), default=0), mass=robot.total_mass,
-        tied_rows=rows + 3 if rows else 0, ties=robot.nv if rows else 0,
-        shared=robot.nu if rows else 0,
+        {**extents_of(robot), "loop_rows": count_rows(robot.model)}, model=robot.model,
+        nf=len(robot.feet), free=robot.nv - len(driven), longest=max(map(len, legs), default=0),
+        mass=robot.total_mass,
     )  # fmt: skip
-    if rows:
-        view.motor[:] = -1
-        view.motor[robot.model.actuator_joint] = np.arange(robot.nu)
+    view.motor[:] = -1
+    view.motor[robot.model.actuator_joint] = np.arange(robot.nu)
     view.ending = NO_ENDING
     view.contact_foot[:] = -1
     view.leg_joint[:] = -1
