@@ -114,8 +114,10 @@ def rimless_wheel(spokes: int = 8, inertia: float = 0.0, gravity: float = 9.81) 
     )
 
 
-def compass_gait(gravity: float = 9.8) -> Robot:
-    """Two legs of 1 m with 5 kg at their middle and 10 kg at the hip, point masses, point feet.
+def compass_gait(gravity: float = 9.8, radius: float = 1e-12) -> Robot:
+    """Two legs of 1 m with 5 kg at their middle and 10 kg at the hip, point masses.
+
+    Feet are points, or round: discs of a radius whose lowest points are 1 m from the hip.
 
     Coordinates are the hip's x and z and the two leg angles, positive when the foot is behind.
     """
@@ -124,7 +126,7 @@ def compass_gait(gravity: float = 9.8) -> Robot:
         f"""<body name="{side}_leg">
           <joint name="{side}_hip" type="hinge" axis="0 1 0"/>
           <inertial pos="0 0 -0.5" mass="5" diaginertia="{tiny}"/>
-          <geom type="sphere" size="1e-12" pos="0 0 -1"/>
+          <geom type="sphere" size="{radius}" pos="0 0 {radius - 1.0}"/>
         </body>"""
         for side in ("left", "right")
     )

@@ -19,7 +19,6 @@ from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.penetration import penetration
 from heelstrike.analysis.recovery import Recovery, recovery
 from heelstrike.analysis.slip import max_slip, slip_distance
-from heelstrike.analysis.stability.monodromy import Saltation
 from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics, zero_dynamics
 from heelstrike.analysis.summary import Summary, summarize
 from heelstrike.analysis.support import (
@@ -45,6 +44,7 @@ from heelstrike.analysis.zero_moment_point import (
     zero_moment_point_limits,
 )
 from heelstrike.robot.sole import Sole, soles
+from heelstrike.sim.linearized.step import Saltation
 
 __all__ = [
     "Cause",

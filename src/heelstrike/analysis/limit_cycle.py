@@ -14,11 +14,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.poincare_map import Carried, Chart, PoincareMap, Section, derivative
+from heelstrike.analysis.poincare_map import (
+    Carried,
+    Landing,
+    PoincareMap,
+    Section,
+    derivative,
+)
 from heelstrike.analysis.stability.loop import ClosedLoop
 from heelstrike.analysis.stability.repeating import Repeating, repeating_walk
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.linearized.standing import Chart
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
@@ -36,6 +43,8 @@ Floats = NDArray[np.float64]
 DISTURBANCE = 1e-4
 # The same of the multipliers, whose differences have an error of the fourth power of it.
 SHARP_DISTURBANCE = 3e-4
+# How far (m, m/s) a state may be off the section.
+ON_THE_SECTION = 1e-8
 # How often a Newton step is halved when the walk does not go on after it.
 HALVINGS = 6
 
@@ -215,11 +224,10 @@ def find_limit_cycle(
     state, kept = landed.state, landed.memory
     residual = np.inf
     for iteration in range(max_iterations + 1):
-        chart = Chart(section, state)
+        image = _Image(step, section.chart(state), kept)
         end = step(state, kept)
-        change = np.concatenate((chart.coordinates(end.state), end.memory - kept))
+        change = image.coordinates(end)
         residual = float(np.abs(change).max(initial=0.0))
-        image = _Image(step, chart, kept)
         slope = derivative(image, len(change), DISTURBANCE)
         if residual <= tolerance:
             multipliers = np.linalg.eigvals(_sharper(image, slope)).astype(np.complex128)
@@ -287,12 +295,24 @@ class _Image:
 
     def at(self, coordinates: Floats) -> tuple[State, Floats]:
         """Return the state and the memory at some coordinates."""
-        place = self.chart.size
-        return self.chart.state(coordinates[:place]), self.memory + coordinates[place:]
+        place, nq = self.chart.directions.shape[1], self.step.section.robot.nq
+        x = self.chart.moved(coordinates[:place])
+        if self.chart.off(x) > ON_THE_SECTION:
+            raise LimitCycleError("the step leads too far from the states just after touchdown")
+        return State(x[:nq], x[nq:]), self.memory + coordinates[place:]
+
+    def coordinates(self, end: Landing) -> Floats:
+        """Return the coordinates of the end of a step."""
+        if (off := self.chart.off(end.state.vector)) > ON_THE_SECTION:
+            raise LimitCycleError(
+                "the contact points that stand after the step are not those that stood before it "
+                f"({off:.3g} m or m/s between the two)"
+            )
+        there = self.chart.coordinates(end.state.vector)
+        return np.concatenate((there, end.memory - self.memory))
 
     def __call__(self, coordinates: Floats) -> Floats:
-        end = self.step(*self.at(coordinates))
-        return np.concatenate((self.chart.coordinates(end.state), end.memory - self.memory))
+        return self.coordinates(self.step(*self.at(coordinates)))
 
 
 def _sharper(image: _Image, slope: Floats) -> Floats:

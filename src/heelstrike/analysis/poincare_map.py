@@ -3,10 +3,6 @@
 Between the two the legs change their parts. So that a walk which repeats is a fixed point, the
 state after touchdown is relabelled - left and right exchanged, a wheel turned by whole spokes - and
 moved back along the ground.
-
-On this section the feet obey equations: points on the ground have no gap, those that stand have no
-velocity, and where along the ground they are does not matter; closed loops hold, and
-joints are where latches have them. A :class:`Chart` numbers what these leave free.
 """
 
 from __future__ import annotations
@@ -19,15 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.linearized.slopes import along_the_ground, plane
+from heelstrike.contact.linearized.standing import Chart, Standing
 from heelstrike.contact.queries.kinematics import contact_kinematics
-from heelstrike.dynamics import loop_displacement, loop_jacobian
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.event_driven.method import EventDriven
+from heelstrike.sim.linearized.step import SAME_INSTANT
 from heelstrike.sim.run import Run
 from heelstrike.sim.simulation import Simulation, simulate
 from heelstrike.sim.whole_run import whole
@@ -40,16 +39,8 @@ SHALLOW = 1e-4
 # A contact point is on the ground up to this gap (m), and at rest up to this speed (m/s).
 ON_THE_GROUND = 1e-9
 AT_REST = 1e-8
-# Rows of a run within this time (s) of an event belong to it.
-SAME_INSTANT = 1e-11
 # Steps of a walk differ by less than this factor in time: what is simulated beyond a touchdown.
 SLACK = 1.2
-# Disturbance (m, rad, m/s, rad/s) by which the equations of the section are differentiated.
-DISTURBANCE = 1e-5
-# Two directions are one when the sine of the angle between them is below this.
-RANK_TOLERANCE = 1e-7
-# How far (m, m/s) a state may be off the equations of the section.
-ON_THE_SECTION = 1e-8
 
 
 @dataclass(frozen=True)
@@ -59,17 +50,10 @@ class Section:
     robot: Robot
     ground: Ground
 
-    @property
-    def along(self) -> Floats:
-        """Unit vector (x, z) along the ground."""
-        left, right = self.ground.model().vertices[:2]
-        direction: Floats = (right - left) / np.hypot(*(right - left))
-        return direction
-
     def contacts(self, state: State) -> tuple[Floats, Floats, Floats]:
         """Places along the ground, gaps and velocities (normal, tangent) of the contact points."""
         seen = contact_kinematics(self.robot, state.q, state.v, self.ground)
-        return seen.position @ self.along, seen.gap, seen.velocity
+        return seen.position @ along_the_ground(self.ground), seen.gap, seen.velocity
 
     def standing(self, state: State) -> tuple[Flags, Flags]:
         """Which points are on the ground, (nc,), and along which directions at rest, (nc, 2)."""
@@ -80,17 +64,21 @@ class Section:
         at_rest[:, 1] &= at_rest[:, 0]
         return touching, at_rest
 
-    def to_latches(self, state: State) -> Floats:
-        """How far joints are from the ends of their ranges at which latches hold them."""
+    def held(self, state: State) -> Integers:
+        """Joints that are, at rest, where latches hold them or have just let go of them."""
         model = self.robot.model
         joint, above = model.latch_joint, model.latch_side > 0
-        end: Floats = np.where(above, model.upper[joint], model.lower[joint])
-        return end - state.q[joint]
+        way = np.where(above, model.upper[joint], model.lower[joint]) - state.q[joint]
+        there = (np.abs(way) <= ON_THE_GROUND) & (np.abs(state.v[joint]) <= AT_REST)
+        return np.asarray(joint[there])
 
-    def latched(self, state: State) -> Flags:
-        """Which latches have their joints, at rest, where they hold them or have just let go."""
-        there: Flags = np.abs(self.to_latches(state)) <= ON_THE_GROUND
-        return there & (np.abs(state.v[self.robot.model.latch_joint]) <= AT_REST)
+    def chart(self, state: State) -> Chart:
+        """Return coordinates of the states on the section near one of them."""
+        touching, at_rest = self.standing(state)
+        standing = Standing(
+            self.robot, self.ground, touching, at_rest, self.foothold(state), self.held(state)
+        )
+        return Chart(standing, state.vector)
 
     def foothold(self, state: State) -> int:
         """First contact point that stands, or else the lowest."""
@@ -105,7 +93,7 @@ class Section:
         if not 0.0 < depth <= SHALLOW:
             return state
         q = state.q.copy()
-        q[:2] += depth * np.array([-self.along[1], self.along[0]])
+        q[:2] += depth * np.array(plane(self.ground)[0])
         return State(q, state.v)
 
     def moved_back(self, state: State) -> tuple[State, float]:
@@ -113,7 +101,7 @@ class Section:
         place, _, _ = self.contacts(state)
         distance = float(place[self.foothold(state)])
         q = state.q.copy()
-        q[:2] -= distance * self.along
+        q[:2] -= distance * along_the_ground(self.ground)
         return State(q, state.v), distance
 
 
@@ -123,72 +111,6 @@ def derivative(function: Callable[[Floats], Floats], size: int, change: float) -
         (function(each) - function(-each)) / (2.0 * change) for each in change * np.eye(size)
     ]
     return np.array(columns).reshape(size, -1).T
-
-
-class Chart:
-    """Coordinates of the states on the section near one of them, which is their origin.
-
-    Points on the ground stay there, points at rest stay at rest, and the foothold keeps its place.
-    """
-
-    def __init__(self, section: Section, origin: State) -> None:
-        self._section = section
-        self._nq = len(origin.q)
-        self._origin = np.concatenate((origin.q, origin.v))
-        self._touching, self._at_rest = section.standing(origin)
-        self._foothold = section.foothold(origin)
-        self._latched = section.latched(origin)
-        gradient = derivative(
-            lambda change: self._equations(self._origin + change), len(self._origin), DISTURBANCE
-        )
-        _, singular, directions = np.linalg.svd(gradient)
-        rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
-        self._normal = directions[:rank].T
-        self.tangent = directions[rank:].T
-        self._correction = self._normal @ np.linalg.pinv(
-            gradient @ self._normal, rcond=RANK_TOLERANCE
-        )
-
-    @property
-    def size(self) -> int:
-        """Number of coordinates."""
-        return int(self.tangent.shape[1])
-
-    def _equations(self, x: Floats) -> Floats:
-        """What vanishes on the section."""
-        robot, q, v = self._section.robot, x[: self._nq], x[self._nq :]
-        place, gap, velocity = self._section.contacts(State(q, v))
-        way, joint = self._section.to_latches(State(q, v)), robot.model.latch_joint
-        held = way[self._latched], v[joint[self._latched]]
-        loops = loop_displacement(robot, q), loop_jacobian(robot, q) @ v
-        foothold = [place[self._foothold]]
-        return np.concatenate(
-            (gap[self._touching], velocity[self._at_rest], foothold, *loops, *held)
-        )
-
-    def state(self, coordinates: Floats) -> State:
-        """Return the state on the section that has the coordinates."""
-        x = self._origin + self.tangent @ coordinates
-        for _ in range(20):
-            change = self._correction @ self._equations(x)
-            x = x - change
-            if np.abs(change).max() <= 1e-15:
-                break
-        if np.abs(self._equations(x)).max() > ON_THE_SECTION:
-            raise LimitCycleError("the step leads too far from the states just after touchdown")
-        return State(x[: self._nq], x[self._nq :])
-
-    def coordinates(self, state: State) -> Floats:
-        """Return the coordinates of a state on the section."""
-        x = np.concatenate((state.q, state.v))
-        off = np.abs(self._equations(x)).max()
-        if off > ON_THE_SECTION:
-            raise LimitCycleError(
-                "the contact points that stand after the step are not those that stood before it "
-                f"({off:.3g} m or m/s between the two)"
-            )
-        coordinates: Floats = (x - self._origin) @ self.tangent
-        return coordinates
 
 
 @dataclass(frozen=True)
@@ -275,7 +197,7 @@ class PoincareMap:
         carried: Carried = Carried(),  # noqa: B008 - it is frozen
     ) -> None:
         robot = section.robot
-        self._section = section
+        self.section = section
         self._controller = controller
         self._control_period = control_period
         self._carried = carried
@@ -325,8 +247,8 @@ class PoincareMap:
         run, time, contact = self._walk(state, memory)
         row = np.flatnonzero(run.time <= time + SAME_INSTANT)[-1]
         after = self.relabelled(State(run.position[row], run.velocity[row]), contact)
-        after, end = self._section.moved_back(after)
-        _, begin = self._section.moved_back(state)
+        after, end = self.section.moved_back(after)
+        _, begin = self.section.moved_back(state)
         left = np.zeros(0)
         if self._carried.names:
             again = self._simulation(state, memory)
@@ -339,8 +261,8 @@ class PoincareMap:
     def _simulation(self, state: State, memory: Floats | None) -> Simulation:
         """Begin a step."""
         simulation = Simulation(
-            self._section.robot, self._controller, state=state, method=self._method,
-            ground=self._section.ground, control_period=self._control_period,
+            self.section.robot, self._controller, state=state, method=self._method,
+            ground=self.section.ground, control_period=self._control_period,
         )  # fmt: skip
         if memory is not None:
             self._carried.put(memory, simulation)
@@ -359,12 +281,12 @@ class PoincareMap:
             else:
                 run = whole(
                     simulate(
-                        self._section.robot,
+                        self.section.robot,
                         self._controller,
                         state=state,
                         duration=duration,
                         method=self._method,
-                        ground=self._section.ground,
+                        ground=self.section.ground,
                         control_period=self._control_period,
                     )
                 )

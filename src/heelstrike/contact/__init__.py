@@ -2,6 +2,14 @@
 
 from heelstrike.contact.certificate import Certificate
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.linearized.motion import (
+    ActiveContacts,
+    ImpactLinearization,
+    PhaseLinearization,
+    linearize_contact,
+    linearize_impact,
+    saltation_matrix,
+)
 from heelstrike.contact.modes import ContactMode, Solver, SolveStatus
 from heelstrike.contact.problem import ContactSolution, solve_contact
 from heelstrike.contact.queries.force_distribution import ForceDistribution
@@ -14,14 +22,6 @@ from heelstrike.contact.queries.inverse_dynamics import (
     contact_inverse_dynamics,
 )
 from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
-from heelstrike.contact.queries.linearization import (
-    ActiveContacts,
-    ImpactLinearization,
-    PhaseLinearization,
-    linearize_contact,
-    linearize_impact,
-    saltation_matrix,
-)
 
 __all__ = [
     "ActiveContacts",

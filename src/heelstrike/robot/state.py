@@ -25,3 +25,8 @@ class State:
                 raise RobotError(refusal(name, value, ["ArrayLike"]))
         object.__setattr__(self, "q", np.array(self.q, dtype=np.float64))
         object.__setattr__(self, "v", np.array(self.v, dtype=np.float64))
+
+    @property
+    def vector(self) -> NDArray[np.float64]:
+        """Positions, then velocities, (nq + nv,)."""
+        return np.concatenate((self.q, self.v))

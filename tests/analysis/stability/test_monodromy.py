@@ -12,9 +12,9 @@ import walking
 from numpy.typing import NDArray
 
 import heelstrike as hs
-from heelstrike.analysis.stability.variation import Variation
 from heelstrike.experiments.passive import METHOD, passive_walk
 from heelstrike.sim import EventKind
+from heelstrike.sim.linearized.flow import Variation
 
 SLOPE = 0.06
 
@@ -66,6 +66,24 @@ def test_passive_walkers(name: str, events: list[tuple[EventKind, ...]]) -> None
     agree(step, cycle, 2e-8)
     assert [each.kinds for each in step.saltations] == events
     assert all(each.spread == 0.0 for each in step.saltations)
+
+
+def test_round_feet_roll() -> None:
+    """Where a foot stands moves on as it rolls, and not with the point that touches the ground.
+
+    No published walk: the multipliers are those of differences of whole steps, of fourth order.
+    """
+    robot = mechanisms.compass_gait(radius=0.2)
+    ramp = hs.Ground(friction=3.0, slope=-np.deg2rad(2.0))
+    q = np.array([-0.18185358, 0.97727248, -0.23829057, 0.30810374])
+    v = np.array([1.21196193, 0.22552524, 1.2401474, 0.84603571])
+    cycle = hs.find_limit_cycle(robot, hs.State(q, v), ground=ramp, method=METHOD)
+    step = hs.monodromy(robot, cycle.state, ground=ramp, method=METHOD)
+    agree(step, cycle, 5e-8)
+    assert not cycle.stable
+    # What a step makes of errors that the foot on the ground allows are such errors.
+    moved = step.matrix @ step.tangent
+    np.testing.assert_allclose(step.tangent @ (step.tangent.T @ moved), moved, atol=1e-9)
 
 
 @cache

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from heelstrike.analysis.poincare_map import is_wheel
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.linearized.slopes import along_the_ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
@@ -143,9 +144,7 @@ class ClosedLoop:
     @property
     def along(self) -> Floats:
         """Unit vector (x, z) along the ground."""
-        left, right = self.ground.model().vertices[:2]
-        direction: Floats = (right - left) / np.hypot(*(right - left))
-        return direction
+        return along_the_ground(self.ground)
 
     def advanced(self, simulation: Simulation, until: float, doing: str) -> None:
         """Simulate until a time, or say why that did not go.

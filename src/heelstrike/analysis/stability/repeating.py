@@ -170,7 +170,7 @@ def _nearest(loop: ClosedLoop, section: Section, walk: Walk) -> Walk:
 
 def _gone(section: Section, walk: Walk) -> Floats:
     """What the end of a return differs by from its begin, but for the way along the ground."""
-    begin, end = (np.concatenate((each.state.q, each.state.v)) for each in walk.begins)
+    begin, end = (each.state.vector for each in walk.begins)
     return section.flat(end - begin)
 
 

@@ -95,7 +95,7 @@ def returned(
             one_sided.add(name)
         columns.append(0.5 * (sides[0] + sides[1]))
         told.append((seen[0] - seen[1]) / (2.0 * size) if seen else np.zeros(0))
-    missed = section.flat(usual[0] - np.concatenate((begin.state.q, begin.state.v)))
+    missed = section.flat(usual[0] - begin.state.vector)
     return Disturbed(
         matrix=np.array(columns).T,
         seen=np.array(told).T,
@@ -119,7 +119,7 @@ def keeps_step(loop: ClosedLoop, section: Section, walk: Walk) -> Floats | None:
     begin, end = walk.begins[:2]
     rate = section.rate(begin)
     moves = IN_STEP * loop.grid * section.size(section.flat(rate))
-    states = [np.concatenate((each.state.q, each.state.v)) for each in walk.begins]
+    states = [each.state.vector for each in walk.begins]
     if any(section.size(section.flat(b - a)) > moves for a, b in pairwise(states)):
         return None
     way = section.way(begin)
@@ -150,7 +150,7 @@ def stays_early(loop: ClosedLoop, section: Section, walk: Walk) -> float:
             loop.advanced(simulation, end.time, "a walk that is early")
         except LimitCycleError:
             return 0.0
-        here = np.concatenate((end.state.q, end.state.v))
+        here = end.state.vector
         way = section.of(section.later(end, seconds)[0] - here)
         by.append(float(way @ section.of(section.read(simulation)[0] - here) / (way @ way)))
     first = by[1] if len(by) > 2 else by[0]

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.poincare_map import RANK_TOLERANCE, derivative
 from heelstrike.analysis.stability.loop import STANDS, ClosedLoop, Walk
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.linearized.standing import Chart, Standing
 from heelstrike.contact.queries.kinematics import contact_kinematics
-from heelstrike.dynamics import loop_displacement, loop_jacobian
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.state import State
 from heelstrike.sim.compliant.method import Compliant
@@ -28,9 +27,6 @@ TOUCHING, AT_REST = 1e-6, 1e-6
 TURNED = 10.0
 """m/s²: over a fixed step a standing point's Jacobian turns, and by so much of it its speed with
 it."""
-
-CHANGE = 1e-5
-"""Disturbance by which the equations of standing feet are differentiated."""
 
 SHORT = 1e-3
 """Seconds after which a number of the memory shows whether it matters, without samples."""
@@ -122,34 +118,19 @@ class Section:
         lowest = float(seen.gap.min(initial=0.0))
         return {self._loop.foot(int(i)) for i in np.flatnonzero(seen.gap <= lowest + STANDS)}
 
-    def _equations(self, x: Floats) -> Floats:
-        """What a standing robot's errors do not change, and where along the ground it stands."""
-        robot, q, v = self._loop.robot, x[: self._nq], x[self._nq :]
-        seen = contact_kinematics(robot, q, v, self._loop.ground)
-        touching, at_rest = self._standing
-        place = seen.position @ self._loop.along
-        held = robot.model.latch_joint[self._begin.arrays["memory.loops.held"] > 0]
-        first = int(np.argmax(touching)) if touching.any() else 0
-        return np.concatenate(
-            (
-                place[first : first + 1], seen.gap[touching], seen.velocity[at_rest],
-                loop_displacement(robot, q), loop_jacobian(robot, q) @ v, q[held], v[held],
-            )
-        )  # fmt: skip
-
     def _frame(self) -> None:
         """Find the directions: orthonormal in scaled coordinates, feet and place kept."""
-        x = _vector(self._begin)
-        gradient = derivative(lambda dx: self._equations(x + dx), len(x), CHANGE)
-        _, singular, rows = np.linalg.svd(gradient / self._scale)
-        rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
-        scaled = rows[rank:].T
-        self._back = np.linalg.pinv(gradient / self._scale, rcond=RANK_TOLERANCE)
-        self.directions = scaled / self._scale[:, None]
-        way = np.zeros(len(x))
-        way[:2] = self._loop.along
+        loop, (touching, at_rest) = self._loop, self._standing
+        held = loop.robot.model.latch_joint[self._begin.arrays["memory.loops.held"] > 0]
+        first = int(np.argmax(touching)) if touching.any() else 0
+        standing = Standing(loop.robot, loop.ground, touching, at_rest, first, held)
+        self._chart = Chart(standing, self._begin.state.vector, self._scale)
+        self.directions = self._chart.directions
+        way = np.zeros(len(self._scale))
+        way[:2] = loop.along
         # The first is the way along the ground, which is left out: it does not matter.
-        self._read = np.linalg.pinv(np.column_stack((way * self._scale, scaled)))
+        frame = np.column_stack((way, self.directions))
+        self._read = np.linalg.pinv(frame * self._scale[:, None])
 
     def of(self, difference: Floats) -> Floats:
         """Coordinates of a difference of two states (q, v)."""
@@ -191,14 +172,7 @@ class Section:
         """Take up a snapshot, with its coordinates changed."""
         robot, words = coordinates[: self.of_robot], coordinates[self.of_robot :]
         if robot.any():
-            x = _vector(begin)
-            there = self._equations(x)
-            moved = x + self.directions @ robot
-            for _ in range(8):
-                change = (self._back @ (self._equations(moved) - there)) / self._scale
-                moved = moved - change
-                if np.abs(change).max() <= 1e-14:
-                    break
+            moved = self._chart.moved(robot, begin.state.vector)
             begin = begin.moved(State(moved[: self._nq], moved[self._nq :]))
         simulation.restore(begin)
         for place in np.flatnonzero(words):
@@ -206,8 +180,7 @@ class Section:
 
     def read(self, simulation: Simulation) -> tuple[Floats, Floats]:
         """State (q, v) now, and the numbers of the memory in their units."""
-        state = simulation.state
-        return np.concatenate((state.q, state.v)), self.words.read(simulation)
+        return simulation.state.vector, self.words.read(simulation)
 
     def later(self, at: Snapshot, seconds: float) -> tuple[Floats, Floats]:
         """State (q, v) of the walk so much later, and the numbers; instants are that much less."""
@@ -219,7 +192,7 @@ class Section:
 
     def rate(self, at: Snapshot) -> Floats:
         """Rate of the state."""
-        short, here = self._loop.simulation.method.step_length or INSTANT, _vector(at)
+        short, here = self._loop.simulation.method.step_length or INSTANT, at.state.vector
         one, two = (self.later(at, k * short)[0] - here for k in (1, 2))
         return (2.0 * one - 0.5 * two) / short  # but for the square of `short`
 
@@ -389,8 +362,7 @@ class Words:
             self._loop.advanced(simulation, self._begin.time + short, "the walk does not go on")
             numbers = self._all(simulation)
             others = [value for name, value in numbers.items() if name not in names]
-            state = simulation.state
-            return np.concatenate((state.q, state.v, others)).tobytes(), numbers
+            return np.concatenate((simulation.state.vector, others)).tobytes(), numbers
 
         usual_numbers = after([])[1]
 
@@ -403,7 +375,7 @@ class Words:
             usual = np.concatenate((self._usual_state, ours)).tobytes()
             return trace == usual and all(numbers[n] == usual_numbers[n] for n in names)
 
-        self._usual_state = np.concatenate((simulation.state.q, simulation.state.v))
+        self._usual_state = simulation.state.vector
         groups: dict[str, list[str]] = {}
         for name in self.names:
             groups.setdefault(name.split("[")[0], []).append(name)
@@ -443,7 +415,3 @@ def _is(name: str, wanted: str) -> bool:
     """Whether a number is meant by the name of its array, with or without what it is part of."""
     bare = name.removeprefix("memory.")
     return wanted in (name, bare, bare.split("[")[0], name.split("[")[0])
-
-
-def _vector(snapshot: Snapshot) -> Floats:
-    return np.concatenate((snapshot.state.q, snapshot.state.v))

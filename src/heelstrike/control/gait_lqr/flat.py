@@ -6,14 +6,14 @@ its motor: of joints' errors e = (δq, δq̇) at a time s since the last touchdo
     ė = A(s) e + B(s) δτ,    e⁺ = J e⁻.
 
 Heel and toe meet the ground together on the gait. A disturbed foot's come down one after the other,
-and the clock begins anew at the first: the robot goes on to there, suffers a plastic impact of one
-point, turns about it until the other is down, and suffers another. To first order that is J, one
-for either order; the regulator is for their mean.
+and the clock begins anew at the first, which is a section therefore: the robot goes on to there,
+suffers a plastic impact of one point, turns about it until the other is down, and suffers another,
+with a saltation matrix of its own. Their product is J, one for either order; the regulator is for
+their mean.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -22,8 +22,14 @@ from scipy.linalg import block_diag, expm
 from scipy.signal import cont2discrete
 
 from heelstrike import dynamics
+from heelstrike.contact import (
+    ActiveContacts,
+    PhaseLinearization,
+    linearize_contact,
+)
+from heelstrike.contact.linearized.slopes import both, contact_slopes, exchanged, following
+from heelstrike.contact.linearized.strikes import strikes
 from heelstrike.control.computed_torque import pitch_of
-from heelstrike.control.gait_lqr.orbit import SMALL
 from heelstrike.control.gait_lqr.transverse import PERIODS, SETTLED
 from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.errors import ControllerError
@@ -52,6 +58,7 @@ class FlatStance:
         self.robot, self.foot = robot, robot.feet[foot]
         self.swing = robot.feet[1 - foot]
         self.driven = robot.model.actuator_joint
+        self.rows = both(robot, self.driven)
         self._pitch = pitch_of(robot)
 
     def position(self, joints: Floats) -> Floats:
@@ -70,40 +77,29 @@ class FlatStance:
         order = np.argsort(at_rest[list(self.foot.contacts), 0])
         return places[order[0]], places[order[-1]]
 
-    def velocity(self, q: Floats, rates: Floats) -> Floats:
-        """Velocities (nv,), the foot at rest."""
-        v = np.zeros(self.robot.nv)
+    def state(self, joints: Floats, rates: Floats) -> tuple[Floats, Floats]:
+        """Coordinates (nq,) and velocities (nv,), the foot at rest."""
+        q, v = self.position(joints), np.zeros(self.robot.nv)
         v[self.driven] = rates
-        return HeldRobot.on(self.robot, q, self.foot.contacts).velocity(v)
+        return q, HeldRobot.on(self.robot, q, self.foot.contacts).velocity(v)
 
-    def acceleration(self, joints: Floats, rates: Floats, torque: Floats) -> Floats:
-        """Accelerations of the joints (nu,), under torques."""
-        q = self.position(joints)
-        v = self.velocity(q, rates)
-        return self.rate(q, v, torque, self.foot.contacts)[self.driven]
+    def errors(self, joints: Floats, rates: Floats) -> Floats:
+        """Errors of all coordinates by those of the joints, (nq + nv, 2 nu)."""
+        contacts = self.foot.contacts
+        return following(self.robot, *self.state(joints, rates), contacts, self.driven)
 
-    def stopped(self, q: Floats, v: Floats, points: Sequence[int]) -> Floats:
-        """Velocities (nv,) just after a plastic impact of contact points."""
-        return HeldRobot.on(self.robot, q, points).stopped(v)[0]
+    def held(self, torque: Floats, joints: Floats, rates: Floats) -> PhaseLinearization:
+        """The equations of motion about a state, under torques."""
+        sole = ActiveContacts(resting=tuple(self.foot.contacts))
+        return linearize_contact(self.robot, *self.state(joints, rates), torque, sole)
 
-    def rate(self, q: Floats, v: Floats, torque: Floats, points: Sequence[int]) -> Floats:
-        """Accelerations (nv,) while contact points stay in place."""
-        robot = self.robot
-        force = dynamics.applied_force(robot, q, v, torque) - dynamics.bias_force(robot, q, v)
-        return HeldRobot.on(robot, q, points, v).accelerated(force)[0]
-
-    def relabelled(self, q: Floats, v: Floats) -> Floats:
-        """Joints (2 nu,) with legs exchanged."""
+    def after(self, joints: Floats, rates: Floats) -> Floats:
+        """Joints (2 nu,) just after a plastic impact of the swing sole, legs exchanged."""
         mirror = self.robot.mirror
         assert mirror is not None  # see pitch_of
-        return np.concatenate([mirror.position(q)[self.driven], mirror.velocity(v)[self.driven]])
-
-    def after(self, state: Floats) -> Floats:
-        """Joints (2 nu,) just after a plastic impact of the swing sole, legs exchanged."""
-        nu = self.robot.nu
-        q = self.position(state[:nu])
-        v = self.velocity(q, state[nu:])
-        return self.relabelled(q, self.stopped(q, v, self.swing.contacts))
+        q, v = self.state(joints, rates)
+        stopped, _ = HeldRobot.on(self.robot, q, self.swing.contacts).stopped(v)
+        return np.concatenate([mirror.position(q), mirror.velocity(stopped)])[self.rows]
 
 
 class FlatOrbit:
@@ -138,16 +134,10 @@ class FlatOrbit:
 
     def _torque(self, s: float) -> Floats:
         """Torques that make the accelerations, which they do in proportion."""
-        stance, (q, v, wanted) = self.stance, self.joints(s)
-        still = stance.acceleration(q, v, np.zeros(stance.robot.nu))
-        return np.asarray(np.linalg.solve(self._response(q, v), wanted - still))
-
-    def _response(self, q: Floats, v: Floats) -> Floats:
-        """Accelerations of the joints by torques, (nu, nu)."""
-        nu = self.stance.robot.nu
-        still = self.stance.acceleration(q, v, np.zeros(nu))
-        each = [self.stance.acceleration(q, v, one) - still for one in np.eye(nu)]
-        return np.array(each).T
+        q, v, wanted = self.joints(s)
+        still = self.stance.held(np.zeros(self.stance.robot.nu), q, v)
+        speeds = self.stance.robot.nq + self.stance.driven
+        return np.asarray(np.linalg.solve(still.B[speeds], wanted - still.rate[speeds]))
 
     def regulator(self, cost: Floats, effort: Floats, count: int | None = None) -> Floats:
         """Gains (intervals, nu, 2 nu) of the least cost for ever.
@@ -206,19 +196,12 @@ class FlatOrbit:
     @cached_property
     def linear(self) -> list[tuple[Floats, Floats]]:
         """A and B at the instants."""
-        nu = self.stance.robot.nu
-        found = []
-        for s, torque in zip(self.time, self.torque, strict=True):
-            q, v, _ = self.joints(s)
+        return [self._about(s, torque) for s, torque in zip(self.time, self.torque, strict=True)]
 
-            def rate(x: Floats, torque: Floats = torque) -> Floats:
-                return self.stance.acceleration(x[:nu], x[nu:], torque)
-
-            below = _slope(rate, np.concatenate([q, v]))
-            above = np.hstack([np.zeros((nu, nu)), np.eye(nu)])
-            pushes = np.vstack([np.zeros((nu, nu)), self._response(q, v)])
-            found.append((np.vstack([above, below]), pushes))
-        return found
+    def _about(self, s: float, torque: Floats) -> tuple[Floats, Floats]:
+        stance, (joints, rates, _) = self.stance, self.joints(s)
+        linear = stance.held(torque, joints, rates)
+        return linear.A[stance.rows] @ stance.errors(joints, rates), linear.B[stance.rows]
 
     @cached_property
     def jump(self) -> Floats:
@@ -233,43 +216,31 @@ class FlatOrbit:
 
     def _jump(self, first: int) -> Floats:
         """Errors after a touchdown of which one point comes down first, and begins the step."""
-        stance, nu = self.stance, self.stance.robot.nu
+        stance, robot = self.stance, self.stance.robot
         points = stance.swing.contacts
         (second,) = {points[0], points[-1]} - {first}
-        q, v, _ = self.joints(self.gait.step_duration)
-        begin = self.joints(0.0)
-        mirror = stance.robot.mirror
-        assert mirror is not None  # see pitch_of
-        driven = mirror.among(stance.driven)
-        torque = driven.sign * self.torque[0][driven.joint]
-
-        def falls(at: Floats, rate: Floats, point: int) -> float:
-            """Time until a point is down, to first order."""
-            height = dynamics.contact_positions(stance.robot, at)[point, 1]
-            return float(-height / (dynamics.contact_jacobian(stance.robot, at)[point, 0] @ rate))
-
-        def through(state: Floats) -> Floats:
-            at = stance.position(state[:nu])
-            rate = stance.velocity(at, state[nu:])
-            until = falls(at, rate, first)
-            hurry = stance.rate(at, rate, self.torque[-1], stance.foot.contacts)
-            at, rate = at + until * rate, rate + until * hurry
-            rate = stance.stopped(at, rate, (first,))
-            until = falls(at, rate, second)
-            hurry = stance.rate(at, rate, torque, (first,))
-            at, rate = at + until * rate, rate + until * hurry
-            rate = stance.stopped(at, rate, points)
-            passed = np.concatenate([begin[1], begin[2]])
-            return stance.relabelled(at, rate) - until * passed
-
-        return _slope(through, np.concatenate([q, v]))
+        joints, rates, _ = self.joints(self.gait.step_duration)
+        q, v = stance.state(joints, rates)
+        assert robot.mirror is not None  # see pitch_of
+        driven = robot.mirror.among(stance.driven)
+        gap = contact_slopes(robot, q, v).gap
+        one, other = strikes(
+            robot, q, v, stance.held(self.torque[-1], joints, rates).rate,
+            driven.sign * self.torque[0][driven.joint],
+            [
+                (gap[first], ActiveContacts(resting=(first,))),
+                (gap[second], ActiveContacts(resting=tuple(points))),
+            ],
+        )  # fmt: skip
+        landed = other.saltation() @ one.section @ stance.errors(joints, rates)
+        return exchanged(robot, landed)[stance.rows]
 
     @property
     def misses(self) -> float:
         """How far the impact leads from the beginning of the gait (rad, rad/s)."""
         q, v, _ = self.joints(self.gait.step_duration)
         begin = np.concatenate(self.joints(0.0)[:2])
-        return float(np.abs(self.stance.after(np.concatenate([q, v])) - begin).max())
+        return float(np.abs(self.stance.after(q, v) - begin).max())
 
 
 def _held(A: Floats, B: Floats, width: float) -> tuple[Floats, Floats]:
@@ -288,12 +259,3 @@ def _sampled(A: Floats, B: Floats, price: Floats, width: float) -> tuple[Floats,
     found = expm(width * np.block([[-still.T, price], [np.zeros((size, size)), still]]))
     grown = found[size:, size:]
     return grown[:nx, :nx], grown[:nx, nx:], grown.T @ found[:size, size:]
-
-
-def _slope(function: Callable[[Floats], Floats], x: Floats) -> Floats:
-    """Derivative by central differences, (m, n)."""
-    columns = [
-        (function(x + SMALL * one) - function(x - SMALL * one)) / (2.0 * SMALL)
-        for one in np.eye(len(x))
-    ]
-    return np.array(columns).T

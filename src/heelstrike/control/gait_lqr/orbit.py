@@ -14,8 +14,8 @@ from numpy.polynomial import Chebyshev
 from numpy.polynomial.chebyshev import chebder, chebpts1, chebvander
 from numpy.typing import ArrayLike
 
-from heelstrike import dynamics
-from heelstrike.contact import contact_inverse_dynamics
+from heelstrike.contact import ActiveContacts, contact_inverse_dynamics, linearize_contact
+from heelstrike.contact.linearized.slopes import both, following
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.gait.phased.surface import Surface, Touchdown
@@ -25,9 +25,6 @@ NODES = 48
 
 INVARIANT = 1e-6
 """Impacts may lead this far from the beginning of the gait (rad, and in slopes)."""
-
-SMALL = 1e-6
-"""Disturbance (rad, rad/s) of central differences, which cost its square and 1e-16 over it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,13 +134,9 @@ def orbit_of(gait: PhasedGait) -> Orbit:
     hurry = 0.5 * Course.through(first, last, rates**2).slope()(theta)  # θ̈
     acceleration = bend * rates[:, None] ** 2 + tangent * hurry[:, None]
     v = tangent * rates[:, None]
-    torque, A, B = [], [], []
-    for k in range(NODES):
-        moved = Instant(gait, q[k], v[k], acceleration[k])
-        torque.append(moved.torque)
-        A.append(moved.A)
-        B.append(moved.B)
-    courses = (q, v, np.array(torque), rates, np.array(A), np.array(B))
+    each = [about(gait, *instant) for instant in zip(q, v, acceleration, strict=True)]
+    torque, A, B = (np.array(values) for values in zip(*each, strict=True))
+    courses = (q, v, torque, rates, A, B)
     return Orbit(gait, end, *(Course.through(first, last, each) for each in courses))
 
 
@@ -164,43 +157,25 @@ def _rates(surface: Surface, end: Touchdown, theta: Floats) -> Floats:
     return np.asarray(np.sqrt(2.0 * energy) / np.vectorize(surface.inertia)(theta))
 
 
-class Instant:
-    """The torques of the walk at an instant, and the linear equations about it.
+def contacts_of(gait: PhasedGait) -> tuple[int, int]:
+    """Contact points of the foot that stands and of the one that swings."""
+    feet = gait.robot.feet
+    return feet[gait.stance_foot].contacts[0], feet[1 - gait.stance_foot].contacts[0]
 
-    Parameters
-    ----------
-    gait : PhasedGait
-    q, v, acceleration : (nq,), (nv,) and (nv,) float
-        State and acceleration of the walk, its stance foot at rest.
 
-    Attributes
-    ----------
-    torque : (nu,) float
-    A, B : float
-        As of :class:`Orbit`.
+def about(
+    gait: PhasedGait, q: Floats, v: Floats, acceleration: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Torques (nu,) of the walk at an instant, and the linear equations A, B about it.
+
+    The trunk follows the foot, which stands: d/dt (δp, δṗ) are the rows of the robot's own
+    equations, under errors of all its coordinates that are those of p.
     """
-
-    def __init__(self, gait: PhasedGait, q: Floats, v: Floats, acceleration: Floats) -> None:
-        robot, n = gait.robot, gait.robot.nv
-        contact = robot.feet[gait.stance_foot].contacts[0]
-        needed = contact_inverse_dynamics(robot, q, v, acceleration, contacts=[contact])
-        self.torque = needed.torque
-        linear = dynamics.linearize(robot, q, v, self.torque, contacts=[contact])
-
-        def rows(at: Floats) -> Floats:
-            jacobian: Floats = dynamics.contact_jacobian(robot, at)[contact][::-1, 2:]
-            return jacobian
-
-        # The trunk follows the foot: δ(x, z) = −J δp, and ẋ = −J(p) ṗ changes with p, too.
-        follows = np.vstack([-rows(q), np.eye(n - 2)])
-        turns = np.zeros((n, n - 2))
-        for k in range(n - 2):
-            step = SMALL * np.eye(n)[k + 2]
-            turns[:2, k] = -(rows(q + step) - rows(q - step)) @ v[2:] / (2.0 * SMALL)
-        by_position, by_velocity = linear.A[n + 2 :, :n], linear.A[n + 2 :, n:]
-        size = n - 2
-        self.A = np.zeros((2 * size, 2 * size))
-        self.A[:size, size:] = np.eye(size)
-        self.A[size:, :size] = by_position @ follows + by_velocity @ turns
-        self.A[size:, size:] = by_velocity @ follows
-        self.B = np.vstack([np.zeros((size, robot.nu)), linear.B[n + 2 :]])
+    robot, (contact, _) = gait.robot, contacts_of(gait)
+    needed = contact_inverse_dynamics(robot, q, v, acceleration, contacts=[contact])
+    held = ActiveContacts(resting=(contact,))
+    linear = linearize_contact(robot, q, v, needed.torque, held)
+    joints = range(2, robot.nv)
+    rows = both(robot, joints)
+    A = linear.A[rows] @ following(robot, q, v, [contact], joints)
+    return needed.torque, A, linear.B[rows]

@@ -26,8 +26,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import null_space
 
-from heelstrike import dynamics
-from heelstrike.control.gait_lqr.orbit import SMALL, Orbit
+from heelstrike.contact import ActiveContacts, linearize_contact
+from heelstrike.contact.linearized.slopes import both, contact_slopes, exchanged, following
+from heelstrike.contact.linearized.strikes import strikes
+from heelstrike.control.gait_lqr.orbit import Orbit, contacts_of
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats
 
@@ -77,7 +79,7 @@ class Transverse:
         pace = 1.0 / rate
         slopes = basis.T @ across @ orbit.A(theta) @ basis * pace[:, None, None]
         pushes = basis.T @ across @ orbit.B(theta) * pace[:, None, None]
-        jump = basis.T @ across[0] @ _impact_slope(orbit) @ _to_the_ground(orbit) @ basis
+        jump = basis.T @ across[0] @ _touchdown(orbit) @ basis
         return cls(theta, basis, slopes, pushes, pace, jump)
 
     def regulator(self, cost: Floats, effort: Floats) -> CubicSpline:
@@ -134,41 +136,19 @@ def multipliers_of(step: Floats) -> NDArray[np.complex128]:
     return found[np.argsort(-np.abs(found))]
 
 
-def _to_the_ground(orbit: Orbit) -> Floats:
-    """I − f ∇h/(∇h f): the disturbance where the swing foot meets the ground."""
+def _touchdown(orbit: Orbit) -> Floats:
+    """Errors (δp, δṗ) just after the touchdown, legs exchanged, by those just before.
+
+    A plastic impact of the swing foot, on the section that it is: errors at touchdown, whenever
+    that is. They are looked at where the phase is that of the beginning, and it does not matter
+    how late.
+    """
     gait, last = orbit.gait, orbit.q.last
-    q, size = orbit.q(last), gait.robot.nv - 2
-    swing = gait.robot.feet[1 - gait.stance_foot].contacts[0]
-    stance = gait.robot.feet[gait.stance_foot].contacts[0]
-    height = dynamics.contact_jacobian(gait.robot, q)[[swing, stance], 0, 2:]
-    falls = np.concatenate([height[0] - height[1], np.zeros(size)])
-    flow = orbit.slope_at(last)
-    return np.asarray(np.eye(2 * size) - np.outer(flow, falls) / (falls @ flow))
-
-
-def _impact_slope(orbit: Orbit) -> Floats:
-    """Derivative of the impact with legs exchanged, by central differences."""
-    q, v = orbit.q(orbit.q.last), orbit.v(orbit.q.last)
-    x = np.concatenate([q[2:], v[2:]])
-    columns = [
-        (_after(orbit, x + SMALL * each) - _after(orbit, x - SMALL * each)) / (2.0 * SMALL)
-        for each in np.eye(len(x))
-    ]
-    return np.array(columns).T
-
-
-def _after(orbit: Orbit, x: Floats) -> Floats:
-    """State (p, ṗ) just after a plastic impact of the swing foot, relabelled."""
-    gait, robot = orbit.gait, orbit.gait.robot
-    size = robot.nv - 2
-    q = np.concatenate([np.zeros(2), x[:size]])
-    jacobian = dynamics.contact_jacobian(robot, q)
-    stance = jacobian[robot.feet[gait.stance_foot].contacts[0]]
-    swing = jacobian[robot.feet[1 - gait.stance_foot].contacts[0]]
-    v = np.concatenate([np.zeros(2), x[size:]])
-    v[:2] = np.linalg.solve(stance[:, :2], -stance @ v)
-    mass = dynamics.mass_matrix(robot, q)
-    stopped = np.linalg.solve(mass, swing.T)
-    v = v - stopped @ np.linalg.solve(swing @ stopped, swing @ v)
-    assert robot.mirror is not None  # see PhasedGait
-    return np.concatenate([robot.mirror.position(q)[2:], robot.mirror.velocity(v)[2:]])
+    robot, (stance, swing) = gait.robot, contacts_of(gait)
+    q, v, torque = orbit.q(last), orbit.v(last), orbit.torque(last)
+    rate = linearize_contact(robot, q, v, torque, ActiveContacts(resting=(stance,))).rate
+    gap, struck = contact_slopes(robot, q, v).gap[swing], ActiveContacts(resting=(swing,))
+    (strike,) = strikes(robot, q, v, rate, torque, [(gap, struck)])
+    joints = range(2, robot.nv)
+    errors = strike.section @ following(robot, q, v, [stance], joints)
+    return exchanged(robot, errors)[both(robot, joints)]

@@ -79,16 +79,9 @@ def linearize(
     position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
     gamma = joint_vector(robot, "torque", torque)
     n, k = robot.nv, 2 * len(held)
-    size = n + k + count_rows(robot.model)
-    equations, derivatives = _equations(robot, held)
-    nothing = np.zeros(size)
-    constant = np.array(equations(position, velocity, nothing, gamma)).ravel()
-    system = np.array(derivatives(position, velocity, nothing, gamma)[0])
-    solution = _solved(system, -constant[:, None], n)[:, 0]
-    slopes = [np.array(part) for part in derivatives(position, velocity, solution, gamma)]
-    # Implicit differentiation: the equations stay satisfied.
-    rates = _solved(system, -np.hstack(slopes[1:]), n)
-    by_state, by_torque = rates[:, : 2 * n], rates[:, 2 * n :]
+    solution, by_state, by_torque = implicit_motion(
+        *_equations(robot, held), position, velocity, gamma
+    )
     upper = np.hstack([np.zeros((n, n)), np.eye(n)])
     return Linearization(
         A=np.vstack([upper, by_state[:n]]),
@@ -100,13 +93,42 @@ def linearize(
     )
 
 
-def _solved(system: Floats, right: Floats, n: int) -> Floats:
-    """Solve for n accelerations, which are unique, and contact forces, the shortest there are.
+def implicit_motion(
+    equations: casadi.Function, derivatives: casadi.Function, q: Floats, v: Floats, torque: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Solve equations of motion for accelerations and forces, and differentiate what they tell.
 
-    Accelerations are scaled by the mass matrix's diagonal, so that light links count as heavy ones.
+    Parameters
+    ----------
+    equations : casadi.Function
+        What must vanish, of (q, v, (v̇, λ), Γ).
+    derivatives : casadi.Function
+        Its Jacobians by (v̇, λ), (q, v) and Γ.
+    q, v, torque : (nq,), (nv,) and (nu,) float
+
+    Returns
+    -------
+    tuple of float arrays
+        (v̇, λ), and its derivatives by (q, v) and Γ.
+    """
+    nothing = np.zeros(equations.size1_in(2))
+    system = np.array(derivatives(q, v, nothing, torque)[0])
+    constant = np.array(equations(q, v, nothing, torque)).reshape(-1, 1)
+    solution = solved(system, -constant, len(v))[:, 0]
+    slopes = [np.array(part) for part in derivatives(q, v, solution, torque)]
+    # Implicit differentiation: the equations stay satisfied.
+    rates = solved(system, -np.hstack(slopes[1:]), len(v))
+    by_state, by_torque = np.split(rates, [len(q) + len(v)], axis=1)
+    return solution, by_state, by_torque
+
+
+def solved(system: Floats, right: Floats, n: int) -> Floats:
+    """Solve for n accelerations or velocities, which are unique, and the least forces.
+
+    The first are scaled by the mass matrix's diagonal, so that light links count as heavy ones.
     """
     scale = np.ones(len(system))
-    scale[:n] = 1.0 / np.sqrt(np.diag(system)[:n])
+    scale[:n] = 1.0 / np.sqrt(np.abs(np.diag(system)[:n]))
     scaled = scale[:, None] * system * scale
     solution = np.linalg.lstsq(scaled, scale[:, None] * right, rcond=1e-12)[0]
     return np.asarray(scale[:, None] * solution, np.float64)

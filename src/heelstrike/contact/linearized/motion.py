@@ -16,10 +16,12 @@ from numpy.typing import ArrayLike
 
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.linearized.slopes import plane
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.places import write_point_rows
 from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
+from heelstrike.dynamics.queries.linearization import implicit_motion, solved
 from heelstrike.errors import ContactProblemError, RobotError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
@@ -122,19 +124,13 @@ def linearize_contact(
     """
     position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
     gamma = joint_vector(robot, "torque", torque)
-    flow, slopes, _ = _equations(robot, _checked(robot, active), *_plane(ground))
-    n, m = robot.nv, flow.size1_in(2)
-    nothing = np.zeros(m)
-    system = np.array(slopes(position, velocity, nothing, gamma)[0])
-    constant = np.array(flow(position, velocity, nothing, gamma)).reshape(-1, 1)
-    solution = _solved(system, -constant, n)[:, 0]
-    parts = [np.array(part) for part in slopes(position, velocity, solution, gamma)]
-    rates = _solved(system, -np.hstack(parts[1:]), n)[:n]  # the equations stay satisfied
-    size = robot.nq + n
+    flow, slopes, _ = _equations(robot, _checked(robot, active), *plane(ground))
+    solution, by_state, by_torque = implicit_motion(flow, slopes, position, velocity, gamma)
+    n = robot.nv
     upper = np.hstack([np.zeros((robot.nq, robot.nq)), np.eye(robot.nq, n)])
     return PhaseLinearization(
-        A=np.vstack([upper, rates[:, :size]]),
-        B=np.vstack([np.zeros((robot.nq, robot.nu)), rates[:, size:]]),
+        A=np.vstack([upper, by_state[:n]]),
+        B=np.vstack([np.zeros((robot.nq, robot.nu)), by_torque[:n]]),
         rate=np.concatenate([velocity, solution[:n]]),
     )
 
@@ -186,14 +182,14 @@ def linearize_impact(
     True
     """
     position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
-    _, _, slopes = _equations(robot, _checked(robot, active), *_plane(ground))
+    _, _, slopes = _equations(robot, _checked(robot, active), *plane(ground))
     n, m = robot.nv, slopes.size1_in(2)
     nothing = np.zeros(m)
     system, _, by_velocity, _ = map(np.array, slopes(position, velocity, nothing))
     constant = np.array(slopes(position, velocity, nothing)[3])
-    solution = _solved(system, -constant.reshape(-1, 1), n)[:, 0]
+    solution = solved(system, -constant.reshape(-1, 1), n)[:, 0]
     by_position = np.array(slopes(position, velocity, solution)[1])
-    after = _solved(system, -np.hstack([by_position, by_velocity]), n)[:n]
+    after = solved(system, -np.hstack([by_position, by_velocity]), n)[:n]
     upper = np.hstack([np.eye(robot.nq), np.zeros((robot.nq, n))])
     return ImpactLinearization(velocity=solution[:n], reset=np.vstack([upper, after]))
 
@@ -265,26 +261,6 @@ def _checked(robot: Robot, active: ActiveContacts) -> ActiveContacts:
             f"robot {robot.name!r} has joints 0 to {robot.nv - 1}, not {list(active.joints)}"
         )
     return active
-
-
-def _plane(ground: Ground | None) -> tuple[tuple[float, float], float, float]:
-    """Return normal, friction and restitution of ground that is one line."""
-    terrain = (Ground() if ground is None else ground).model()
-    if len(terrain.friction) > 1:
-        raise SimulationError(
-            "contact is linearised on level or sloping ground, the same everywhere"
-        )
-    nx, nz = terrain.normal[0].tolist()
-    return (nx, nz), float(terrain.friction[0]), float(terrain.restitution[0])
-
-
-def _solved(system: Floats, right: Floats, n: int) -> Floats:
-    """Solve for n accelerations or velocities, which are unique, and the least forces."""
-    scale = np.ones(len(system))
-    scale[:n] = 1.0 / np.sqrt(np.abs(np.diag(system)[:n]))
-    scaled = scale[:, None] * system * scale
-    solution = np.linalg.lstsq(scaled, scale[:, None] * right, rcond=1e-12)[0]
-    return np.asarray(scale[:, None] * solution, np.float64)
 
 
 @lru_cache(maxsize=64)

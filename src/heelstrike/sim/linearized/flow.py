@@ -10,8 +10,9 @@ import numpy as np
 from numpy.polynomial import Polynomial, legendre
 from numpy.typing import NDArray
 
+from heelstrike.contact.linearized.motion import ActiveContacts, linearize_contact
+from heelstrike.contact.linearized.slopes import ContactSlopes, contact_slopes
 from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
-from heelstrike.contact.queries.linearization import ActiveContacts, linearize_contact
 from heelstrike.errors import SimulationError
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.in_python import AskedLaw
@@ -137,8 +138,9 @@ class Variation:
         kept = simulation.snapshot().part("control")
         numbers = np.concatenate((kept["parameters"], kept["kept"]))
         at = contact_kinematics(self._robot, state.q, state.v, self._ground)
+        slopes = contact_slopes(self._robot, state.q, state.v, self._ground)
         force = simulation.contacts.force
-        return _Instant(self._asked, numbers, simulation.time, state, at, force)
+        return _Instant(self._asked, numbers, simulation.time, state, at, slopes, force)
 
     def _check_beginning(self) -> None:
         """Refuse a law that acts on what it made of the state in which the step began."""
@@ -209,17 +211,18 @@ class _Instant:
     time: float
     state: State
     at: ContactKinematics
+    slopes: ContactSlopes
     force: Floats
 
     def torque(self, change: Floats | None = None) -> Floats:
         """What it asks for in a state changed by so little; it forgets the call."""
         nq = len(self.state.q)
         change = np.zeros(nq + len(self.state.v)) if change is None else change
-        moved = self.at.jacobian @ change[:nq]
-        tangent = np.column_stack((self.at.normal[:, 1], -self.at.normal[:, 0]))
+        normal, gap, place = self.at.normal, self.slopes.gap @ change, self.slopes.place @ change
+        along = np.column_stack((normal[:, 1], -normal[:, 0]))
         seen = Contacts(
-            position=self.at.position + moved[:, :1] * self.at.normal + moved[:, 1:] * tangent,
-            normal=self.at.normal, gap=self.at.gap + moved[:, 0], force=self.force,
+            position=self.at.position + gap[:, None] * normal + place[:, None] * along,
+            normal=normal, gap=self.at.gap + gap, force=self.force,
         )  # fmt: skip
         self.asked.restore(self.numbers)
         there = State(self.state.q + change[:nq], self.state.v + change[nq:])

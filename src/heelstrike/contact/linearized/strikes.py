@@ -1,0 +1,86 @@
+"""What comes down in one instant, one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from heelstrike.contact.ground import Ground
+from heelstrike.contact.linearized.motion import (
+    ActiveContacts,
+    ImpactLinearization,
+    linearize_contact,
+    linearize_impact,
+    saltation_matrix,
+)
+from heelstrike.contact.workspace import Floats
+from heelstrike.robot.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Strike:
+    """One of them.
+
+    Attributes
+    ----------
+    gradient : (nq + nv,) float
+        Derivative of the gap that closes.
+    before, after : (nq + nv,) float
+        Rates of the state: after those that came down before it, and after it.
+    impact : ImpactLinearization
+        Its impact.
+    """
+
+    gradient: Floats
+    before: Floats
+    after: Floats
+    impact: ImpactLinearization
+
+    def saltation(self, after: Floats | None = None) -> Floats:
+        """Saltation matrix, under the rate after it or another."""
+        rate = self.after if after is None else after
+        return saltation_matrix(self.impact.reset, self.gradient, self.before, rate)
+
+    @property
+    def section(self) -> Floats:
+        """The same where the undisturbed walk waits for the disturbed: errors at the event."""
+        return self.saltation(np.zeros(len(self.before)))
+
+
+def strikes(
+    robot: Robot, q: Floats, v: Floats, rate: Floats, torque: Floats,
+    order: Sequence[tuple[Floats, ActiveContacts]], ground: Ground | None = None,
+) -> list[Strike]:  # fmt: skip
+    """Let contact points, or joints at stops, come down in an order.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q, v : (nq,) and (nv,) float
+        State just before.
+    rate : (nq + nv,) float
+        Its rate then.
+    torque : (nu,) float
+        Joint torques afterwards.
+    order : sequence of ((nq + nv,) float, ActiveContacts)
+        Of each the derivative of its gap, and what takes part in its impact and holds after it.
+    ground : Ground, optional
+        As of :func:`~heelstrike.linearize_impact`.
+
+    Returns
+    -------
+    list of Strike
+        None of an order in which one would not come down after those before it.
+    """
+    found: list[Strike] = []
+    for gradient, active in order:
+        if found and gradient @ rate >= 0.0:
+            return []
+        impact = linearize_impact(robot, q, v, active, ground=ground)
+        v, before = impact.velocity, rate
+        rate = linearize_contact(robot, q, v, torque, active, ground=ground).rate
+        found.append(Strike(gradient, before, rate, impact))
+    return found

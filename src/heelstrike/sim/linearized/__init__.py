@@ -1,0 +1,1 @@
+"""What small errors do in a motion that was simulated."""

@@ -1,0 +1,348 @@
+"""A motion between two instants, linearised event by event: flows between them, saltations at them.
+
+A motion that an event-driven simulation has made is gone through once more. Between two events the
+variational equation is integrated, with derivatives of the equations of motion that are exact; at
+an event the error goes through its saltation matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise, permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.contact.linearized.motion import (
+    ActiveContacts,
+    linearize_contact,
+    saltation_matrix,
+)
+from heelstrike.contact.linearized.slopes import ContactSlopes, contact_slopes
+from heelstrike.contact.linearized.strikes import Strike, strikes
+from heelstrike.errors import SimulationError
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.linearized.flow import Variation
+from heelstrike.sim.run import Event, Run
+
+Floats = NDArray[np.float64]
+
+SAME_INSTANT = 1e-11
+"""Rows of a run within this time (s) of an event belong to it."""
+
+SLIPS = 1e-9
+"""Points on the ground that are faster than this (m/s) slide."""
+
+FITS = 1e-6
+"""An impact that is recomputed agrees with the simulation's to this (m/s, rad/s)."""
+
+MOST_TOGETHER = 3
+"""Contact points that come down in one instant, in any order."""
+
+NOT_SMOOTH = (
+    EventKind.ZENO, EventKind.PAINLEVE, EventKind.ENERGY_GAIN, EventKind.BRIDGE, EventKind.WEDGED,
+    EventKind.JOINT_SLIP, EventKind.JOINT_STICK,
+)  # fmt: skip
+"""Events behind which errors have no derivative that is known here."""
+
+APPROACHES = 1e-8
+"""What comes down on the ground or to a stop faster than this (m/s, rad/s) was not there."""
+
+SWITCHES = (EventKind.STICK, EventKind.SLIP_REVERSAL)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Saltation:
+    """An event of a step and what it does to small errors.
+
+    Attributes
+    ----------
+    time : float
+        When, in s.
+    kinds : tuple of EventKind
+        What happened then.
+    matrix : (nq + nv, nq + nv) float
+        The saltation matrix: error just after of an error just before. The identity at lift-offs
+        and where slip begins, as forces are continuous there. Of the touchdown that ends a step,
+        that of the error on the section: at touchdown, whenever that is.
+    spread : float
+        Where several points come down in one instant, errors decide in which order; the matrix is
+        then the mean of those of all orders, which differ by so much at most.
+    """
+
+    time: float
+    kinds: tuple[EventKind, ...]
+    matrix: Floats
+    spread: float
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A motion, linearised from its beginning to its last event.
+
+    Attributes
+    ----------
+    flows : tuple of (nq + nv, nq + nv) float
+        What the smooth motion before each event does to errors (δq, δv).
+    saltations : tuple of Saltation
+        What the events do, in their order; the last is a section.
+    arrival : Strike or None
+        The one contact point that comes down in the last, if it is one.
+    """
+
+    flows: tuple[Floats, ...]
+    saltations: tuple[Saltation, ...]
+    arrival: Strike | None
+
+    @property
+    def matrix(self) -> Floats:
+        """Errors at the last event by errors at the beginning, (nq + nv, nq + nv)."""
+        return self.saltations[-1].matrix @ self.until_the_last
+
+    @property
+    def until_the_last(self) -> Floats:
+        """The same just before the last event."""
+        matrix = self.flows[0]
+        for event, flow in zip(self.saltations, self.flows[1:], strict=False):
+            matrix = flow @ event.matrix @ matrix
+        return matrix
+
+
+def linearized(run: Run, until: float, variation: Variation) -> Motion:
+    """Linearise the beginning of a run, up to an event.
+
+    Parameters
+    ----------
+    run : Run
+        A run of an event-driven simulation that goes a little beyond.
+    until : float
+        When the event is (s).
+    variation : Variation
+        The variational equation of the same motion.
+
+    Raises
+    ------
+    SimulationError
+        If a controller or an event cannot be linearised; the message says which and why.
+    """
+    _refuse(run.robot, run, until)
+    instants = _instants(run, until)
+    bounds = list(pairwise([0.0, *(events[0].time for events in instants)]))
+    held: list[ActiveContacts | None] = [_active(run, *each) for each in bounds]
+    flows, saltations = [], []
+    for k, (events, begin_and_end) in enumerate(zip(instants, bounds, strict=True)):
+        before = held[k]
+        assert before is not None
+        flows.append(variation.flow(*begin_and_end, before))
+        instant = _Instant(run, tuple(events), before, [*held, None][k + 1])
+        saltations.append(instant.saltation())
+    return Motion(tuple(flows), tuple(saltations), instant.arrival())
+
+
+def _refuse(robot: Robot, run: Run, period: float) -> None:
+    """Refuse steps whose errors have no derivative that is known here."""
+    if np.any(robot.model.dry_friction > 0.0):
+        raise SimulationError(
+            f"dry friction in the joints of {robot.name!r} cannot be linearised here; "
+            "hs.find_limit_cycle takes differences instead"
+        )
+    if np.any(run.brake_torque):
+        raise SimulationError(
+            f"brakes of {robot.name!r} are on, which is not linearised here; "
+            "hs.find_limit_cycle takes differences instead"
+        )
+    if run.saturations:
+        raise SimulationError(
+            "torques were clipped at the limits of the motors: a law that cannot do what it asks "
+            "for is not linearised here; hs.find_limit_cycle takes differences instead"
+        )
+    for event in run.events:
+        if event.kind in NOT_SMOOTH and event.time <= period:
+            raise SimulationError(
+                f"an event of kind {event.kind.name} at t = {event.time:.6g} s cannot be "
+                "linearised; hs.find_limit_cycle takes differences instead"
+            )
+
+
+def _instants(run: Run, period: float) -> list[list[Event]]:
+    """Events of the step, those of one instant together."""
+    instants: list[list[Event]] = []
+    for event in run.events:
+        if not 0.0 < event.time <= period + SAME_INSTANT:
+            continue
+        if instants and event.time - instants[-1][0].time <= SAME_INSTANT:
+            instants[-1].append(event)
+        else:
+            instants.append([event])
+    return instants
+
+
+def _active(run: Run, begin: float, end: float) -> ActiveContacts:
+    """What holds the robot between two events, as the row nearest to their middle shows it."""
+    row = int(np.argmin(np.abs(run.time - 0.5 * (begin + end))))
+    if not begin + SAME_INSTANT < run.time[row] < end - SAME_INSTANT:
+        # Too short for a row of its own: the last of the first instant says what comes after it.
+        row = int(np.flatnonzero(run.time <= begin + SAME_INSTANT)[-1])
+    down = [i for i in range(run.robot.nc) if run.contact_force[row, i, 0] > 0.0]
+    speed = run.slip_velocity[row]
+    return ActiveContacts(
+        resting=tuple(i for i in down if abs(speed[i]) <= SLIPS),
+        sliding=tuple((i, 1 if speed[i] > 0.0 else -1) for i in down if abs(speed[i]) > SLIPS),
+        joints=tuple(int(j) for j in np.flatnonzero(run.stop_torque[row])),
+    )
+
+
+@dataclass(frozen=True)
+class _Instant:
+    """Events of one instant, what held before and what holds after, if the motion goes on."""
+
+    run: Run
+    events: tuple[Event, ...]
+    held: ActiveContacts
+    after: ActiveContacts | None
+
+    @property
+    def time(self) -> float:
+        return self.events[0].time
+
+    @cached_property
+    def rows(self) -> tuple[int, int]:
+        """Rows just before and just after."""
+        there = np.flatnonzero(np.abs(self.run.time - self.time) <= SAME_INSTANT)
+        return int(there[0]), int(there[-1])
+
+    @cached_property
+    def before(self) -> Floats:
+        """Rate of the state before."""
+        return self._rate(self.rows[0], self.held)
+
+    @cached_property
+    def rate(self) -> Floats:
+        """Rate of the state after; none of a section."""
+        if self.after is None:
+            return np.zeros(len(self.before))
+        return self._rate(self.rows[1], self.after)
+
+    @cached_property
+    def slopes(self) -> ContactSlopes:
+        """Derivatives of gaps and velocities before."""
+        run, row = self.run, self.rows[0]
+        return contact_slopes(run.robot, run.position[row], run.velocity[row], run.ground)
+
+    @cached_property
+    def struck(self) -> list[Event]:
+        """What receives impulses."""
+        return [event for event in self.events if event.impulse[0] != 0.0]
+
+    @cached_property
+    def fresh(self) -> list[Event]:
+        """Of these, what comes down; the others were on the ground or at their stops."""
+        return [
+            each for each in self.struck if self._gap_gradient(each) @ self.before < -APPROACHES
+        ]
+
+    def saltation(self) -> Saltation:
+        kinds = tuple(dict.fromkeys(event.kind for event in self.events))
+        switched = [event.contact for event in self.events if event.kind in SWITCHES]
+        spread, matrix = 0.0, np.eye(len(self.before))
+        if self.struck:
+            matrices = [self._through(order) for order in self._orders()]
+            matrix = np.mean(matrices, axis=0)
+            spread = max(
+                float(np.abs(one - other).max()) for one, other in product(matrices, matrices)
+            )
+        elif switched and self.after is not None:  # a speed that vanishes is the event
+            speed = self.slopes.velocity[switched[0], 1]
+            matrix = saltation_matrix(matrix, speed, self.before, self.rate)
+        return Saltation(time=self.time, kinds=kinds, matrix=matrix, spread=spread)
+
+    def arrival(self) -> Strike | None:
+        """The one contact point that comes down."""
+        if len(self.fresh) != 1 or self.fresh[0].kind.of_joint:
+            return None
+        return self._orders()[0][-1]
+
+    def _rate(self, row: int, active: ActiveContacts) -> Floats:
+        run = self.run
+        q, v, torque = run.position[row], run.velocity[row], run.torque[row]
+        return linearize_contact(run.robot, q, v, torque, active, ground=run.ground).rate
+
+    def _through(self, order: list[Strike]) -> Floats:
+        """Matrix of what comes down in an order."""
+        matrix = order[-1].saltation(self.rate)
+        for strike in order[-2::-1]:
+            matrix = matrix @ strike.saltation()
+        return matrix
+
+    def _orders(self) -> list[list[Strike]]:
+        """The orders in which points that come down together may do so."""
+        if len(self.fresh) > MOST_TOGETHER:
+            raise SimulationError(
+                f"{len(self.fresh)} contact points come down together at t = {self.time:.6g} s: "
+                "more orders than are gone through here"
+            )
+        orders = [order for each in permutations(self.fresh) if (order := self._in_order(each))]
+        if not orders:
+            raise SimulationError(
+                f"the impact at t = {self.time:.6g} s cannot be linearised: nothing comes down in "
+                "it, or of several points none after the other"
+            )
+        return orders
+
+    def _in_order(self, order: Sequence[Event]) -> list[Strike]:
+        """What comes down in an order; nothing if a point would not after those before it."""
+        run, (first, last) = self.run, self.rows
+        friction = float(run.ground.model().friction[0]) * run.robot.model.friction_scale
+        others = [event for event in self.struck if event not in self.fresh]
+        down = [
+            (self._gap_gradient(event), _struck([*order[:count], *others], friction))
+            for count, event in enumerate(order, start=1)
+        ]
+        found = strikes(
+            run.robot, run.position[first], run.velocity[first], self.before, run.torque[last],
+            down, run.ground,
+        )  # fmt: skip
+        if found:
+            v = found[-1].impact.velocity
+            off = float(np.abs(v - run.velocity[last]).max())
+            if off > FITS * max(1.0, float(np.abs(v).max())):
+                raise SimulationError(
+                    f"the impact at t = {self.time:.6g} s cannot be linearised: points that slide, "
+                    f"bounce or come off in it leave velocities {off:.3g} from those recomputed"
+                )
+        return found
+
+    def _gap_gradient(self, event: Event) -> Floats:
+        """Derivative of what vanishes as a point comes down, or a joint comes to its stop."""
+        if not event.kind.of_joint:
+            gap: Floats = self.slopes.gap[event.contact]
+            return gap
+        model, gradient = self.run.robot.model, np.zeros(len(self.slopes.gap.T))
+        # A sign of its own makes coming to either end a fall.
+        middle = 0.5 * (model.lower[event.contact] + model.upper[event.contact])
+        upper = self.run.position[self.rows[0], event.contact] > middle
+        gradient[event.contact] = -1.0 if upper else 1.0
+        return gradient
+
+
+def _struck(events: Sequence[Event], friction: Floats) -> ActiveContacts:
+    """What receives impulses in an impact, as its events tell; `friction` is that of all points."""
+    points = [event for event in events if not event.kind.of_joint]
+    on_the_cone = [
+        abs(event.impulse[1]) >= friction[event.contact] * event.impulse[0] * (1.0 - 1e-9)
+        for event in points
+    ]
+    return ActiveContacts(
+        resting=tuple(
+            event.contact for event, slides in zip(points, on_the_cone, strict=True) if not slides
+        ),
+        sliding=tuple(
+            (event.contact, -1 if event.impulse[1] > 0.0 else 1)
+            for event, slides in zip(points, on_the_cone, strict=True)
+            if slides
+        ),
+        joints=tuple(event.contact for event in events if event.kind.of_joint),
+    )
