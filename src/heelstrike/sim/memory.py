@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
+from heelstrike.compiler.mold import Mold
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
@@ -326,6 +328,16 @@ class Memory(Bundle):
 
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
+    if robot not in _MOLDS:
+        _MOLDS[robot] = Mold(_laid_out(robot))
+    memory = _MOLDS[robot].cast()
+    return memory.replaced(pushes=pushes_on(robot, pushes)) if pushes else memory
+
+
+_MOLDS: WeakKeyDictionary[Robot, Mold[Memory]] = WeakKeyDictionary()
+
+
+def _laid_out(robot: Robot) -> Memory:
     nc, model = robot.nc, robot.model
     dry = dry_joints(model)
     capacity = contact_capacity(robot)
@@ -372,7 +384,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
             extents, latch_stop=nc + 2 * model.latch_joint + (model.latch_side > 0)
         ),
         reported=Reported.allocate(extents, resting=np.full(len(dry), -1, dtype=np.int64)),
-        pushes=pushes_on(robot, pushes),
+        pushes=pushes_on(robot, ()),
     )
 
 

@@ -9,7 +9,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from heelstrike.arguments import takes
 from heelstrike.errors import RunFileError, SimulationError
 from heelstrike.robot.state import State
+from heelstrike.sim.image import Image
 from heelstrike.whole_file import write_whole
 
 _IDENTITY = "identity"
@@ -40,10 +41,13 @@ class Snapshot:
         State, time, memory of the controller, contact modes and all else, by name.
     identity : mapping of str to str
         Robot, method and controller it was taken of; it fits no other.
+    taken : Image or None
+        Where it was taken in this process, what most of these arrays are views of.
     """
 
     arrays: dict[str, NDArray[Any]]
     identity: Mapping[str, str]
+    taken: Image | None = field(default=None, repr=False)
 
     @property
     def time(self) -> float:

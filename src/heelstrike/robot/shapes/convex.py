@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,8 @@ FLAT = 1e-9
 """Metres; points no further than this from a line are on it."""
 LEVEL = 1e-4
 """Metres above the lowest corner within which others are as low."""
+DIRECTIONS = 64
+"""In which points are looked for that are surely on an outline."""
 STEEPEST = 1.0
 """Slope of the steepest edge on which a foot is expected to roll: 45 degrees."""
 COARSE = 0.01
@@ -26,9 +30,43 @@ def convex_hull(points: Floats) -> Floats:
         on_line = (points - center) @ along[0]
         ends = points[[np.argmin(on_line), np.argmax(on_line)]]
         return ends[:1] if np.ptp(on_line) < FLAT else ends
-    from scipy.spatial import ConvexHull
+    points = _outermost(points)
+    points = points[np.lexsort((points[:, 1], points[:, 0]))]
+    return np.concatenate((_lower_side(points)[:-1], _lower_side(points[::-1])[:-1]))
 
-    return np.asarray(points[ConvexHull(points).vertices], dtype=np.float64)
+
+def _outermost(points: Floats) -> Floats:
+    """Leave out points well within the polygon of those that are the farthest in some directions.
+
+    Of the many corners of a mesh few are left.
+    """
+    angle = np.linspace(0.0, 2.0 * np.pi, DIRECTIONS, endpoint=False)
+    farthest = np.argmax(np.stack((np.cos(angle), np.sin(angle)), axis=1) @ points.T, axis=1)
+    corners = points[farthest]
+    inside = np.ones(len(points), dtype=bool)
+    for corner, ahead in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        side = ahead - corner
+        to_left = side[0] * (points[:, 1] - corner[1]) - side[1] * (points[:, 0] - corner[0])
+        inside &= (to_left > FLAT * np.hypot(*side)) | (side == 0.0).all()
+    return points[~inside]
+
+
+def _lower_side(points: Floats) -> Floats:
+    """Corners of the hull from the first to the last of sorted points, those on a line left out."""
+    chain: list[Floats] = []
+    for point in points:
+        while len(chain) > 1 and _height(chain[-1], chain[-2], point) < FLAT:
+            chain.pop()
+        chain.append(point)
+    return np.array(chain)
+
+
+def _height(corner: Floats, before: Floats, after: Floats) -> float:
+    """How far a corner is to the right of the way from one point to another."""
+    run, rise = float(after[0] - before[0]), float(after[1] - before[1])
+    across = (corner[0] - before[0]) * rise - (corner[1] - before[1]) * run
+    length = math.hypot(run, rise)
+    return float(across) / length if length > 0.0 else 0.0
 
 
 def with_fewer_corners(polygon: Floats) -> Floats:
