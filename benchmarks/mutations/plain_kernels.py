@@ -69,8 +69,20 @@ def _copy_words(source: np.ndarray, target: np.ndarray) -> None:
     target.reshape(-1)[:count] = source.reshape(-1)[:count]
 
 
+def _copy_between(source: int, target: int, count: int) -> None:
+    ctypes.memmove(int(target), int(source), 8 * int(count))
+
+
+def _keep_value(function: Any, place: np.ndarray) -> None:
+    place[0] = _by_number.index(function)
+
+
 bundles.Bundle._new_table = _new_table  # type: ignore[method-assign]
 words.copy_words = _copy_words
+words.copy_between = _copy_between
+words.word_from = lambda address: ctypes.c_int64.from_address(int(address)).value
+words.keep_value = _keep_value
+words.kept_value = lambda _: lambda place: _by_number[int(place[0])]
 bundle_type.address_of = lambda bundle: bundle.address
 bundle_type.bundle_at = lambda _: lambda address: _by_address[int(address)]
 
@@ -78,7 +90,18 @@ compilation.compiled_for = _compiled_for
 compilation.loop_for = _compiled_for  # type: ignore[assignment]
 compilation.Kernel.__call__ = lambda self, *arguments: _twin(self)(*arguments)  # type: ignore
 
-from heelstrike.compiler import separate_kernel  # noqa: E402
+from heelstrike.compiler import mold, separate_kernel  # noqa: E402
+
+_cast_quietly = mold._cast
+
+
+def _cast(*arguments: Any) -> Any:
+    made = _cast_quietly(*arguments)
+    _by_address[made.address] = made
+    return made
+
+
+mold._cast = _cast
 
 
 def _finish(self: Any) -> Any:

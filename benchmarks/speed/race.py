@@ -10,9 +10,11 @@ import numpy as np
 
 from heelstrike.experiments.engines import Engine, InvalidRunError, Peer, Scenario, check_flight
 from heelstrike.sim import TimeStepping
-from speed.stopwatch import Work, best_of, steps_in_slot
+from speed.stopwatch import Work, best_of, steps_in_slot, timed
 
 STEP = 1e-3
+BEGIN = 0.2
+"""Part of a run that is over before its steps are timed, unless it is said when that begins."""
 ELSEWHERE = 0.1
 """How far from ours a peer may end a walk or a fall, in m and rad, for its times to count.
 
@@ -29,9 +31,14 @@ def race(
     least: int = 5,
     controller: Any = None,
     same_motion: bool = True,
+    same_end: bool = True,
     alike: bool | None = None,
+    begin: float | None = None,
 ) -> dict[str, Any]:
     """Time the steps of each engine.
+
+    Each runs for two times, in turn; a step costs the difference by the steps between. What it
+    takes to set a run of ours up is what is left of the shorter one.
 
     Parameters
     ----------
@@ -46,13 +53,18 @@ def race(
         What heelstrike does instead of the scenario's law.
     same_motion : bool
         Ask every engine for a flight like ours, and, of what does not stand, for an end like ours.
+    same_end : bool
+        Whether an end unlike ours makes a peer's run invalid, where nothing stands.
     alike : bool, optional
         Whether all steps cost the same, so that a part of the run does; by default if it stands.
+    begin : float, optional
+        When the steps begin that are timed (s).
 
     Returns
     -------
     dict
-        `<name>_us` by engine; `<name>_check` and `<name>_invalid` say why it counts, or not.
+        `<name>_us` by engine, `heelstrike_setup_us`; `<name>_check` and `<name>_invalid` say why it
+        counts, or not.
     """
     row: dict[str, Any] = {}
     method = TimeStepping(step=STEP)
@@ -64,32 +76,47 @@ def race(
 
     def run(duration: float) -> float:
         shorter = replace(scenario, duration=duration)
-        return shorter.run(method, controller=controller).timing.wall_s
+        return timed(shorter.run, method, controller=controller)[1]
+
+    def first_of(all_steps: int) -> int:
+        return round(BEGIN * all_steps if begin is None else begin / STEP)
 
     steps = {"heelstrike": round(scenario.duration / STEP)}
     if alike:
+        run(scenario.duration)
         once = run(scenario.duration) / steps["heelstrike"]
         steps["heelstrike"] = steps_in_slot(once, most=steps["heelstrike"])
-    works: dict[str, Work] = {"heelstrike": partial(run, steps["heelstrike"] * STEP)}
+    first = {"heelstrike": first_of(steps["heelstrike"])}
+    runs = {"heelstrike": lambda count: run(count * STEP)}
     for name, engine in engines.items():
         try:
-            peer, row[f"{name}_check"] = _valid(engine, scenario, same_motion=same_motion)
+            peer, row[f"{name}_check"] = _valid(
+                engine, scenario, same_motion=same_motion, same_end=same_end
+            )
             steps[name] = peer.steps
             if alike:
                 steps[name] = steps_in_slot(peer.run() / peer.steps, most=peer.steps)
         except Exception as error:  # of one engine must not lose what the others found
             row[f"{name}_invalid"] = reason(error)
             continue
-        works[name] = partial(peer.run, steps[name])
+        first[name], runs[name] = first_of(steps[name]), peer.run
+    works: dict[str, Work] = {}
+    for name, running in runs.items():
+        works[name] = partial(running, steps[name])
+        works[f"{name}, begin"] = partial(running, first[name])
     if part:
         try:
             works["pinocchio_part"], row["pinocchio_part_check"] = _forward_dynamics(scenario)
-            steps["pinocchio_part"] = 1
+            steps["pinocchio_part"], first["pinocchio_part"] = 1, 0
         except Exception as error:
             row["pinocchio_part_invalid"] = reason(error)
     best = best_of(works, seconds=seconds, least=least, in_a_row=2)
-    row |= {f"{name}_us": 1e6 * t / steps[name] for name, t in best.items()}
+    for name, count in steps.items():
+        if name in best:
+            span = best[name] - best.get(f"{name}, begin", 0.0)
+            row[f"{name}_us"] = 1e6 * span / (count - first[name])
     ours = row["heelstrike_us"]
+    row["heelstrike_setup_us"] = 1e6 * best["heelstrike, begin"] - first["heelstrike"] * ours
     row["times_faster"] = {name: row[f"{name}_us"] / ours for name in engines if name in best}
     return row
 
@@ -138,7 +165,9 @@ def _check(scenario: Scenario, controller: Any) -> dict[str, float]:
     return found
 
 
-def _valid(engine: Engine, scenario: Scenario, *, same_motion: bool) -> tuple[Peer, dict[str, Any]]:
+def _valid(
+    engine: Engine, scenario: Scenario, *, same_motion: bool, same_end: bool
+) -> tuple[Peer, dict[str, Any]]:
     """Return the peer of a scenario, and what was found of it, if its steps count."""
     peer = engine.peer(scenario, STEP)
     check: dict[str, Any] = {}
@@ -147,7 +176,7 @@ def _valid(engine: Engine, scenario: Scenario, *, same_motion: bool) -> tuple[Pe
     if scenario.contacts is not None:
         peer.settle(peer.settling)
     check |= peer.check()
-    if same_motion and scenario.contacts is None:
+    if same_motion and same_end and scenario.contacts is None:
         check["end_error"] = _end_error(peer, scenario)
     if peer.lacks:
         check["lacks"] = ", ".join(peer.lacks)

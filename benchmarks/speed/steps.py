@@ -1,8 +1,9 @@
-"""Microseconds a step, each engine in turn: standing, walking, falling."""
+"""Microseconds a step, each engine in turn: standing, walking, falling, lying."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from heelstrike.experiments.engines import Scenario, simulators
@@ -16,11 +17,11 @@ def measure(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
     part = "pinocchio" in peers
     seconds = 0.1 if quick else 5.0 + len(engines) + part
     rows = []
-    for scenario, controller in contests():
+    for scenario, controller, options in contests():
         control = "none" if scenario.feedback is None else "springs, dampers"
         if controller is not None:
             control = "computed torque; precomputed for the others"
-        row = race(scenario, engines, part=part, seconds=seconds, controller=controller)
+        row = race(scenario, engines, part=part, seconds=seconds, controller=controller, **options)
         rows.append({"scenario": scenario.name, "controller": control, **row})
     return {
         "step_s": STEP,
@@ -30,12 +31,17 @@ def measure(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def contests() -> list[tuple[Scenario, Any]]:
-    """Return the scenarios, and what heelstrike does in each instead of the law of the others."""
+def contests() -> list[tuple[Scenario, Any, dict[str, Any]]]:
+    """Return the scenarios, what heelstrike does in each instead of the law of the others, and how.
+
+    A robot that has fallen lies as it fell, in every engine another way.
+    """
+    lying = replace(scenarios.falling("bravo7", duration=3.0), name="bravo7 lying")
     return [
-        (scenarios.standing("bravo7", bent=False, duration=2.0), None),
-        (scenarios.standing("bravo7", duration=2.0), None),
-        (scenarios.standing("walker2d", duration=2.0), None),
-        (scenarios.walking(), scenarios.walking_law()),
-        (scenarios.falling("bravo7"), None),
+        (scenarios.standing("bravo7", bent=False, duration=2.0), None, {}),
+        (scenarios.standing("bravo7", duration=2.0), None, {}),
+        (scenarios.standing("walker2d", duration=2.0), None, {}),
+        (scenarios.walking(), scenarios.walking_law(), {"begin": 0.1}),
+        (scenarios.falling("bravo7"), None, {"begin": 0.1}),
+        (lying, None, {"begin": 1.0, "same_end": False}),
     ]

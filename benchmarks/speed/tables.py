@@ -29,10 +29,11 @@ def _steps(part: dict[str, Any]) -> Iterator[Table]:
             times = row.get("times_faster", {}).get(name)
             beside = "" if times is None else f" ({number(times)} ×)"
             cells.append(number(row.get(f"{name}_us")) + beside)
-        body.append([row["scenario"], *cells, row["controller"]])
+        setup = number(row.get("heelstrike_setup_us"))
+        body.append([row["scenario"], *cells, setup, row["controller"]])
     yield Table(
         f"µs a step of {1e3 * part['step_s']:g} ms, best of many, in turn (times as long as ours)",
-        ["scenario", "heelstrike", *engines.values(), "control"],
+        ["scenario", "heelstrike", *engines.values(), "to set ours up", "control"],
         body,
     )
     sides = {"heelstrike": "heelstrike", **engines}

@@ -112,16 +112,27 @@ def takes(
             and (kinds := _kinds(each.annotation))
         }
 
+        in_turn = [
+            name
+            for name, each in signature.parameters.items()
+            if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)
+        ]
+
         @functools.wraps(function)
         def checked(*args: _Parameters.args, **kwargs: _Parameters.kwargs) -> _Result:
+            given = (*zip(in_turn, args, strict=False), *kwargs.items())
+            if not all(_is_any(value, wanted[name]) for name, value in given if name in wanted):
+                refuse(*args, **kwargs)
+            return function(*args, **kwargs)
+
+        def refuse(*args: Any, **kwargs: Any) -> None:
             try:
                 given = signature.bind(*args, **kwargs).arguments
             except TypeError:  # too many, too few, unknown: Python's own words come with the call
-                return function(*args, **kwargs)
+                return
             for name, kinds in wanted.items():
                 if name in given and not _is_any(given[name], kinds):
                     raise error(refusal(name, given[name], kinds))
-            return function(*args, **kwargs)
 
         return checked
 
@@ -175,8 +186,14 @@ def refusal(name: str, value: object, kinds: Sequence[str]) -> str:
 
 
 def _is_any(value: object, kinds: Sequence[str]) -> bool:
-    names = {each.__name__ for each in type(value).__mro__}
+    names = _names(type(value))
     return any(_KINDS[kind][1](value) if kind in _KINDS else kind in names for kind in kinds)
+
+
+@functools.lru_cache
+def _names(kind: type) -> frozenset[str]:
+    """Names of a class and of all that it is one of."""
+    return frozenset(each.__name__ for each in kind.__mro__)
 
 
 def _words(kinds: Sequence[str]) -> str:

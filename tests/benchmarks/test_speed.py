@@ -155,7 +155,7 @@ def test_the_page_is_filled_from_results_that_are_whole(
 def _only(monkeypatch: pytest.MonkeyPatch, engines: dict[str, Engine], contest: Scenario) -> None:
     """Measure one scenario in these engines."""
     monkeypatch.setattr(steps, "simulators", lambda names: engines)
-    monkeypatch.setattr(steps, "contests", lambda: [(contest, None)])
+    monkeypatch.setattr(steps, "contests", lambda: [(contest, None, {})])
 
 
 def test_who_ends_elsewhere_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,7 +30,7 @@ from heelstrike.field_texts import FieldTexts
 _EXTENT = re.compile(r"(?:(\d+)\s*)?([A-Za-z]\w*)?(?:\s*\+\s*(\d+))?")
 
 # Names of no members: where a bundle keeps what is its own, and an argument of `allocate`.
-_TAKEN = ("_cells", "_extents", "_block", "_places", "_table", "dtype")
+_TAKEN = ("_cells", "_floats", "_ints", "_extents", "_block", "_places", "_table", "dtype")
 
 _Some = TypeVar("_Some", bound="Bundle")
 
@@ -210,6 +210,7 @@ class Bundle:
     """
 
     _cell_count = 0
+    _cell_names: ClassVar[frozenset[str]] = frozenset()
 
     declared: ClassVar[dict[str, Member]] = {}
     named: ClassVar[frozenset[str]] = frozenset()
@@ -229,7 +230,7 @@ class Bundle:
         parts: Any = (each.kind for each in cls.declared.values() if each.role == "part")
         cls.extent_names = frozenset(letters - {""}).union(*(part.extent_names for part in parts))
         cells = [name for name, member in cls.declared.items() if member.role == "cell"]
-        cls._cell_count = len(cells)
+        cls._cell_count, cls._cell_names = len(cells), frozenset(cells)
         for name in own:
             if name in cls.named:
                 setattr(cls, name, _extent_property(name))
@@ -271,8 +272,7 @@ class Bundle:
             raise TypeError(f"{type(self).__name__} has no {name}")
 
     def __setattr__(self, name: str, value: Any) -> None:
-        member = self.declared.get(name)
-        if member is None or member.role != "cell":
+        if name not in self._cell_names:
             raise AttributeError(f"{type(self).__name__}.{name} is no cell, and stays what it is")
         object.__setattr__(self, name, value)
 
@@ -365,9 +365,9 @@ class Bundle:
         own = self.__dict__
         block, places, begin = own.get("_block"), own.get("_places", {}), 0
         if block is None:
-            cells = _address(own["_cells"])
+            cells = address_of_array(own["_cells"])
         else:
-            own["address"] = begin = _address(block)
+            own["address"] = begin = address_of_array(block)
             cells = begin + places["_cells"]
         for name, member in self.declared.items():
             if member.role == "cell":
@@ -383,7 +383,7 @@ class Bundle:
                         f"{type(self).__name__}.{name} is a C-contiguous array of "
                         f"{member.dtype}, not of {value.dtype}"
                     )
-                words += [_address(value), *value.shape]
+                words += [address_of_array(value), *value.shape]
             elif member.role == "part":
                 words.append(value.address)
             elif member.kind is float:
@@ -399,7 +399,7 @@ class Bundle:
     @cached_property
     def address(self) -> int:
         """Where its table is."""
-        return _address(self.table)
+        return address_of_array(self.table)
 
     def __reduce__(self) -> Any:
         """Members only: a copy has a table of its own."""
@@ -498,6 +498,7 @@ class Bundle:
                 members[name] = members[name].stored(place, prefix + member.prefix(name))
             elif member.role == "array" and not member.address:
                 members[name] = place(prefix + name, members[name])
+        members = {n: each for n, each in members.items() if self.declared[n].role != "cell"}
         copy = type(self)(**members)
         copy.__dict__["_cells"] = cells
         return copy
@@ -587,7 +588,8 @@ def _made(kind: type[_Some], members: dict[str, Any]) -> _Some:
 _NOTHING = ctypes.c_char * 0
 
 
-def _address(array: Any) -> int:
+def address_of_array(array: Any) -> int:
+    """Return where an array begins."""
     if array.flags.writeable:  # four times as quick
         return ctypes.addressof(_NOTHING.from_buffer(array))
     address: int = array.__array_interface__["data"][0]
@@ -656,12 +658,20 @@ def _settable(cls: Any) -> Any:
 
 def _cell_property(place: int, member: Member) -> property:
     """Read and write a cell from Python."""
+    kept = f"_{member.kind.__name__}s"
+
+    def numbers(bundle: Bundle) -> Any:
+        """All cells as numbers of this kind, by what is quickest from Python."""
+        made = memoryview(bundle.__dict__["_cells"].view(member.dtype))
+        return bundle.__dict__.setdefault(kept, made)
 
     def get(bundle: Bundle) -> Any:
-        return member.kind(bundle.__dict__["_cells"].view(member.dtype)[place])
+        made = bundle.__dict__.get(kept)
+        return (numbers(bundle) if made is None else made)[place]
 
     def put(bundle: Bundle, value: Any) -> None:
-        bundle.__dict__["_cells"].view(member.dtype)[place] = value
+        made = bundle.__dict__.get(kept)
+        (numbers(bundle) if made is None else made)[place] = member.kind(value)
 
     return property(get, put)
 

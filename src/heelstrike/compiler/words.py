@@ -1,7 +1,8 @@
-"""Arrays as the words of memory in which they lie."""
+"""Words of memory: those in which arrays lie, and those in which values can be kept."""
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from llvmlite import ir
@@ -25,6 +26,20 @@ word_at: Any = intrinsic(_word_at)
 """``word_at(array, place)``: bits of the word so many after the first, inside the array or not."""
 
 
+def _word_from(context: Any, address: Any) -> Any:
+    del context, address
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        del context, signature
+        return builder.load(builder.inttoptr(values[0], ir.IntType(64).as_pointer()))
+
+    return types.int64(types.int64), generate
+
+
+word_from: Any = intrinsic(_word_from)
+"""``word_from(address)``: bits of the word at an address."""
+
+
 def _copy_words(context: Any, source: Any, target: Any) -> Any:
     del context
     signature = types.void(source, target)
@@ -42,6 +57,70 @@ def _copy_words(context: Any, source: Any, target: Any) -> Any:
         return context.get_dummy_value()
 
     return signature, generate
+
+
+def _copy_between(context: Any, source: Any, target: Any, count: Any) -> Any:
+    del context, source, target, count
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        del signature
+        byte = ir.IntType(8).as_pointer()
+        copy = builder.module.declare_intrinsic("llvm.memcpy", [byte, byte, ir.IntType(64)])
+        source, target = (builder.inttoptr(value, byte) for value in values[:2])
+        size = builder.mul(values[2], ir.Constant(ir.IntType(64), 8))
+        builder.call(copy, [target, source, size, ir.Constant(ir.IntType(1), 0)])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64), generate
+
+
+copy_between: Any = intrinsic(_copy_between)
+"""``copy_between(source, target, count)``: copy so many words from an address to another."""
+
+VALUE = 4
+"""Words that the value of a compiled function takes up, and more."""
+
+
+def _keep_value(context: Any, value: Any, words: Any) -> Any:
+    del context
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        value, words = values
+        if context.get_abi_sizeof(value.type) > 8 * VALUE:
+            raise NotImplementedError(f"{signature.args[0]} is longer than {VALUE} words")
+        builder.store(value, _pointer(context, builder, signature.args[1], words, value.type))
+        return context.get_dummy_value()
+
+    return types.void(value, words), generate
+
+
+keep_value: Any = intrinsic(_keep_value)
+"""``keep_value(value, words)``: keep a value in words of memory, for :func:`kept_value`."""
+
+
+@cache
+def kept_value(kind: Any) -> Any:
+    """Return an intrinsic that returns the value of a type that is kept in words of memory.
+
+    To hand a function to compiled code takes twenty times as long as to call it: Numba looks for
+    its addresses in Python. Kept, it is found by them.
+    """
+
+    def define(context: Any, words: Any) -> Any:
+        del context
+
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            found = context.get_value_type(signature.return_type)
+            return builder.load(_pointer(context, builder, signature.args[0], values[0], found))
+
+        return kind(words), generate
+
+    return intrinsic(define)
+
+
+def _pointer(context: Any, builder: Any, array: Any, value: Any, kind: Any) -> Any:
+    data = context.make_array(array)(context, builder, value).data
+    return builder.bitcast(data, kind.as_pointer())
 
 
 copy_words: Any = intrinsic(_copy_words)

@@ -31,7 +31,7 @@ from heelstrike.robot.model import Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.controller.asking import ask
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.controller.law import CONTROLLER_TYPE
+from heelstrike.sim.controller.law import controller_in
 from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
@@ -129,10 +129,11 @@ def frame(kernels: Kernels) -> Callable[..., int]:
     report, move = kernels.report, kernels.move
 
     def advance(
-        controller: Any, model: Model, ground: GroundModel, control: Control, memory: Memory,
-        work: Any, record: Record, clock: Clock,
+        model: Model, ground: GroundModel, control: Control, memory: Memory, work: Any,
+        record: Record, clock: Clock,
     ) -> int:  # fmt: skip
         """Advance a simulation until its time is up or something stops it; return what."""
+        controller = controller_in(control.function)
         scene = Scene(controller, model, ground)
         while True:
             if is_full(record, clock):
@@ -191,7 +192,7 @@ def compiled_loop(kernels: Kernels, work: Any) -> tuple[Any, float]:
     """Compile the loop of a method, or load it; return it with the seconds that took."""
     begin = perf_counter()
     kinds = (Model, GroundModel, Control, Memory, work, Record, Clock)
-    signature = types.int64(CONTROLLER_TYPE, *(kind.compiled_type() for kind in kinds))
+    signature = types.int64(*(kind.compiled_type() for kind in kinds))
     try_solvers.begin()
     compiled = loop_for(signature, frame(kernels))
     try_solvers.finish()

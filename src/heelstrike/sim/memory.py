@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.compilation import dissolved_kernel
+from heelstrike.compiler.mold import Mold
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
@@ -353,6 +355,16 @@ def are_there(kind: int, assembly: Assembly) -> bool:
 
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
+    if robot not in _MOLDS:
+        _MOLDS[robot] = Mold(_laid_out(robot))
+    memory = _MOLDS[robot].cast()
+    return memory.replaced(pushes=pushes_on(robot, pushes)) if pushes else memory
+
+
+_MOLDS: WeakKeyDictionary[Robot, Mold[Memory]] = WeakKeyDictionary()
+
+
+def _laid_out(robot: Robot) -> Memory:
     nc, model = robot.nc, robot.model
     rows = lay_out_rows(model)
     points = usual_points(robot)
@@ -398,7 +410,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
             extents, entry=np.arange(rows.first[LOOP], most),
             brake_entry=np.arange(rows.first[BRAKE], rows.end[BRAKE]),
         ),
-        pushes=pushes_on(robot, pushes),
+        pushes=pushes_on(robot, ()),
     )  # fmt: skip
     memory.surface.friction[rows.first[DRY_JOINT] : rows.end[DRY_JOINT]] = 1.0
     memory.reported.resting[:] = -1

@@ -9,11 +9,13 @@ controller, pushes, the record, stopping, keeping and continuing - is the same f
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import field
 from typing import Any, ClassVar
+from weakref import WeakKeyDictionary
 
 from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.mold import Mold
 from heelstrike.contact import problem
 from heelstrike.errors import ContactProblemError, SimulationError
 from heelstrike.field_texts import dataclass
@@ -263,6 +265,19 @@ class Method(ABC):
             In a person's words.
         """
         return ""
+
+
+def work_of(method: Method, robot: Robot) -> Any:
+    """Return a new bundle of a method for a robot, cast if it had one before."""
+    if not isinstance(method, Hashable):
+        return method.new_work(robot)
+    molds = _MOLDS.setdefault(robot, {})
+    if method not in molds:
+        molds[method] = Mold(method.new_work(robot))
+    return molds[method].cast()
+
+
+_MOLDS: WeakKeyDictionary[Robot, dict[Method, Mold[Any]]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import sys
 import time as clock_time
 from collections.abc import Callable, Iterable, Sequence
@@ -34,8 +35,10 @@ from heelstrike.sim.controller.raised import EndOfRun, tell
 from heelstrike.sim.controller.robot import NO_ENDING
 from heelstrike.sim.controller.watch import Watch
 from heelstrike.sim.frame import Outcome, compiled_loop
+from heelstrike.sim.image import Camera
+from heelstrike.sim.look import Look
 from heelstrike.sim.memory import Memory, allocate_memory
-from heelstrike.sim.method import Method, UnknownMethod
+from heelstrike.sim.method import Method, UnknownMethod, work_of
 from heelstrike.sim.push import Push, numbers_of_pushes, pushes_of_numbers, pushes_on
 from heelstrike.sim.record.record import Record, allocate_record
 from heelstrike.sim.run import Run, Timing, counted, joined, tallied
@@ -60,6 +63,8 @@ NEVER = 2**62
 FAR = 1e300
 # Points deeper than this (m) in ground that is laid under them are in it.
 LAID = 1e-6
+
+_OUTCOMES = tuple(Outcome)
 
 CAN_GO_ON = (RunStatus.COMPLETED, RunStatus.INTERRUPTED)
 
@@ -215,7 +220,7 @@ class Simulation:
         self._memory.v[:] = setting.state.v
         self._memory.loops.held[:] = setting.held
         put_on(self.robot, setting.braked, setting.state, HOLDS, self._memory)
-        self._work = method.new_work(self.robot)
+        self._work = work_of(method, self.robot)
         rows, events = method.room(self.robot)
         self._clock = Clock(
             record_every=setting.record_every,
@@ -224,9 +229,14 @@ class Simulation:
             event_margin=events,
         )
         method.set_clock(setting, self._clock)
+        for bundle in (self._memory, self._work, self._clock, setting.ground.model()):
+            _ = bundle.address  # laid out now, not while the loop is timed
         self._loop, compile_s = compiled_loop(method.kernels, method.work)
         self._timing = Timing(compile_s, 0.0)
         self._fork: Snapshot | None = None
+        self._cameras: tuple[tuple[Any, Any], Any] = ((None, None), None)
+        self._around: tuple[tuple[Any, Any], dict[str, Any]] = ((None, None), {})
+        self._look = Look(self.robot)
         self._records: list[Record] = []
         self._keeps_rows = keep_rows
         self._event_counts = np.zeros(len(EventKind), dtype=np.int64)
@@ -268,13 +278,7 @@ class Simulation:
     @property
     def contacts(self) -> Contacts:
         """Contact points now, with the forces of the step before."""
-        at = contact_kinematics(self.robot, self._memory.q, self._memory.v, self._ground)
-        return Contacts(
-            position=at.position,
-            normal=at.normal,
-            gap=at.gap,
-            force=self._memory.contacts.force.copy(),
-        )
+        return self._look.at_contacts(self._ground, self._memory)
 
     @property
     def ground(self) -> Ground:
@@ -504,12 +508,12 @@ class Simulation:
             self._new_record()
         while True:
             try:
-                outcome = Outcome(
+                outcome = _OUTCOMES[
                     self._loop(
-                        self._kernel, self.robot.model, self._ground.model(), self._control,
-                        self._memory, self._work, self._records[-1], self._clock,
+                        self.robot.model, self._ground.model(), self._control, self._memory,
+                        self._work, self._records[-1], self._clock,
                     )
-                )  # fmt: skip
+                ]  # fmt: skip
                 wrong = self._ask() if outcome is Outcome.ASKING else ""
             except KeyboardInterrupt:
                 raise
@@ -651,6 +655,8 @@ class Simulation:
             return ""
         clock = self._clock
         rows = self.method.rows_in(clock.until - clock.time, clock.record_every)
+        # What goes on piece by piece makes room for as much again as there is.
+        rows = max(rows, sum(record.rows for record in self._records))
         rows = min(CHUNK, rows + clock.row_margin)
         try:
             words = self._control.logged.size
@@ -698,9 +704,8 @@ class Simulation:
                 "this controller logs other things than the one before, and rows are recorded: "
                 "begin another simulation with it, from state=simulation.state"
             )
-        self._kernel = compiled.function.finish()
-        if python is not None:  # loops do not call it, and Numba need not look for its addresses
-            self._kernel = compiled.function.separate
+        ready.control.function[:] = compiled.function.words
+        _ = ready.control.address
         voltage = commands_voltage(controller, robot)
         self.method.set_clock(setting, clock)
         self._setting, self._logs, self._python_log = setting, ready, told
@@ -716,6 +721,7 @@ class Simulation:
         if law is not None:
             self._name = f"controller {law.function.name!r}"
         self._take_gains(law, voltage)
+        self._identity = identity_of(setting, self.method, self._decides)
         if python is None:
             self._control.continuous = setting.control_period is None and controller is not None
         else:
@@ -751,17 +757,12 @@ class Simulation:
             If a controller in Python does not take part: it needs methods ``snapshot()``, which
             returns an array of numbers, and ``restore(numbers)``.
         """
-        pushes = numbers_of_pushes(self.robot, self._pushes)
-        arrays: dict[str, Any] = {
-            "time": np.array(self.time),
-            **{f"ground.{name}": values for name, values in self._ground.numbers().items()},
-            **{f"push.{name}": values for name, values in pushes.items()},
-        }
-        for name, bundle in self._bundles(self._memory):
-            arrays |= bundle.contents(name)
+        taken = self._camera(self._memory).take()
+        arrays: dict[str, Any] = {"time": np.array(self.time), **self._surroundings()}
+        arrays.update(zip(self._cameras[1].names, taken.arrays, strict=True))
         if self._python is not None:
             arrays["controller"] = np.array(_partaking(self._python, self._name).snapshot())
-        return Snapshot(arrays, self._identity())
+        return Snapshot(arrays, dict(self._identity), taken)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Be again as a simulation was; the record begins anew.
@@ -779,7 +780,7 @@ class Simulation:
         """
         if not isinstance(snapshot, Snapshot):
             raise SimulationError(f"restore takes a Snapshot, got {type(snapshot).__name__}")
-        for what, mine in self._identity().items():
+        for what, mine in self._identity.items():
             its = snapshot.identity.get(what)
             if its != mine:
                 raise SimulationError(f"the snapshot is one of another {what}: {its}, not {mine}")
@@ -808,41 +809,51 @@ class Simulation:
 
     def _put_back(self, snapshot: Snapshot) -> None:
         """Take up what a snapshot holds, or leave everything as it is."""
-        before: list[tuple[Bundle, dict[str, Any]]] = []
+        arrays = snapshot.arrays
+        memory, pushes, ground = self._memory, self._pushes, self._ground
         try:
-            float(snapshot.arrays["time"])
-            pushes = pushes_of_numbers(snapshot.part("push"))
-            ground = _ground_of(snapshot)
-            memory = self._memory.replaced(pushes=pushes_on(self.robot, pushes))
-            bundles = self._bundles(memory)
-            before = [(bundle, bundle.contents()) for _, bundle in bundles]
-            for name, bundle in bundles:
-                bundle.fill(snapshot.arrays, name)
+            float(arrays["time"])
+            now = self._surroundings()
+            if not all(map(operator.is_, map(arrays.get, now), now.values())):
+                pushes, ground = pushes_of_numbers(snapshot.part("push")), _ground_of(snapshot)
+                memory = memory.replaced(pushes=pushes_on(self.robot, pushes))
+            camera = self._camera(memory)
+            image = camera.image_of(arrays, snapshot.taken)
             if self._python is not None:
-                _partaking(self._python, self._name).restore(snapshot.arrays["controller"].copy())
-        except BaseException as error:
-            for bundle, contents in before:
-                bundle.fill(contents)
-            if isinstance(error, KeyError | ValueError):
-                raise SimulationError(f"the snapshot is damaged: {error}") from error
-            raise
+                _partaking(self._python, self._name).restore(arrays["controller"].copy())
+        except (KeyError, ValueError) as error:
+            raise SimulationError(f"the snapshot is damaged: {error}") from error
+        camera.put_back(image)
         self._memory, self._pushes, self._ground = memory, pushes, ground
         self._why_stopped = ""
         self._clock.finishing = 0  # of one that its controller has ended
         for numbers in (self._control, self._numbers.control):
             numbers.robot.ending = NO_ENDING
 
-    def _bundles(self, memory: Memory) -> tuple[tuple[str, Bundle], ...]:
-        """Name the bundles that change as a simulation goes on, with the dot of their arrays."""
-        return (
-            ("clock.", self._clock),
-            ("memory.", memory),
-            ("work.", self._work),
-            ("control.", self._control),
-        )
+    def _camera(self, memory: Memory) -> Camera:
+        """Return what takes images of all that changes as a simulation goes on."""
+        of, camera = self._cameras
+        if of[0] is not memory or of[1] is not self._control:
+            bundles = {
+                "clock.": self._clock, "memory.": memory, "work.": self._work,
+                "control.": self._control,
+            }  # fmt: skip
+            camera = Camera(bundles.items())
+            self._cameras = (memory, self._control), camera
+        return camera
 
-    def _identity(self) -> dict[str, str]:
-        return identity_of(self._setting, self.method, self._decides)
+    def _surroundings(self) -> dict[str, Any]:
+        """Return ground and pushes as arrays, the same as long as they are the same."""
+        of, arrays = self._around
+        if of[0] is not self._ground or of[1] is not self._pushes:
+            arrays = {f"ground.{name}": each for name, each in self._ground.numbers().items()}
+            pushes = numbers_of_pushes(self.robot, self._pushes)
+            arrays |= {f"push.{name}": each for name, each in pushes.items()}
+            arrays = {name: each.view() for name, each in arrays.items()}
+            for each in arrays.values():
+                each.flags.writeable = False
+            self._around = (self._ground, self._pushes), arrays
+        return arrays
 
     @property
     def record(self) -> Run:

@@ -9,6 +9,7 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from heelstrike.arguments import takes
 from heelstrike.errors import RunFileError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.state import State
+from heelstrike.sim.image import Image
 from heelstrike.whole_file import write_whole
 
 _IDENTITY = "identity"
@@ -39,6 +41,8 @@ class Snapshot:
     """State, time, memory of the controller, contact modes and all else, by name."""
     identity: Mapping[str, str]
     """Robot, method and controller it was taken of; it fits no other."""
+    taken: Image | None = field(default=None, repr=False)
+    """Where it was taken in this process, what most of these arrays are views of."""
 
     @property
     def time(self) -> float:

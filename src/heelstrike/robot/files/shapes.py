@@ -60,12 +60,10 @@ def read_outlines(file: MujocoFile, links: Links) -> tuple[Outline, ...]:
 
 def _drawable(file: MujocoFile, geom: int, origin: Floats) -> tuple[Floats, float] | None:
     """Shape of a geom, None of one that is too large for numbers, too."""
-    from scipy.spatial import QhullError
-
     with np.errstate(all="ignore"):
         try:
             shape = _shape(file, geom, origin)
-        except (QhullError, np.linalg.LinAlgError):
+        except np.linalg.LinAlgError:
             return None
     if shape is None or not (np.all(np.abs(shape[0]) < FARTHEST) and shape[1] < FARTHEST):
         return None

@@ -109,7 +109,7 @@ def brakes_of(robot: Robot, joints: Iterable[str | int] | str | int) -> tuple[bo
                 f"joint {robot.joint_names[joint]!r} of robot {robot.name!r} has no brake; "
                 f"{', '.join(robot.brake_names) or 'no joint'} has"
             )
-    return tuple(np.isin(robot.model.brake_joint, chosen).tolist())
+    return tuple(joint in chosen for joint in robot.model.brake_joint.tolist())
 
 
 def put_on(robot: Robot, wanted: Sequence[bool], state: State, how: int, memory: Memory) -> None:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
+from heelstrike.compiler.mold import Mold
+from heelstrike.compiler.words import VALUE
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Integers
@@ -35,6 +38,8 @@ OVERRAN = 2
 class Control(Bundle):
     """The numbers of a controller, and how it is asked."""
 
+    function: Integers = array(VALUE, of=int, address=True)
+    """The compiled function, as :func:`~heelstrike.compiler.words.kept_value` reads it."""
     parameters: Integers = array("words", of=int)
     """Words of its parameters; guarded."""
     kept: Integers = array("memory", of=int)
@@ -106,15 +111,9 @@ class ReadyLaw:
         self.robot = robot = law.robot if believes and law.robot is not None else robot
         self._law = law
         extents = extents_of(robot)
-        numbers, memory = law.numbers(robot)
-        log = law.new_log(robot) if log is None else log
-        self.parameters, parameters, between_parameters = in_one_block(numbers)
-        kinds: tuple[Any, Any] = type(memory), type(log)
-        both: Any = _kept(*kinds)(memory=memory, log=log)
-        both, kept, between_kept = in_one_block(both)
-        self._spare, spare, _ = in_one_block(both)
-        self.memory, self.log = both.memory, both.log
-        places = [_places(values, kept) for _, _, values in self.log.views()]
+        own, laid = _numbers_of(law, robot, log)
+        self.parameters, self.memory, self.log = own.parameters, own.kept.memory, own.kept.log
+        self._spare = own.spare
         shown: dict[str, Any] = {
             "state": ControlState.allocate(extents),
             "contacts": Contacts.allocate(extents),
@@ -128,11 +127,12 @@ class ReadyLaw:
         else:
             shown = self._shown = {name: guarded_bundle(each) for name, each in shown.items()}
         self.control = Control(
-            parameters=parameters, kept=kept, spare=spare,
-            between_parameters=between_parameters, between_kept=between_kept,
+            function=np.zeros(VALUE, dtype=np.int64), parameters=own.parameter_words,
+            kept=own.kept_words, spare=own.spare_words,
+            between_parameters=laid.between[0], between_kept=laid.between[1],
             parameters_at=self.parameters.address, kept_at=self.memory.address,
             spare_at=self._spare.memory.address, log_at=self.log.address,
-            spare_log_at=self._spare.log.address, logged=np.concatenate((*places, _NOWHERE)),
+            spare_log_at=self._spare.log.address, logged=laid.logged,
             believes=believes, conduct=WATCHED if self._shown else TRUSTED, **shown,
         )  # fmt: skip
 
@@ -165,6 +165,64 @@ class ReadyLaw:
 
 
 _NOWHERE = np.zeros(0, dtype=np.int64)
+
+
+class _Laid(NamedTuple):
+    """The numbers of a law for a robot: laid out in blocks, and where in these is what."""
+
+    robot: Robot
+    parameters: Bundle
+    memory: dict[str, Any]
+    mold: Mold[Any]
+    between: tuple[Integers, Integers]
+    logged: Integers
+
+
+_LAID: WeakKeyDictionary[Law, _Laid] = WeakKeyDictionary()
+
+
+def _numbers_of(law: Law, robot: Robot, log: Bundle | None) -> tuple[Any, _Laid]:
+    """Return the numbers that a law begins with, and how they were laid out."""
+    plain = all(isinstance(value, int | float) for value in law.memory.values())
+    if log is not None or not plain:
+        laid = _laid_out(law, robot, law.new_log(robot) if log is None else log)
+        return laid.mold.cast(), laid
+    laid = _LAID.get(law)
+    wanted = robot, law.parameters, law.memory
+    if laid is None or (laid.robot, laid.parameters, laid.memory) != wanted:
+        laid = _LAID[law] = _laid_out(law, robot, law.new_log(robot))
+    own = laid.mold.cast()
+    places = {name: values for name, _, values in own.parameters.views()}
+    for name, _, values in law.parameters.views():  # somebody may have set them
+        places[name][...] = values
+    return own, laid
+
+
+def _laid_out(law: Law, robot: Robot, log: Bundle) -> _Laid:
+    numbers, memory = law.numbers(robot)
+    parameters, parameter_words, between_parameters = in_one_block(numbers)
+    both = _kept(type(memory), type(log))(memory=memory, log=log)
+    kept, kept_words, between_kept = in_one_block(both)
+    spare, spare_words, _ = in_one_block(both)
+    own = _own(type(parameters), type(kept))(
+        parameters=parameters, kept=kept, spare=spare, parameter_words=parameter_words,
+        kept_words=kept_words, spare_words=spare_words,
+    )  # fmt: skip
+    places = [_places(values, kept_words) for _, _, values in kept.log.views()]
+    logged = np.concatenate((*places, _NOWHERE))
+    between = between_parameters, between_kept
+    return _Laid(robot, law.parameters, dict(law.memory), Mold(own), between, logged)
+
+
+@cache
+def _own(parameters: Any, kept: Any) -> Any:
+    """Class of all that is a law's own, with the blocks that its bundles lie in."""
+    members = {
+        "parameters": part(parameters), "kept": part(kept), "spare": part(kept),
+        "parameter_words": array("parameter_words", of=int),
+        "kept_words": array("kept_words", of=int), "spare_words": array("kept_words", of=int),
+    }  # fmt: skip
+    return type("OwnNumbers", (Bundle,), members)
 
 
 @cache

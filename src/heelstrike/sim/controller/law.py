@@ -6,7 +6,7 @@ import copy
 import inspect
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, update_wrapper
+from functools import cache, cached_property, update_wrapper
 from typing import Any, ClassVar, overload
 
 import numpy as np
@@ -15,10 +15,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.bundle_type import bundle_at
-from heelstrike.compiler.compilation import CompileError, is_ours, kernel, within_bounds
+from heelstrike.compiler.compilation import (
+    CompileError,
+    compiled_for,
+    is_ours,
+    kernel,
+    within_bounds,
+)
 from heelstrike.compiler.separate_kernel import SeparateKernel
+from heelstrike.compiler.words import VALUE, keep_value, kept_value
 from heelstrike.errors import ControllerError
-from heelstrike.robot.model import Floats
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.in_python import AskedLaw
@@ -29,6 +36,9 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState, exten
 # same for all, so that one compiled loop serves every controller.
 CONTROLLER_SIGNATURE = types.void(types.float64, *[types.int64] * 6, types.float64[::1])
 CONTROLLER_TYPE = types.FunctionType(CONTROLLER_SIGNATURE)
+
+controller_in = kept_value(CONTROLLER_TYPE)
+"""``controller_in(words)``: what :attr:`ControllerFunction.words` keeps."""
 
 REAL = "biuf"
 """Kinds of arrays of real numbers."""
@@ -112,8 +122,15 @@ class ControllerFunction:
         if self.is_ours and self.compiles:
             self.separate.begin()
 
+    @cached_property
+    def words(self) -> Integers:
+        """What loops find it by, compiled: its value in words of memory."""
+        words = np.zeros(VALUE, dtype=np.int64)
+        _keep()(self.finish(), words)
+        return words
+
     def finish(self) -> Any:
-        """Compile it, or load its machine code, in the form that loops call.
+        """Compile it, or load its machine code.
 
         Raises
         ------
@@ -138,6 +155,14 @@ class ControllerFunction:
             lambda: CONTROLLER_SIGNATURE,
             boundscheck=not self.is_ours,
         )
+
+
+@cache
+def _keep() -> Any:
+    def keep_controller(controller: Any, words: Integers) -> None:
+        keep_value(controller, words)
+
+    return compiled_for(types.void(CONTROLLER_TYPE, types.int64[::1]), keep_controller)
 
 
 def _called_by_address(law: ControllerFunction, function: Any) -> Callable[..., None]:

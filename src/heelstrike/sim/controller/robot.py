@@ -5,10 +5,13 @@ All positions, velocities and Jacobians are in world axes: x forward, z up, rota
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.mold import Mold
 from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.dynamics.held import HeldRows
 from heelstrike.dynamics.inverse_kinematics import Reaching, leg_joints, reach
@@ -366,6 +369,15 @@ def controlled_robot(robot: Robot) -> ControlledRobot:
     ControlledRobot
         Its sizes and queries, and a state to ask about.
     """
+    if robot not in _MOLDS:
+        _MOLDS[robot] = Mold(_laid_out(robot))
+    return _MOLDS[robot].cast()
+
+
+_MOLDS: WeakKeyDictionary[Robot, Mold[ControlledRobot]] = WeakKeyDictionary()
+
+
+def _laid_out(robot: Robot) -> ControlledRobot:
     driven = set(robot.model.actuator_joint.tolist())
     legs = leg_joints(robot)
     view = ControlledRobot.allocate(

@@ -1,0 +1,121 @@
+"""Bundles cast in a mold: like one that was laid out before, in one block, by one copy.
+
+To lay a bundle out takes a look at every member of every part, a hundred times as long as to copy
+what comes of it. Simulations begin with the same memory again and again: laid out once, it is cast
+for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.compiler.bundle import Bundle, address_of_array
+from heelstrike.compiler.bundle_type import WORD_BYTES
+
+_Some = TypeVar("_Some", bound=Bundle)
+
+
+class _Shape(NamedTuple):
+    """Where in the block a bundle lies, in bytes, and what it shares with the one laid out."""
+
+    kind: type[Bundle]
+    table: int
+    cells: int
+    cell_count: int
+    arrays: list[tuple[str, tuple[int, ...], np.dtype[Any], int]]
+    parts: list[tuple[str, _Shape]]
+    shared: dict[str, Any]
+
+
+class Mold(Generic[_Some]):
+    """What a bundle holds at this moment, to cast others that begin so.
+
+    Its tables, its cells and the arrays that it can write to are each cast's own. Arrays that are
+    read only, addresses, and parts that are another's are shared.
+
+    Parameters
+    ----------
+    laid_out : Bundle
+        The bundle. Its arrays may share memory, and do so in a cast.
+    """
+
+    def __init__(self, laid_out: _Some) -> None:
+        self._words: list[NDArray[np.int64]] = []
+        self._size = 0
+        self._begins: dict[int, tuple[Any, int]] = {}  # of what memory, and where it comes to lie
+        self._shape = self._of(laid_out)
+        self._block = np.concatenate(self._words)
+        self._pointers = np.array(list(self._lay_tables(self._shape)), dtype=np.int64)
+
+    def cast(self) -> _Some:
+        """Return another bundle, as the one laid out was when the mold was made of it."""
+        block = self._block.copy()
+        begin = address_of_array(block)
+        block[self._pointers] += begin
+        made: _Some = _cast(self._shape, block, begin)
+        return made
+
+    def _of(self, bundle: Bundle) -> _Shape:
+        own = bundle.__dict__
+        arrays, parts, shared = [], [], {"_extents": bundle.extents}
+        for name, member in bundle.declared.items():
+            if member.role == "cell":
+                continue
+            value = own[name]
+            if member.role == "part" and not member.address:
+                parts.append((name, self._of(value)))
+            elif member.role == "array" and not member.address and value.flags.writeable:
+                arrays.append((name, value.shape, value.dtype, self._place(value)))
+            else:
+                shared[name] = value
+        table = WORD_BYTES * self._size
+        self._append(bundle.table)
+        cells = own["_cells"]
+        place = self._place(cells)
+        return _Shape(type(bundle), table, place, cells.size, arrays, parts, shared)
+
+    def _place(self, array: Any) -> int:
+        """Return where in the block an array lies, which brings along all that it is a part of."""
+        whole = array
+        while isinstance(whole.base, np.ndarray):
+            whole = whole.base
+        if id(whole) not in self._begins:
+            self._begins[id(whole)] = whole, WORD_BYTES * self._size
+            self._append(whole)
+        return self._begins[id(whole)][1] + address_of_array(array) - address_of_array(whole)
+
+    def _append(self, array: NDArray[Any]) -> None:
+        self._words.append(array.reshape(-1).view(np.int64))
+        self._size += array.size
+
+    def _lay_tables(self, shape: _Shape) -> Iterator[int]:
+        """Write where members come to lie into the tables; yield where there are addresses."""
+        begins = {name: begin for name, _, _, begin in shape.arrays}
+        begins |= {name: part.table for name, part in shape.parts}
+        place, cells = shape.table // WORD_BYTES, shape.cells
+        for name, member in shape.kind.declared.items():
+            if member.role == "cell":
+                begins[name], cells = cells, cells + WORD_BYTES
+            if name in begins:
+                self._block[place] = begins[name]
+                yield place
+            place += 1 + len(member.shape)
+        for _, part in shape.parts:
+            yield from self._lay_tables(part)
+
+
+def _cast(shape: _Shape, block: NDArray[np.int64], begin: int) -> Any:
+    bundle = shape.kind.__new__(shape.kind)
+    own = bundle.__dict__
+    own.update(shape.shared)
+    own["address"] = begin + shape.table
+    own["_cells"] = np.ndarray(shape.cell_count, np.int64, block, shape.cells)
+    for name, extents, numbers, place in shape.arrays:
+        own[name] = np.ndarray(extents, numbers, block, place)
+    for name, part in shape.parts:
+        own[name] = _cast(part, block, begin)
+    return bundle

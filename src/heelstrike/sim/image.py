@@ -1,0 +1,118 @@
+"""What is in the bundles of a simulation, in one piece: taken and put back at once."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from heelstrike.compiler.bundle import Bundle, address_of_array
+from heelstrike.compiler.bundle_type import WORD_BYTES
+from heelstrike.compiler.compilation import loop_for
+from heelstrike.compiler.words import copy_between
+from heelstrike.robot.model import Integers
+
+Arrays = dict[str, NDArray[Any]]
+Layout = tuple[tuple[str, tuple[int, ...], np.dtype[Any]], ...]
+
+_LAYOUTS: dict[Layout, Layout] = {}
+
+
+class Image(NamedTuple):
+    """What was in some bundles.
+
+    Attributes
+    ----------
+    layout : tuple
+        Names, shapes and kinds of their arrays.
+    words : (n,) int
+        All that was in them, one array after the other.
+    arrays : tuple of array
+        The same words as arrays.
+    """
+
+    layout: Layout
+    words: Integers
+    arrays: tuple[NDArray[Any], ...]
+
+
+class Camera:
+    """Takes images of bundles, and puts back what is on them.
+
+    Parameters
+    ----------
+    bundles : iterable of str and Bundle
+        What the names of the arrays of each begin with, and the bundle. Arrays that are read only
+        are not its own, and not on the image.
+    """
+
+    def __init__(self, bundles: Iterable[tuple[str, Bundle]]) -> None:
+        named = [each for prefix, bundle in bundles for each in bundle.storage(prefix)]
+        named = [(name, array) for name, array in named if array.flags.writeable]
+        layout = tuple((name, array.shape, array.dtype) for name, array in named)
+        self._layout = _LAYOUTS.setdefault(layout, layout)
+        self.names = tuple(name for name, _ in named)
+        self._arrays = tuple(array for _, array in named)
+        places = [(address_of_array(array), array.size) for array in self._arrays]
+        self._places = np.array(places, dtype=np.int64).reshape(-1, 2)
+        self._ends = np.cumsum(self._places[:, 1]).tolist()
+
+    def take(self) -> Image:
+        """Take an image."""
+        image = self._empty()
+        _copy()(self._places, address_of_array(image.words), 1)
+        return image
+
+    def put_back(self, image: Image) -> None:
+        """Let everything be as it was."""
+        _copy()(self._places, address_of_array(image.words), 0)
+
+    def image_of(self, arrays: Mapping[str, NDArray[Any]], taken: Image | None) -> Image:
+        """Return an image of arrays by name, which may be those of an image that was taken.
+
+        Raises
+        ------
+        ValueError
+            If something is missing, or of another shape or kind. Empty arrays may be missing.
+        """
+        given = tuple(map(arrays.get, self.names))
+        alike = taken is not None and taken.layout is self._layout
+        if taken is not None and alike and all(map(operator.is_, given, taken.arrays)):
+            return taken
+        image = self._empty()
+        for name, mine, its in zip(self.names, image.arrays, given, strict=True):
+            if mine.size == 0:
+                continue
+            if its is None or its.shape != mine.shape or its.dtype != mine.dtype:
+                raise ValueError(f"{name} is missing, or of another shape")
+            mine[...] = its
+        return image
+
+    def _empty(self) -> Image:
+        words = np.empty(self._ends[-1], dtype=np.int64)
+        begins = (0, *self._ends)
+        arrays = tuple(
+            np.ndarray(shape, kind, words, WORD_BYTES * begin)
+            for (_, shape, kind), begin in zip(self._layout, begins, strict=False)
+        )
+        return Image(self._layout, words, arrays)
+
+
+@cache
+def _copy() -> Any:
+    def copy_all(places: Integers, address: int, outwards: int) -> int:
+        """Copy arrays, by address and words, one after the other to an address, or back."""
+        for i in range(places.shape[0]):
+            if outwards == 1:
+                copy_between(places[i, 0], address, places[i, 1])
+            else:
+                copy_between(address, places[i, 0], places[i, 1])
+            address += WORD_BYTES * places[i, 1]
+        return 0
+
+    return loop_for(types.int64(types.int64[:, ::1], types.int64, types.int64), copy_all)
