@@ -15,6 +15,7 @@ from typing import Any, get_type_hints
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.compilation import Kernel
 from heelstrike.compiler.straight_line import play
+from heelstrike.robot.model import Model
 from heelstrike.sim.contacts.straight_line import KERNELS
 
 NOTHING: frozenset[str] = frozenset()
@@ -122,7 +123,8 @@ class _Reading(ast.NodeVisitor):
         return all(kind_at(self.kinds, path) is not None for path in self.paths(node))
 
     def visit_Name(self, node: ast.Name) -> None:
-        self.touched |= self.paths(node)
+        if isinstance(node.ctx, ast.Load):
+            self.touched |= self.paths(node)
 
     def visit_Attribute(self, node: ast.Attribute) -> None:
         self.touched |= self.paths(node)
@@ -258,9 +260,14 @@ def kind_at(kinds: dict[str, type], path: Path) -> type | None:
 
 
 def leaves_of(kind: type | None) -> int:
-    """Return how many arrays and numbers there are in a bundle, and in the bundles in it."""
+    """Return how many arrays and numbers there are in a bundle, and in the bundles in it.
+
+    The robot's numbers count as none: no kernel writes to them.
+    """
     if kind is None:
         return 1
+    if kind is Model:
+        return 0
     return sum(leaves_of(each if holds_others(each) else None) for each in members_of(kind).values())
 
 
@@ -271,7 +278,12 @@ def reach_of(kernel: Kernel) -> int:
 
 def use_of(kernel: Kernel) -> int:
     """Return how many arrays and numbers a kernel touches, itself or by what it calls."""
-    kinds, touched = kinds_of(kernel), touched_by(kernel)
+    kinds = kinds_of(kernel)
+    touched = {
+        path
+        for path in touched_by(kernel)
+        if Model not in [kind_at(kinds, path[:k]) for k in range(1, len(path))]
+    }
     whole = {path for path in touched if kind_at(kinds, path) is not None}
     inside = {path for path in touched if any(path[:k] in whole for k in range(1, len(path)))}
     return sum(leaves_of(kind_at(kinds, path)) for path in touched - inside)

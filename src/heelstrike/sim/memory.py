@@ -124,8 +124,6 @@ class Assembly(Bundle):
         The contact problem of the candidates.
     answer : ContactAnswer
         Its solution.
-    solver : ContactWorkspace
-        Memory of the contact solvers.
     """
 
     candidate: Integers = array("capacity", of=int)
@@ -135,7 +133,6 @@ class Assembly(Bundle):
     half: Floats = array("nv", "2 capacity")
     problem: ContactProblem = part(ContactProblem)
     answer: ContactAnswer = part(ContactAnswer)
-    solver: ContactWorkspace = part(ContactWorkspace)
 
 
 class UsualPoints(Bundle):
@@ -289,6 +286,8 @@ class Memory(Bundle):
         The ground under them.
     assembly : Assembly
         The contact problem.
+    solver : ContactWorkspace
+        Memory of the contact solvers.
     usual : UsualPoints
         What straight-line programs make it of.
     reaction : Reaction
@@ -316,6 +315,7 @@ class Memory(Bundle):
     contacts: Contacts = part(Contacts)
     surface: Surface = part(Surface, flat=True)
     assembly: Assembly = part(Assembly, flat=True)
+    solver: ContactWorkspace = part(ContactWorkspace)
     usual: UsualPoints = part(UsualPoints, flat=True)
     reaction: Reaction = part(Reaction, flat=True)
     loops: Loops = part(Loops)
@@ -343,7 +343,6 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         {**extents, "capacity": most},
         problem=ContactProblem.allocate(nc=most),
         answer=ContactAnswer.allocate(nc=most),
-        solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
     )
     problem = assembly.problem
     return Memory.allocate(
@@ -356,6 +355,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
             extents, friction=np.repeat([0.0, 1.0, 0.0], [capacity - len(dry), len(dry), nc])
         ),
         assembly=assembly,
+        solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
         usual=UsualPoints.allocate(
             extents,
             usual_problem=ContactProblem.allocate(

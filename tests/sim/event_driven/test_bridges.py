@@ -56,8 +56,9 @@ def bridged(begin: float, longer: int) -> tuple[hs.Run, hs.Run]:
         )  # fmt: skip
         simulation.advance(begin)
         if forced:
-            simulation._work.bridging, simulation._work.bridges = 1, longer
-            simulation._work.series = begin
+            work = simulation._work
+            work.decision.bridging, work.series.count = 1, longer
+            work.series.begin = begin
         simulation.advance(begin + 1e-6 * 4.0**longer)
         runs.append(simulation.record)
     return runs[0], runs[1]
@@ -88,7 +89,8 @@ def test_what_a_bridge_in_free_fall_is_wrong_by() -> None:
     )  # fmt: skip
     simulation.advance(0.01)
     length, phase = 1e-6 * 4.0**4, simulation._work
-    phase.bridging, phase.bridges, phase.series = 1, 4, simulation.time
+    phase.decision.bridging = 1
+    phase.series.count, phase.series.begin = 4, simulation.time
     simulation.advance(0.0105)
     (bridge,) = bridges(simulation.record)
     assert bridge.impulse[0] == pytest.approx(length)
@@ -110,7 +112,8 @@ def test_a_bridge_says_how_wrong_it_may_be_with_the_doubt_about_that() -> None:
     simulation.advance(0.01)
     begin = simulation.state
     phase, length = simulation._work, 1e-6 * 4.0**4
-    phase.bridging, phase.bridges, phase.series = 1, 4, simulation.time
+    phase.decision.bridging = 1
+    phase.series.count, phase.series.begin = 4, simulation.time
     simulation.advance(0.01 + length)
     (bridge,) = bridges(simulation.record)
 
@@ -137,9 +140,10 @@ def test_loops_hold_at_the_end_of_a_bridge() -> None:
     )  # fmt: skip
     simulation.advance(0.01)
     phase, length = simulation._work, 1e-6 * 4.0**4
-    phase.bridging, phase.bridges, phase.series = 1, 4, simulation.time
+    phase.decision.bridging = 1
+    phase.series.count, phase.series.begin = 4, simulation.time
     simulation.advance(0.01 + length)
-    run, reached = simulation.record, phase.end  # before the next phase puts it right
+    run, reached = simulation.record, phase.bridge.end  # before the next phase puts it right
     (bridge,) = bridges(run)
     assert run.completed
     assert np.abs(dynamics.loop_displacement(robot, reached[:3])).max() <= 1e-12
@@ -213,7 +217,8 @@ def test_a_robot_that_no_bridge_helps_is_given_up_in_words() -> None:
     )  # fmt: skip
     simulation.advance(0.01)
     phase = simulation._work
-    phase.bridging, phase.bridges, phase.series = 1, MOST_BRIDGES, simulation.time
+    phase.decision.bridging = 1
+    phase.series.count, phase.series.begin = MOST_BRIDGES, simulation.time
     simulation.advance(0.02)
     run = simulation.record
     assert run.status is RunStatus.SOLVER_FAILED
