@@ -8,13 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
+from heelstrike.compiler.compilation import dissolved_kernel
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
 from heelstrike.dynamics.loops import LoopRows, most_rows
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.contacts.rows import (
+    BRAKE,
+    DRY_JOINT,
+    LOOP,
+    POINT,
+    SECOND_FACE,
+    Rows,
+    lay_out_rows,
+)
 from heelstrike.sim.contacts.straight_line import straight_line_programs, usual_points
 from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
@@ -95,8 +104,8 @@ class Surface(Bundle):
     Attributes
     ----------
     friction, restitution : (capacity,) float
-        Of contact points; zero for the joint stops after them, and friction 1 for the dry joints
-        after these; then of the second faces of the points.
+        Of contact points and their second faces; of joint stops zero, and friction 1 of dry joints.
+        Numbered by the table of rows.
     """
 
     friction: Floats = array("capacity")
@@ -109,9 +118,9 @@ class Assembly(Bundle):
     Attributes
     ----------
     candidate : (capacity,) int
-        Contact points that take part; after them joint stops, numbered on from nc: twice the joint,
-        plus one for its upper end; then dry joints, then rows of the loops. The capacity has room
-        for all.
+        Entries of the table of rows that take part, kind by kind. The capacity has room for all.
+    begin, until : (kinds,) int
+        Places of the first candidate of each kind, and of the one after its last.
     jacobian : (2 capacity, nv) float
         Contact Jacobian of the candidates.
     leaf : (capacity,) int
@@ -127,6 +136,8 @@ class Assembly(Bundle):
     """
 
     candidate: Integers = array("capacity", of=int)
+    begin: Integers = array("kinds", of=int)
+    until: Integers = array("kinds", of=int)
     jacobian: Floats = array("2 capacity", "nv")
     leaf: Integers = array("capacity", of=int)
     root: Floats = array("nv")
@@ -174,21 +185,15 @@ class Reaction(Bundle):
     slip : (nc,) float
         Tangential velocity of each contact point at the end of the step.
     mode : (capacity,) int
-        Contact mode, the guess of the next solve.
+        Contact mode, the guess of the next solve; numbered by the table of rows.
     stop_torque, friction_torque : (nv,) float
         Generalised forces of joint stops and of dry joint friction.
-    stop_mode : (nv, 2) int
-        Contact mode of each joint's lower and upper stop.
-    dry_mode : (nd,) int
-        Contact mode of each dry joint.
     """
 
     slip: Floats = array("nc")
     mode: Integers = array("capacity", of=int)
     stop_torque: Floats = array("nv")
     friction_torque: Floats = array("nv")
-    stop_mode: Integers = array("nv", 2, of=int)
-    dry_mode: Integers = array("nd", of=int)
 
 
 class Loops(Bundle):
@@ -210,12 +215,14 @@ class Loops(Bundle):
     lean : (loops, axes) float
         What a row of each loop is of the other, where both say the same; see
         :func:`heelstrike.sim.contacts.loops.leave_one`.
+    entry : (loop_rows,) int
+        Which entry of the table of rows each row is now.
     held : (latches,) int
         Whether each latch is engaged.
-    latch_stop : (latches,) int
-        The joint stop that each is, as candidates of time stepping are numbered.
     braked : (brakes,) int
         Whether each brake is on; see :mod:`heelstrike.sim.contacts.brakes`.
+    brake_entry : (brakes,) int
+        Which entry of the table of rows each brake is.
     brake_position : (brakes,) float
         Where those that are on hold their joints (rad, m).
     brake_force : (brakes,) float
@@ -230,9 +237,10 @@ class Loops(Bundle):
     loop_force: Floats = array("loops", "axes")
     coupling_force: Floats = array("couplings")
     lean: Floats = array("loops", "axes")
+    entry: Integers = array("loop_rows", of=int)
     held: Integers = array("latches", of=int)
-    latch_stop: Integers = array("latches", of=int)
     braked: Integers = array("brakes", of=int)
+    brake_entry: Integers = array("brakes", of=int)
     brake_position: Floats = array("brakes")
     brake_force: Floats = array("brakes")
 
@@ -246,14 +254,16 @@ class Reported(Bundle):
         Whether each contact point is on the ground, and whether it slips.
     stopped : (nv,) int
         Whether each joint pressed against a stop.
-    resting : (nd,) int
+    resting : (capacity,) int
         Whether each dry joint was at rest, -1 before the first report.
+
+    Those of (capacity,) are numbered by the table of rows.
     """
 
     closed: Integers = array("capacity", of=int)
     slipping: Integers = array("capacity", of=int)
     stopped: Integers = array("nv", of=int)
-    resting: Integers = array("nd", of=int)
+    resting: Integers = array("capacity", of=int)
 
 
 class Memory(Bundle):
@@ -274,14 +284,16 @@ class Memory(Bundle):
     stiffness, damping : (nv,) float
         Gains of joint springs, dampers and controller that an implicit scheme takes at the end of
         the step (N m, N m s).
-    dry_joint : (nd,) int
-        Joints that may have dry friction, of their own or of a brake that slips.
     breakaway : (nv,) float
-        The most that it is of each joint now (N m, N).
+        The most that dry friction is of each joint now (N m, N).
+    rows : Rows
+        The table of all that may hold the robot.
     equations : Equations
         Equations of motion of the state now.
     contacts : Contacts
         Contact points now; their forces are those of the last solve.
+    seconds : Contacts
+        The same points on their second faces, in concave corners.
     surface : Surface
         The ground under them.
     assembly : Assembly
@@ -309,10 +321,11 @@ class Memory(Bundle):
     torque: Floats = array("nu")
     stiffness: Floats = array("nv")
     damping: Floats = array("nv")
-    dry_joint: Integers = array("nd", of=int)
     breakaway: Floats = array("nv")
+    rows: Rows = part(Rows, address=True)
     equations: Equations = part(Equations, flat=True)
     contacts: Contacts = part(Contacts)
+    seconds: Contacts = part(Contacts)
     surface: Surface = part(Surface, flat=True)
     assembly: Assembly = part(Assembly, flat=True)
     solver: ContactWorkspace = part(ContactWorkspace)
@@ -324,35 +337,48 @@ class Memory(Bundle):
     tally: Tally = part(Tally)
 
 
+@dissolved_kernel
+def note_group(kind: int, first: int, count: int, assembly: Assembly) -> int:
+    """Note that the candidates of a kind are those from `first` on, the last of `count`."""
+    assembly.begin[kind] = first
+    assembly.until[kind] = count
+    return count
+
+
+@dissolved_kernel
+def are_there(kind: int, assembly: Assembly) -> bool:
+    """Whether any candidate is of a kind."""
+    return bool(assembly.until[kind] > assembly.begin[kind])
+
+
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
     nc, model = robot.nc, robot.model
-    dry = dry_joints(model)
-    capacity = contact_capacity(robot)
+    rows = lay_out_rows(model)
     points = usual_points(robot)
     place = np.full(nc, -1)
     place[points] = np.arange(len(points))
-    sides = capacity + nc  # in a concave corner a point is there twice
+    most = len(rows.kind)
     extents = {
-        **model.extents, "nd": len(dry), "capacity": sides,
+        **model.extents, "kinds": len(rows.first), "capacity": most,
         "points": len(points), "components": 2, "loop_rows": most_rows(model),
     }  # fmt: skip
     programs = straight_line_programs(model, points)
-    most = sides + most_rows(model)
     assembly = Assembly.allocate(
-        {**extents, "capacity": most},
+        extents,
         problem=ContactProblem.allocate(nc=most),
         answer=ContactAnswer.allocate(nc=most),
     )
     problem = assembly.problem
-    return Memory.allocate(
+    memory = Memory.allocate(
         extents,
         command=guarded(np.zeros(robot.nu)),
-        dry_joint=dry,
         breakaway=model.dry_friction.copy(),
+        rows=rows,
         equations=Equations.allocate(extents, programs=programs),
-        surface=Surface.allocate(
-            extents, friction=np.repeat([0.0, 1.0, 0.0], [capacity - len(dry), len(dry), nc])
+        contacts=Contacts.allocate(extents, gap=rows.gap[rows.first[POINT] : rows.end[POINT]]),
+        seconds=Contacts.allocate(
+            extents, gap=rows.gap[rows.first[SECOND_FACE] : rows.end[SECOND_FACE]]
         ),
         assembly=assembly,
         solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
@@ -369,21 +395,11 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
             every_point=np.arange(nc),
         ),
         loops=Loops.allocate(
-            extents, latch_stop=nc + 2 * model.latch_joint + (model.latch_side > 0)
+            extents, entry=np.arange(rows.first[LOOP], most),
+            brake_entry=np.arange(rows.first[BRAKE], rows.end[BRAKE]),
         ),
-        reported=Reported.allocate(extents, resting=np.full(len(dry), -1, dtype=np.int64)),
         pushes=pushes_on(robot, pushes),
-    )
-
-
-def contact_capacity(robot: Robot) -> int:
-    """Return how many contacts there may be: points, joint stops and joints that may be dry."""
-    model = robot.model
-    stops = np.isfinite(model.lower).sum() + np.isfinite(model.upper).sum()
-    return robot.nc + int(stops) + len(dry_joints(model))
-
-
-def dry_joints(model: Model) -> Integers:
-    """Return the joints that may have dry friction, of their own or of a brake that slips."""
-    slipping = model.brake_joint[np.isfinite(model.brake_limit)]
-    return np.union1d(np.flatnonzero(model.dry_friction > 0.0), slipping).astype(np.int64)
+    )  # fmt: skip
+    memory.surface.friction[rows.first[DRY_JOINT] : rows.end[DRY_JOINT]] = 1.0
+    memory.reported.resting[:] = -1
+    return memory

@@ -54,6 +54,7 @@ from heelstrike.sim.compliant.law import FrictionForces, NormalForces
 from heelstrike.sim.compliant.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
 from heelstrike.sim.contacts.geometry import contact_rows, row_product, weigh
 from heelstrike.sim.contacts.loops import find_loops, push_loops, respond, rows_of, speed_along
+from heelstrike.sim.contacts.rows import DRY_JOINT
 from heelstrike.sim.controller.asking import ask, consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.guard import guarded
@@ -500,8 +501,9 @@ def pull_back(model: Model, latch: int, memory: Memory, stop: NormalForces) -> N
 @kernel
 def rub_joints(scale: float, memory: Memory, now: Rates) -> None:
     """Dry friction of the joints, smoothed around zero speed."""
-    for place in range(memory.dry_joint.shape[0]):
-        j = memory.dry_joint[place]
+    rows = memory.rows
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        j = rows.owner[dry]
         limit = memory.breakaway[j]
         size = sqrt(memory.v[j] * memory.v[j] + scale * scale)
         now.dry_force[j] = -limit * memory.v[j] / size

@@ -439,7 +439,7 @@ def brake(
         steady_loops(model, memory.q, memory.equations, loops, memory.v)
         for row in range(rows_of(loops)):
             work.loop_impulse[row] = loops.unknown[row]
-            note_loop(model, row, loops.unknown[row], loops)
+            note_loop(memory.rows, row, loops.unknown[row], loops)
     note_brakes(model, time, 1.0, record, loops)
 
 
@@ -448,7 +448,7 @@ def finish_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> Non
     """Put the mean forces since the sample before into the memory."""
     span = work.step
     for row in range(work.loop_impulse.shape[0]):
-        note_loop(model, row, work.loop_impulse[row] / span, memory.loops)
+        note_loop(memory.rows, row, work.loop_impulse[row] / span, memory.loops)
     tell_resultants(model, work.corners, work.impulse, work.place)
     for contact in range(work.touched.shape[0]):
         for k in range(2):
@@ -571,7 +571,7 @@ def report(
 ) -> None:  # fmt: skip
     """Append a row if one is due, with the forces of this instant."""
     for row in range(work.loop_rows.shape[0]):
-        note_loop(scene.model, row, work.now.loop[row], memory.loops)
+        note_loop(memory.rows, row, work.now.loop[row], memory.loops)
     work.row = note_row_when_due(memory, clock, record)
     if work.row >= 0:
         now = work.now

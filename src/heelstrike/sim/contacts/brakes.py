@@ -24,6 +24,7 @@ from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.latches import several
 from heelstrike.sim.contacts.loops import BEGINS_TO_RUB, HOLDS, OFF, PUT_ON, RUBS, TAKES_HOLD
+from heelstrike.sim.contacts.rows import DRY_JOINT
 from heelstrike.sim.memory import Loops, Memory
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import log_event
@@ -131,8 +132,9 @@ def put_on(robot: Robot, wanted: Sequence[bool], state: State, how: int, memory:
             memory.breakaway[joint] = model.dry_friction[joint] + added
             if memory.breakaway[joint] == 0.0:
                 memory.reaction.friction_torque[joint] = 0.0
-    rubbing = memory.breakaway[memory.dry_joint] > 0.0
-    memory.reported.resting[~rubbing] = -1  # as one that begins at rest, or in motion
+    dry = slice(memory.rows.first[DRY_JOINT], memory.rows.end[DRY_JOINT])
+    rubbing = memory.breakaway[memory.rows.owner[dry]] > 0.0
+    memory.reported.resting[dry][~rubbing] = -1  # as one that begins at rest, or in motion
 
 
 def brakes_on(loops: Loops) -> tuple[bool, ...]:

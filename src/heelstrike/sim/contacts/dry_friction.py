@@ -11,26 +11,25 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.sets import INTERVAL
-from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.contacts.geometry import write_unit_row
+from heelstrike.sim.contacts.rows import DRY_JOINT, Rows
 from heelstrike.sim.memory import Assembly
 
 
 @kernel
 def select_dry_joints(
-    model: Model, step: float, count: int, dry_joint: Integers, breakaway: Floats, guess: Integers,
-    v: Floats, assembly: Assembly,
+    rows: Rows, step: float, count: int, breakaway: Floats, guess: Integers, v: Floats,
+    assembly: Assembly,
 ) -> int:  # fmt: skip
     """Append the joints with dry friction to the candidates of a step; return how many there are.
 
-    Those whose brake is off, and that have none of their own, are left out. They are numbered on
-    from the joint stops and the second faces of corners, one a contact point; `guess` holds their
-    contact modes.
+    Those whose brake is off, and that have none of their own, are left out; `guess` holds the
+    contact modes of all entries of the table.
     """
-    first = 2 * model.nc + 2 * model.nv
     problem = assembly.problem
-    for place in range(dry_joint.shape[0]):
-        joint = dry_joint[place]
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        joint = rows.owner[dry]
         if breakaway[joint] == 0.0:
             continue
         write_unit_row(joint, 2 * count + 1, 1.0, assembly)
@@ -38,8 +37,8 @@ def select_dry_joints(
         problem.set[count] = INTERVAL
         problem.friction[count] = 1.0
         problem.bound[count] = step * breakaway[joint]
-        assembly.answer.mode[count] = guess[place]
-        assembly.candidate[count] = first + place
+        assembly.answer.mode[count] = guess[dry]
+        assembly.candidate[count] = dry
         count += 1
     return count
 

@@ -25,6 +25,7 @@ from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.geometry import EVERYWHERE, solve_mass_matrix, weigh
+from heelstrike.sim.contacts.rows import COUPLING, LOOP, Rows
 from heelstrike.sim.memory import Assembly, Equations, Loops
 
 CLOSED = 1e-14
@@ -57,6 +58,15 @@ def rows_of(loops: Loops) -> int:
 
 
 @kernel
+def row_of(entry: int, loops: Loops) -> int:
+    """Which row an entry of the table is now."""
+    row = 0
+    while loops.entry[row] != entry:
+        row += 1
+    return row
+
+
+@kernel
 def find_loops(model: Model, q: Floats, v: Floats, tree: Workspace, loops: Loops) -> None:
     """Write displacements, Jacobian and bias of a state whose kinematics and velocities are in."""
     find_rows(model, q, v, tree, loops.rows)
@@ -65,6 +75,7 @@ def find_loops(model: Model, q: Floats, v: Floats, tree: Workspace, loops: Loops
     row = 2 * model.loops + model.couplings
     for brake in range(loops.braked.shape[0]):
         if loops.braked[brake] >= TAKES_HOLD:
+            loops.entry[row] = loops.brake_entry[brake]
             joint = model.brake_joint[brake]
             loops.rows.displacement[row] = q[joint] - loops.brake_position[brake]
             loops.rows.jacobian[row, joint] = 1.0
@@ -101,10 +112,10 @@ def leave_one(loop: int, loops: Loops) -> None:
 
 
 @dissolved_kernel
-def append_loops(first: int, count: int, loops: Loops, assembly: Assembly) -> int:
-    """Append the rows of the loops to the candidates, numbered from `first`; return how many."""
+def append_loops(count: int, loops: Loops, assembly: Assembly) -> int:
+    """Append the rows of the loops to the candidates; return how many there are with them."""
     for row in range(rows_of(loops)):
-        append_loop(first, row, count, loops, assembly)
+        append_loop(row, count, loops, assembly)
         count += 1
     return count
 
@@ -124,7 +135,7 @@ def free_loops(count: int, loops: Loops, rate: Floats, time: float, assembly: As
 
 
 @kernel
-def append_loop(first: int, row: int, count: int, loops: Loops, assembly: Assembly) -> None:
+def append_loop(row: int, count: int, loops: Loops, assembly: Assembly) -> None:
     """Write what a row of the loops brings to the contact problem, but for its free term."""
     jacobian, problem = assembly.jacobian, assembly.problem
     for j in range(jacobian.shape[1]):
@@ -135,7 +146,7 @@ def append_loop(first: int, row: int, count: int, loops: Loops, assembly: Assemb
     problem.friction[count] = 0.0
     assembly.leaf[count] = EVERYWHERE
     assembly.answer.mode[count] = STICK
-    assembly.candidate[count] = first + row
+    assembly.candidate[count] = loops.entry[row]
 
 
 @kernel
@@ -148,32 +159,29 @@ def speed_along(row: int, loops: Loops, v: Floats) -> float:
 
 
 @dissolved_kernel
-def note_loops(model: Model, count: int, impulse: Floats, loops: Loops) -> None:
-    """Keep the forces of the loops, whose rows end with the first `count` candidates."""
+def note_loops(table: Rows, count: int, span: float, impulse: Floats, loops: Loops) -> None:
+    """Keep the forces of the loops, whose impulses over a span of time are the last of `count`."""
     rows = rows_of(loops)
     for row in range(rows):
-        note_loop(model, row, impulse[2 * (count - rows + row)], loops)
+        note_loop(table, row, impulse[2 * (count - rows + row)] / span, loops)
 
 
 @dissolved_kernel
-def note_loop(model: Model, row: int, force: float, loops: Loops) -> None:
+def note_loop(table: Rows, row: int, force: float, loops: Loops) -> None:
     """Keep the force of a row."""
-    if row < 2 * model.loops:
-        force_now, lean = loops.loop_force[row // 2], loops.lean[row // 2]
-        force_now[row % 2] = force
-        for axis in range(2 if row % 2 == 1 else 0):  # of forces that do the same the least
+    entry = loops.entry[row]
+    owner, kind = table.owner[entry], table.kind[entry]
+    if kind == LOOP:
+        force_now, lean, last = loops.loop_force[owner], loops.lean[owner], table.axis[entry]
+        force_now[last] = force
+        for axis in range(2 if last == 1 else 0):  # of forces that do the same the least
             if lean[axis] != 0.0:
                 force_now[1 - axis] /= 1.0 + lean[axis] * lean[axis]
                 force_now[axis] = lean[axis] * force_now[1 - axis]
-    elif row < 2 * model.loops + model.couplings:
-        loops.coupling_force[row - 2 * model.loops] = force
+    elif kind == COUPLING:
+        loops.coupling_force[owner] = force
     else:
-        left = row - 2 * model.loops - model.couplings
-        for brake in range(loops.braked.shape[0]):
-            if loops.braked[brake] >= TAKES_HOLD:
-                if left == 0:
-                    loops.brake_force[brake] = force
-                left -= 1
+        loops.brake_force[owner] = force
 
 
 @kernel

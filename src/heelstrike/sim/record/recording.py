@@ -12,6 +12,7 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
+from heelstrike.sim.contacts.rows import DRY_JOINT
 from heelstrike.sim.memory import Memory, Tally
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.run import QUANTITIES
@@ -89,8 +90,9 @@ def note_events(
     for joint in range(model.parent.shape[0]):
         if memory.reaction.stop_torque[joint] != 0.0 or memory.reported.stopped[joint] != 0:
             note_stop(model, end, step, joint, memory, record)
-    for dry in range(memory.dry_joint.shape[0]):
-        joint = memory.dry_joint[dry]
+    rows = memory.rows
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        joint = rows.owner[dry]
         if memory.breakaway[joint] == 0.0:
             continue
         rests = abs(memory.next_v[joint]) <= SLIP_SPEED

@@ -5,7 +5,7 @@ held by two: so there the contact problem has a second group of rows for it. Wha
 with is recorded as one force, in the frame of the nearest face, at the place where the resultant's
 line of action leaves the disc.
 
-Corners are numbered on from the joint stops. Convex ground has none.
+Convex ground has no such corners.
 """
 
 from __future__ import annotations
@@ -13,63 +13,47 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, array, cell, part
+from heelstrike.compiler.bundle import Bundle, cell
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel, second_contact
 from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Integers, Model
-from heelstrike.robot.robot import Robot
+from heelstrike.robot.model import Model
+from heelstrike.sim.contacts.rows import SECOND_FACE, Rows
 from heelstrike.sim.controller.interface import Contacts
-
-Floats = NDArray[np.float64]
+from heelstrike.sim.memory import Surface
 
 
 class Corner(Bundle):
-    """The second faces of the contact points.
+    """How many second faces there are.
 
     Attributes
     ----------
-    near, count : int
-        How many points have one now; how many of these take part in the step.
-    contacts : Contacts
-        The points on them; the gap is infinite where there is none.
-    friction, restitution : (nc,) float
-    mode : (nc,) int
-        Contact mode of the last solve, the guess of the next.
+    near : int
+        How many points have one now.
     """
 
     near: int = cell(int)
-    count: int = cell(int)
-    contacts: Contacts = part(Contacts)
-    friction: Floats = array("nc")
-    restitution: Floats = array("nc")
-    mode: Integers = array("nc", of=int)
-
-
-def allocate_corner(robot: Robot) -> Corner:
-    """Allocate it for a robot, of which no point is in a corner."""
-    extents = {**robot.model.extents, "components": 2}
-    contacts = Contacts.allocate(extents, gap=np.full(robot.nc, np.inf))
-    return Corner.allocate(extents, contacts=contacts)
 
 
 @kernel
-def locate_corners(model: Model, ground: GroundModel, tree: Workspace, corner: Corner) -> None:
+def locate_corners(
+    model: Model, ground: GroundModel, tree: Workspace, rows: Rows, contacts: Contacts,
+    surface: Surface, corner: Corner,
+) -> None:  # fmt: skip
     """Find the second faces of the contact points."""
-    contacts = corner.contacts
     corner.near = 0
-    for i in range(model.nc):
+    for second in range(rows.first[SECOND_FACE], rows.end[SECOND_FACE]):
+        i = rows.owner[second]
         point, normal, radius = contacts.position[i], contacts.normal[i], model.contact_radius[i]
         point_position(tree, model.contact_link[i], model.contact_position[i], point)
         contacts.gap[i], friction, restitution = second_contact(
             ground, point[0], point[1], radius, normal
         )
-        corner.friction[i] = model.friction_scale[i] * friction
-        corner.restitution[i] = model.restitution_scale[i] * restitution
+        surface.friction[second] = model.friction_scale[i] * friction
+        surface.restitution[second] = model.restitution_scale[i] * restitution
         point[0] -= radius * normal[0]
         point[1] -= radius * normal[1]
         corner.near += contacts.gap[i] < np.inf
@@ -78,20 +62,20 @@ def locate_corners(model: Model, ground: GroundModel, tree: Workspace, corner: C
 
 
 @kernel
-def join_forces(model: Model, corner: Corner, contacts: Contacts) -> None:
+def join_forces(model: Model, seconds: Contacts, contacts: Contacts) -> None:
     """Put the forces of both faces of every point into one, and that where it acts.
 
     About the centre of the disc only friction has a moment, r λ_t of either face. The resultant of
     forces that nearly cancel each other, as those of a wedge, may act off the disc.
     """
     for i in range(model.nc):
-        other = corner.contacts.force[i]
+        other = seconds.force[i]
         if other[0] == 0.0 and other[1] == 0.0:
             continue
         normal, force, point = contacts.normal[i], contacts.force[i], contacts.position[i]
         radius = model.contact_radius[i]
         own_x, own_z = out_of_frame(normal, (force[0], force[1]))
-        x, z = out_of_frame(corner.contacts.normal[i], (other[0], other[1]))
+        x, z = out_of_frame(seconds.normal[i], (other[0], other[1]))
         x, z = own_x + x, own_z + z
         moment = radius * (force[1] + other[1])
         size = math.sqrt(x * x + z * z)

@@ -39,17 +39,17 @@ from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.sets import HALF_LINE, INTERVAL, LINE
+from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
-from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.memory import Assembly, Memory, contact_capacity
+from heelstrike.sim.contacts.rows import POINT, SECOND_FACE, STOP, lay_out_rows
+from heelstrike.sim.memory import Assembly, Memory
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import log_event, note_event
-from heelstrike.sim.time_stepping.corners import Corner, allocate_corner
+from heelstrike.sim.time_stepping.corners import Corner
 
 Floats = NDArray[np.float64]
 
@@ -77,10 +77,9 @@ class Impact(Bundle):
     ----------
     happens : int
         Whether an impact falls into this step.
-    touching : (places,) int
-        The last step at whose end each contact point, each end of each joint, and each second face
-        of a corner touched.
-    called : (places,) int
+    touching : (entries,) int
+        The last step at whose end each entry of the table of rows touched.
+    called : (entries,) int
         What takes part although it seemed too far away; `calls` tells whether there is any.
     calls : int
     relaxed, wedged, since : int
@@ -107,8 +106,8 @@ class Impact(Bundle):
     """
 
     happens: int = cell(int)
-    touching: Integers = array("places", of=int)
-    called: Integers = array("places", of=int)
+    touching: Integers = array("entries", of=int)
+    called: Integers = array("entries", of=int)
     calls: int = cell(int)
     relaxed: int = cell(int)
     wedged: int = cell(int)
@@ -127,32 +126,17 @@ class Impact(Bundle):
 
 def allocate_impact(robot: Robot, *, bounded: bool = False) -> Impact:
     """Allocate what the steps of a robot need, with nothing known yet."""
-    capacity = contact_capacity(robot) + robot.nc + most_rows(robot.model)
-    places = 2 * (robot.nc + robot.nv)
+    entries = len(lay_out_rows(robot.model).kind)
     return Impact.allocate(
         nv=robot.nv,
-        capacity=capacity,
-        places=places,
-        touching=np.full(places, NEVER),
+        capacity=entries,
+        entries=entries,
+        touching=np.full(entries, NEVER),
         wedged=NEVER,
         bounded=int(bounded),
-        problem=ContactProblem.allocate(nc=capacity),
-        answer=ContactAnswer.allocate(nc=capacity),
-        corner=allocate_corner(robot),
+        problem=ContactProblem.allocate(nc=entries),
+        answer=ContactAnswer.allocate(nc=entries),
     )
-
-
-@kernel
-def gap_of(model: Model, memory: Memory, corner: Corner, candidate: int) -> float:
-    """Gap of a contact point, a joint stop or the second face of a corner."""
-    stop, q = candidate - model.nc, memory.q
-    if stop < 0:
-        return memory.contacts.gap[candidate]
-    if stop >= 2 * model.nv:
-        return corner.contacts.gap[stop - 2 * model.nv]
-    if stop % 2 == 1:
-        return model.upper[stop // 2] - q[stop // 2]
-    return q[stop // 2] - model.lower[stop // 2]
 
 
 @kernel
@@ -164,31 +148,25 @@ def dismiss(impact: Impact) -> None:
 
 
 @dissolved_kernel
-def call(place: int, impact: Impact) -> None:
+def call(entry: int, impact: Impact) -> None:
     """Call a contact point or stop to take part."""
-    impact.calls += 1 - impact.called[place]
-    impact.called[place] = 1
+    impact.calls += 1 - impact.called[entry]
+    impact.called[entry] = 1
 
 
 @kernel
-def left_alone(model: Model, count: int, memory: Memory, impact: Impact) -> tuple[float, bool]:
+def left_alone(count: int, memory: Memory) -> tuple[float, bool]:
     """What a relaxed step does not ask for: the deepest negative gap, and whether any bounces."""
     deepest, bounces = 0.0, False
-    surface, corner = memory.surface, impact.corner
     for place in range(count):
         candidate = memory.assembly.candidate[place]
-        second = candidate - model.nc - 2 * model.nv
-        if second < model.nc:
-            deepest = min(deepest, gap_of(model, memory, corner, candidate))
-        if candidate < model.nc:
-            bounces = bounces or surface.restitution[candidate] > 0.0
-        elif 0 <= second < model.nc:
-            bounces = bounces or corner.restitution[second] > 0.0
+        deepest = min(deepest, memory.rows.gap[candidate])
+        bounces = bounces or memory.surface.restitution[candidate] > 0.0
     return deepest, bounces
 
 
 @kernel
-def relax(model: Model, bounds_gaps: bool, count: int, memory: Memory, impact: Impact) -> bool:
+def relax(bounds_gaps: bool, count: int, memory: Memory, impact: Impact) -> bool:
     """Ask a step without an answer for less: no way out, no bounce; return if it asked for any.
 
     Without these the velocity that the step would have without contact is all that is in the way,
@@ -196,7 +174,7 @@ def relax(model: Model, bounds_gaps: bool, count: int, memory: Memory, impact: I
     bounded and none is deeper than rounding and turning explain. In a wedge that goes on all of it
     is explained: the step before has let nothing sink but by turning.
     """
-    deepest, bounces = left_alone(model, count, memory, impact)
+    deepest, bounces = left_alone(count, memory)
     leaves = impact.relaxed == 0 and bounces
     if bounds_gaps and impact.relaxed == 0 and deepest < 0.0:
         leaves = impact.wedged == memory.tally.steps - 1 or deepest >= -WEDGED_BY
@@ -213,35 +191,30 @@ def stays_wedged(steps: int, impact: Impact) -> bool:
 
 
 @kernel
-def modes_change(model: Model, count: int, memory: Memory, impact: Impact) -> bool:
+def modes_change(memory: Memory) -> bool:
     """Whether a point or stop opens, closes or slides otherwise than in the step before."""
-    reaction, mode = memory.reaction, memory.assembly.answer.mode
-    for place in range(count):
-        candidate = memory.assembly.candidate[place]
-        stop = candidate - model.nc
-        now = mode[place]
-        if stop < 0:
-            before = reaction.mode[candidate]
-        elif stop < 2 * model.nv:
-            before = reaction.stop_mode[stop // 2, stop % 2]
-            now = int(now != OPEN)
-        elif stop < 2 * model.nv + model.nc:
-            before = impact.corner.mode[stop - 2 * model.nv]
-        else:  # dry friction and loops
-            break
-        if now != before:
+    return (
+        changes(POINT, memory.assembly, memory.reaction.mode)
+        or changes(STOP, memory.assembly, memory.reaction.mode)
+        or changes(SECOND_FACE, memory.assembly, memory.reaction.mode)
+    )
+
+
+@kernel
+def changes(kind: int, assembly: Assembly, before: Integers) -> bool:
+    """Whether any candidate of a kind has another mode than before."""
+    for place in range(assembly.begin[kind], assembly.until[kind]):
+        if assembly.answer.mode[place] != before[assembly.candidate[place]]:
             return True
     return False
 
 
 @kernel
-def close_gaps(model: Model, step: float, count: int, impact: Impact, memory: Memory) -> None:
+def close_gaps(step: float, count: int, memory: Memory) -> None:
     """Count negative gaps of the candidates as zero."""
     for place in range(count):
-        candidate = memory.assembly.candidate[place]
-        if candidate < 2 * (model.nc + model.nv):
-            gap = gap_of(model, memory, impact.corner, candidate)
-            memory.assembly.problem.free[2 * place] -= min(gap, 0.0) / step
+        gap = memory.rows.gap[memory.assembly.candidate[place]]
+        memory.assembly.problem.free[2 * place] -= min(gap, 0.0) / step
 
 
 @kernel
@@ -268,27 +241,22 @@ def arrives(step: float, place: int, answer: ContactAnswer) -> bool:
 
 
 @dissolved_kernel
-def note_touching(model: Model, step: float, count: int, memory: Memory, impact: Impact) -> None:
+def note_touching(step: float, count: int, memory: Memory, impact: Impact) -> None:
     """Keep which of the candidates touch at the end of this step."""
     assembly = memory.assembly
     for place in range(count):
-        candidate = assembly.candidate[place]
-        if candidate < 2 * (model.nc + model.nv) and arrives(step, place, assembly.answer):
-            impact.touching[candidate] = memory.tally.steps
+        if arrives(step, place, assembly.answer):
+            impact.touching[assembly.candidate[place]] = memory.tally.steps
 
 
 @dissolved_kernel
-def falls_into(
-    model: Model, step: float, problem: ContactProblem, memory: Memory, impact: Impact
-) -> bool:
+def falls_into(step: float, problem: ContactProblem, memory: Memory, impact: Impact) -> bool:
     """Whether an impact falls into the step; `problem` is that of the positions, solved."""
     assembly, before = memory.assembly, memory.tally.steps - 1
     for place in range(problem.count):
         candidate = assembly.candidate[place]
-        if candidate >= 2 * (model.nc + model.nv):
-            continue
-        if arrives(step, place, assembly.answer):
-            now = gap_of(model, memory, impact.corner, candidate)
+        now = memory.rows.gap[candidate]
+        if now < np.inf and arrives(step, place, assembly.answer):
             new = impact.touching[candidate] != before and problem.free[2 * place] < 0.0
             if now < -TOUCHING or (new and now > TOUCHING):
                 return True
@@ -296,18 +264,15 @@ def falls_into(
 
 
 @kernel
-def find_members(
-    model: Model, step: float, problem: ContactProblem, memory: Memory, impact: Impact
-) -> int:
+def find_members(step: float, problem: ContactProblem, memory: Memory, impact: Impact) -> int:
     """List what takes part in the impact of a step; return how many that are."""
     assembly, before = memory.assembly, memory.tally.steps - 1
     members = 0
     for place in range(problem.count):
         candidate = assembly.candidate[place]
-        # Dry friction and loops are always there.
-        takes_part = candidate >= 2 * (model.nc + model.nv)
+        now = memory.rows.gap[candidate]
+        takes_part = now == np.inf  # dry friction and loops are always there
         if not takes_part:
-            now = gap_of(model, memory, impact.corner, candidate)
             touched = impact.touching[candidate] == before
             stays = touched or problem.free[2 * place] < 0.0
             takes_part = now <= TOUCHING or (stays and arrives(step, place, assembly.answer))
@@ -318,11 +283,22 @@ def find_members(
 
 
 @kernel
+def speed_before(model: Model, entry: int, memory: Memory) -> float:
+    """Normal velocity of a contact point, on either face, as the step begins."""
+    point, tree = memory.rows.owner[entry], memory.equations.tree
+    if memory.rows.kind[entry] == POINT:
+        normal, _ = contact_velocity(model, tree, memory.contacts, point)
+    else:
+        normal, _ = contact_velocity(model, tree, memory.seconds, point)
+    return normal
+
+
+@kernel
 def pose_impact(
     model: Model, step: float, members: int, problem: ContactProblem, memory: Memory, impact: Impact
 ) -> None:
     """Write the problem of the impact: what takes part, without the gaps, with restitution."""
-    assembly, contacts, its = memory.assembly, memory.contacts, impact.problem
+    assembly, its, restitution = memory.assembly, impact.problem, memory.surface.restitution
     for place in range(members):
         source = impact.member[place]
         for other in range(members):
@@ -332,19 +308,12 @@ def pose_impact(
                     entry = problem.delassus[2 * source + i, column + j]
                     its.delassus[2 * place + i, 2 * other + j] = entry
         candidate = assembly.candidate[source]
-        normal = problem.free[2 * source]
-        if candidate < 2 * (model.nc + model.nv):
-            gap = gap_of(model, memory, impact.corner, candidate)
+        normal, gap = problem.free[2 * source], memory.rows.gap[candidate]
+        if gap < np.inf:
             normal -= (max(gap, 0.0) if impact.relaxed == 1 else gap) / step
         impact.bounce[place] = 0.0
-        bounces = impact.relaxed == 0
-        if bounces and candidate < model.nc:
-            before, _ = contact_velocity(model, memory.equations.tree, contacts, candidate)
-            impact.bounce[place] = memory.surface.restitution[candidate] * before
-        elif bounces and model.nc + 2 * model.nv <= candidate < 2 * (model.nc + model.nv):
-            contact, corner = candidate - model.nc - 2 * model.nv, impact.corner
-            before, _ = contact_velocity(model, memory.equations.tree, corner.contacts, contact)
-            impact.bounce[place] = corner.restitution[contact] * before
+        if impact.relaxed == 0 and restitution[candidate] > 0.0:
+            impact.bounce[place] = restitution[candidate] * speed_before(model, candidate, memory)
         its.free[2 * place] = normal + impact.bounce[place]
         its.free[2 * place + 1] = problem.free[2 * source + 1]
         its.friction[place] = problem.friction[source]
@@ -433,9 +402,7 @@ def note_gain(
 
 
 @kernel
-def pose_way_out(
-    model: Model, step: float, problem: ContactProblem, memory: Memory, impact: Impact
-) -> None:
+def pose_way_out(step: float, problem: ContactProblem, memory: Memory, impact: Impact) -> None:
     """Write the problem of what is to be added to the velocity of a wedge to push it out.
 
     Without friction; `problem` is that of the positions, solved with negative gaps counted as zero.
@@ -447,12 +414,11 @@ def pose_way_out(
         for column in range(rows):
             its.delassus[row, column] = problem.delassus[row, column]
     for place in range(problem.count):
-        candidate = assembly.candidate[place]
+        gap = min(memory.rows.gap[assembly.candidate[place]], 0.0)
         its.friction[place] = its.bound[place] = 0.0
         its.set[place] = LINE if problem.set[place] == LINE else HALF_LINE
         impact.answer.mode[place] = STICK if problem.set[place] == LINE else OPEN
-        if candidate < 2 * (model.nc + model.nv) and problem.set[place] != LINE:
-            gap = min(gap_of(model, memory, impact.corner, candidate), 0.0)
+        if problem.set[place] in (CONE, HALF_LINE):
             its.free[2 * place] = assembly.answer.velocity[2 * place] + gap / step
             if gap < 0.0:
                 impact.answer.mode[place] = STICK

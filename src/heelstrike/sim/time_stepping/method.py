@@ -36,7 +36,7 @@ from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
-from heelstrike.contact.modes import SOLVED, STICK
+from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.contact.workspace import ContactProblem
@@ -68,23 +68,32 @@ from heelstrike.sim.contacts.loops import (
     close_loops,
     find_loops,
     free_loops,
-    note_loop,
+    note_loops,
     rows_of,
     speed_along,
     steady_loops,
 )
 from heelstrike.sim.contacts.points import point_velocities
+from heelstrike.sim.contacts.rows import (
+    DRY_JOINT,
+    LOOP,
+    POINT,
+    SECOND_FACE,
+    STOP,
+    Rows,
+    lay_out_rows,
+)
 from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.frame import DIVERGED, DONE, SOLVER_FAILED, Kernels, Scene
-from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
+from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints, are_there, note_group
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
-from heelstrike.sim.time_stepping.corners import Corner, join_forces, locate_corners
+from heelstrike.sim.time_stepping.corners import join_forces, locate_corners
 from heelstrike.sim.time_stepping.doubts import SimulationWarning, too_light, too_stiff
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
@@ -244,11 +253,13 @@ class TimeStepping(Method):
         self, robot: Robot, work: Stepping, clock: Clock, *, stops: bool = False
     ) -> None:
         """What touched other ground says nothing of this one."""
-        work.impact.touching[: robot.nc] = NEVER
-        work.impact.touching[robot.nc + 2 * robot.nv :] = NEVER
+        rows = lay_out_rows(robot.model)
+        stood = work.impact.touching[rows.first[STOP] : rows.end[STOP]].copy()
+        work.impact.touching[:] = NEVER
         if stops:
-            work.impact.touching[:] = NEVER
             clock.begun = 0  # loops are closed again
+        else:
+            work.impact.touching[rows.first[STOP] : rows.end[STOP]] = stood
         work.impact.corner.near = 0
 
     def check(self, setting: Setting) -> None:
@@ -330,7 +341,10 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
     if memory.loops.unknown.shape[0] > 0:
         find_loops_of_step(model, memory)
     if ground.concave == 1:
-        locate_corners(model, ground, equations.tree, work.impact.corner)
+        locate_corners(
+            model, ground, equations.tree, memory.rows, memory.seconds, memory.surface,
+            work.impact.corner,
+        )  # fmt: skip
 
 
 @dissolved_kernel
@@ -439,47 +453,49 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
 
 
 @dissolved_kernel
-def stops_are_near(model: Model, step: float, q: Floats, v: Floats) -> bool:
+def locate_stops(q: Floats, rows: Rows) -> None:
+    """Write the gaps of the joint stops."""
+    for stop in range(rows.first[STOP], rows.end[STOP]):
+        rows.gap[stop] = rows.side[stop] * (q[rows.owner[stop]] - rows.limit[stop])
+
+
+@dissolved_kernel
+def stops_are_near(step: float, v: Floats, rows: Rows) -> bool:
     """Whether any joint stop could act in a step that bounds the gap at its end."""
     near = 0
-    for joint in range(model.nv):
-        reach = step * max(CLOSING_RATE, 2.0 * abs(v[joint]))
-        near += (q[joint] - model.lower[joint] < reach) | (model.upper[joint] - q[joint] < reach)
+    for stop in range(rows.first[STOP], rows.end[STOP]):
+        near += rows.gap[stop] < step * max(CLOSING_RATE, 2.0 * abs(v[rows.owner[stop]]))
     return near > 0
 
 
 @dissolved_kernel
-def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> int:
+def select_stops(work: Stepping, count: int, memory: Memory) -> int:
     """Append the joint stops that could act in this step: contacts without friction."""
     assembly, problem, step = memory.assembly, memory.assembly.problem, work.step
-    linearised, calls = is_linearised(work.scheme), work.impact.calls
-    if linearised and calls == 0 and not stops_are_near(model, step, memory.q, memory.next_v):
+    linearised, calls, rows = is_linearised(work.scheme), work.impact.calls, memory.rows
+    locate_stops(memory.q, rows)
+    if linearised and calls == 0 and not stops_are_near(step, memory.next_v, rows):
         return count
-    for joint in range(model.nv):
-        for end in range(2):
-            sign = 1.0 - 2.0 * end
-            limit = model.upper[joint] if end == 1 else model.lower[joint]
-            gap = sign * (memory.q[joint] - limit)
-            normal = sign * memory.next_v[joint]
-            before = sign * memory.v[joint]
-            if linearised:
-                far = not gap < step * max(CLOSING_RATE, -2.0 * normal)
-                place = model.nc + 2 * joint + end
-                if far and (calls == 0 or work.impact.called[place] == 0):
-                    continue
-                normal += gap / step
-            elif work.scheme == MOREAU_JEAN:
-                if not gap + 0.5 * step * before <= work.activation:
-                    continue
-            elif not gap <= work.activation:
+    for stop in range(rows.first[STOP], rows.end[STOP]):
+        joint, side, gap = rows.owner[stop], rows.side[stop], rows.gap[stop]
+        normal = side * memory.next_v[joint]
+        if linearised:
+            far = not gap < step * max(CLOSING_RATE, -2.0 * normal)
+            if far and (calls == 0 or work.impact.called[stop] == 0):
                 continue
-            problem.free[2 * count] = normal
-            problem.free[2 * count + 1] = 0.0
-            problem.set[count] = HALF_LINE
-            problem.friction[count] = 0.0
-            assembly.answer.mode[count] = memory.reaction.stop_mode[joint, end]
-            assembly.candidate[count] = model.nc + 2 * joint + end
-            count += 1
+            normal += gap / step
+        elif work.scheme == MOREAU_JEAN:
+            if not gap + 0.5 * step * side * memory.v[joint] <= work.activation:
+                continue
+        elif not gap <= work.activation:
+            continue
+        problem.free[2 * count] = normal
+        problem.free[2 * count + 1] = 0.0
+        problem.set[count] = HALF_LINE
+        problem.friction[count] = 0.0
+        assembly.answer.mode[count] = memory.reaction.mode[stop]
+        assembly.candidate[count] = stop
+        count += 1
     return count
 
 
@@ -489,31 +505,30 @@ def hold_latched(model: Model, count: int, memory: Memory) -> int:
 
     Where the gap decides, and a scheme has left a joint before its stop, it is held there.
     """
-    loops, assembly = memory.loops, memory.assembly
-    missing = hold(count, loops.latch_stop, loops.held, assembly)
+    loops, assembly, stops = memory.loops, memory.assembly, memory.rows.latch_stop
+    missing = hold(count, stops, loops.held, assembly)
     while missing >= 0:
         joint = model.latch_joint[missing]
         assembly.problem.free[2 * count] = -model.latch_side[missing] * memory.next_v[joint]
         assembly.problem.free[2 * count + 1] = 0.0
         assembly.problem.friction[count] = 0.0
         assembly.answer.mode[count] = STICK
-        assembly.candidate[count] = loops.latch_stop[missing]
+        assembly.candidate[count] = stops[missing]
         count += 1
-        missing = hold(count, loops.latch_stop, loops.held, assembly)
+        missing = hold(count, stops, loops.held, assembly)
     return count
 
 
 @kernel
 def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> int:
     """Append the second faces of corners that could act in this step, and write their rows."""
-    assembly, corner, step = memory.assembly, work.impact.corner, work.step
-    problem, gaps = assembly.problem, corner.contacts.gap
-    for contact in range(model.nc):
-        gap = gaps[contact]
+    assembly, rows, step = memory.assembly, memory.rows, work.step
+    problem, tree, surface = assembly.problem, memory.equations.tree, memory.surface
+    for second in range(rows.first[SECOND_FACE], rows.end[SECOND_FACE]):
+        gap = rows.gap[second]
         if gap > FAR_STEPS * CLOSING_SPEED * step:
             continue
-        tree = memory.equations.tree
-        contact_rows(model, tree, corner.contacts, contact, count, assembly)
+        contact_rows(model, tree, memory.seconds, rows.owner[second], count, assembly)
         normal = row_product(assembly.jacobian, 2 * count, memory.next_v)
         if is_linearised(work.scheme):
             if gap > step * max(CLOSING_SPEED, -2.0 * normal):
@@ -524,7 +539,7 @@ def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> 
             if gap + 0.5 * step * before > work.activation:
                 continue
             if work.impact.relaxed == 0:
-                work.impact.bounce[count] = corner.restitution[contact] * before
+                work.impact.bounce[count] = surface.restitution[second] * before
                 normal += work.impact.bounce[count]
         elif gap > work.activation:
             continue
@@ -532,46 +547,40 @@ def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> 
         tangent = row_product(assembly.jacobian, 2 * count + 1, memory.next_v)
         problem.free[2 * count + 1] = tangent
         problem.set[count] = CONE
-        problem.friction[count] = corner.friction[contact]
-        assembly.answer.mode[count] = corner.mode[contact]
-        assembly.candidate[count] = model.nc + 2 * model.nv + contact
+        problem.friction[count] = surface.friction[second]
+        assembly.answer.mode[count] = memory.reaction.mode[second]
+        assembly.candidate[count] = second
         count += 1
-        corner.count += 1
     return count
 
 
 @kernel
 def write_rows(
-    model: Model, tree: Workspace, contacts: Contacts, count: int, assembly: Assembly
+    model: Model, tree: Workspace, contacts: Contacts, rows: Rows, assembly: Assembly
 ) -> None:
-    """Write the Jacobian rows of the first `count` candidates, contact points and stops.
+    """Write the Jacobian rows of the candidates that are contact points and stops.
 
     A stop has a normal row ±1 at its joint and a tangent row of zeros.
     """
-    for place in range(count):
-        stop = assembly.candidate[place] - model.nc
-        if stop < 0:
-            contact_rows(model, tree, contacts, assembly.candidate[place], place, assembly)
-        else:
-            write_unit_row(stop // 2, 2 * place, 1.0 - 2.0 * (stop % 2), assembly)
+    for place in range(assembly.begin[POINT], assembly.until[POINT]):
+        contact_rows(model, tree, contacts, assembly.candidate[place], place, assembly)
+    for place in range(assembly.begin[STOP], assembly.until[STOP]):
+        stop = assembly.candidate[place]
+        write_unit_row(rows.owner[stop], 2 * place, rows.side[stop], assembly)
 
 
 @kernel
-def joint_row(
-    model: Model, dry_joint: Integers, candidate: Integers, place: int
-) -> tuple[int, int, float]:
+def joint_row(rows: Rows, assembly: Assembly, place: int) -> tuple[int, int, float]:
     """Row of a candidate that is a stop or a dry joint, its joint, and the sign of the two."""
-    stop = candidate[place] - model.nc
-    dry = stop - 2 * model.nv - model.nc
-    if dry >= 0:
-        return 2 * place + 1, dry_joint[dry], 1.0
-    return 2 * place, stop // 2, 1.0 - 2.0 * (stop % 2)
+    entry = assembly.candidate[place]
+    row = 2 * place + 1 if rows.kind[entry] == DRY_JOINT else 2 * place
+    return row, rows.owner[entry], rows.side[entry]
 
 
 @dissolved_kernel
 def gather_delassus(
-    model: Model, contacts: Contacts, dry_joint: Integers, near: int, count: int,
-    equations: Equations, usual: UsualPoints, assembly: Assembly,
+    model: Model, contacts: Contacts, rows: Rows, near: int, count: int, equations: Equations,
+    usual: UsualPoints, assembly: Assembly,
 ) -> None:  # fmt: skip
     """Delassus matrix of all usual points; that of the candidates too, if these are others."""
     candidate, usual_place = assembly.candidate, usual.usual_place
@@ -593,17 +602,14 @@ def gather_delassus(
                 for j in range(2):
                     entry = usual.usual_problem.delassus[row + i, column + j]
                     assembly.problem.delassus[2 * place + i, 2 * other + j] = entry
-    first_loop = 2 * (model.nc + model.nv) + dry_joint.shape[0]
-    for place in range(near, count):
-        if candidate[place] >= first_loop:
-            break
-        add_joint(model, contacts, dry_joint, near, place, equations, usual, assembly)
+    for place in range(near, assembly.until[DRY_JOINT]):
+        add_joint(model, contacts, rows, near, place, equations, usual, assembly)
 
 
 @dissolved_kernel
 def add_joint(
-    model: Model, contacts: Contacts, dry_joint: Integers, near: int, place: int,
-    equations: Equations, usual: UsualPoints, assembly: Assembly,
+    model: Model, contacts: Contacts, rows: Rows, near: int, place: int, equations: Equations,
+    usual: UsualPoints, assembly: Assembly,
 ) -> None:  # fmt: skip
     """Add the stop or dry joint at a place to the Delassus matrix of the candidates before.
 
@@ -611,7 +617,7 @@ def add_joint(
     ``assembly.jacobian``.
     """
     candidate, delassus = assembly.candidate, assembly.problem.delassus
-    row, joint, sign = joint_row(model, dry_joint, candidate, place)
+    row, joint, sign = joint_row(rows, assembly, place)
     change = assembly.jacobian[row]
     for j in range(model.nv):
         change[j] = 0.0
@@ -629,7 +635,7 @@ def add_joint(
             delassus[row, 2 * other + i] = entry
             delassus[2 * other + i, row] = entry
     for other in range(near, place + 1):
-        column, its_joint, its_sign = joint_row(model, dry_joint, candidate, other)
+        column, its_joint, its_sign = joint_row(rows, assembly, other)
         entry = its_sign * change[its_joint]
         delassus[row, column] = entry
         delassus[column, row] = entry
@@ -659,7 +665,7 @@ def add_loop(model: Model, near: int, joints: int, place: int, memory: Memory) -
     for other in range(near, place + 1):
         column = 2 * other
         if other < joints:
-            column, joint, sign = joint_row(model, memory.dry_joint, candidate, other)
+            column, joint, sign = joint_row(memory.rows, assembly, other)
             entry = sign * change[joint]
         else:
             entry = speed_along(other - joints, memory.loops, change)
@@ -669,7 +675,7 @@ def add_loop(model: Model, near: int, joints: int, place: int, memory: Memory) -
 
 @dissolved_kernel
 def push_candidates(
-    model: Model, contacts: Contacts, assembly: Assembly, near: int, count: int,
+    model: Model, contacts: Contacts, rows: Rows, assembly: Assembly, near: int, count: int,
     equations: Equations, usual: UsualPoints, v: Floats,
 ) -> None:  # fmt: skip
     """Add what the impulses of the candidates do to a velocity, after `gather_delassus`."""
@@ -689,9 +695,7 @@ def push_candidates(
             ),
         )  # fmt: skip
     for place in range(near, count):
-        row = 2 * place
-        if assembly.candidate[place] >= 2 * (model.nc + model.nv):
-            row += 1
+        row, _, _ = joint_row(rows, assembly, place)
         for j in range(model.nv):
             v[j] += impulse[row] * assembly.jacobian[row, j]
 
@@ -705,7 +709,7 @@ def push_all(
     equations, usual = memory.equations, memory.usual
     if straight:
         joints = count - rows_of(memory.loops)
-        push_candidates(model, contacts, assembly, near, joints, equations, usual, v)
+        push_candidates(model, contacts, memory.rows, assembly, near, joints, equations, usual, v)
         for place in range(joints, count):
             for j in range(model.nv):
                 v[j] += assembly.answer.impulse[2 * place] * assembly.jacobian[2 * place, j]
@@ -714,27 +718,26 @@ def push_all(
 
 
 @dissolved_kernel
-def solve_candidates(
-    model: Model, near: int, joints: int, count: int, work: Stepping, memory: Memory
-) -> bool:
+def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory: Memory) -> bool:
     """Find the impulses of the candidates and add what they do to the velocity; return success.
 
-    Points are the first `near` of `count`, points and stops the first `joints`.
+    Points are the first `near` of `count`.
     """
-    assembly, contacts, dry_joint = memory.assembly, memory.contacts, memory.dry_joint
+    assembly, contacts, rows = memory.assembly, memory.contacts, memory.rows
     equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
     impact, step = work.impact, work.step
-    corners = impact.corner.count
-    straight = corners == 0 and are_usual(assembly.candidate, near, DELASSUS, usual)
+    straight = not are_there(SECOND_FACE, assembly) and are_usual(
+        assembly.candidate, near, DELASSUS, usual
+    )
     if straight:
-        gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
+        gather_delassus(model, contacts, rows, near, count, equations, usual, assembly)
         loops = count - rows_of(memory.loops)
         for place in range(loops, count):
             add_loop(model, near, loops, place, memory)
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:
-        write_rows(model, equations.tree, contacts, joints, assembly)
+        write_rows(model, equations.tree, contacts, rows, assembly)
         assemble_delassus(model, count, equations, assembly)
     problem.count = count
     if work.scheme == MOREAU_JEAN:
@@ -744,7 +747,7 @@ def solve_candidates(
         status = solve_contact_kernel(work.order, problem, memory.solver, assembly.answer)
         solved = status == SOLVED
     resolves = solved and work.scheme == IMPACT_RESOLVED
-    if resolves and falls_into(model, step, problem, memory, impact):
+    if resolves and falls_into(step, problem, memory, impact):
         impact.happens = 1
         arriving = impact.arriving
         for j in range(model.nv):
@@ -752,7 +755,7 @@ def solve_candidates(
         push_all(model, near, count, straight, memory, arriving)
         if impact.relaxed == 1:
             push_out(model, near, count, straight, problem, work, memory)
-        members = find_members(model, step, problem, memory, impact)
+        members = find_members(step, problem, memory, impact)
         pose_impact(model, step, members, problem, memory, impact)
         solved = solve_impact(work.order, members, problem, memory.solver, impact, assembly)
     push_all(model, near, count, straight, memory, memory.next_v)
@@ -766,7 +769,7 @@ def push_out(
 ) -> None:  # fmt: skip
     """Let the positions of a wedge come out of the ground, where a way without friction leads."""
     impact, answer = work.impact, memory.assembly.answer
-    pose_way_out(model, work.step, problem, memory, impact)
+    pose_way_out(work.step, problem, memory, impact)
     solver, its = memory.solver, impact.answer
     if solve_contact_kernel(work.order, impact.problem, solver, its) == SOLVED:
         for row in range(2 * count):
@@ -833,12 +836,11 @@ def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Im
     for contact in range(model.nc):
         if contacts.gap[contact] + step * usual.point_velocity[contact, 0] < -TOUCHING:
             call(contact, impact)
-    for joint in range(model.nv):
-        after = memory.q[joint] + step * v[joint]
-        if after < model.lower[joint] - TOUCHING:
-            call(model.nc + 2 * joint, impact)
-        if after > model.upper[joint] + TOUCHING:
-            call(model.nc + 2 * joint + 1, impact)
+    rows = memory.rows
+    for stop in range(rows.first[STOP], rows.end[STOP]):
+        joint, side = rows.owner[stop], rows.side[stop]
+        if side * (memory.q[joint] + step * v[joint]) < side * rows.limit[stop] - TOUCHING:
+            call(stop, impact)
     return impact.calls > calls
 
 
@@ -851,10 +853,10 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
     out of where they are already, or lets them bounce; they are left there, then, and in a wedge
     that lasts at once.
     """
-    assembly, reaction, impact = memory.assembly, memory.reaction, work.impact
+    assembly, impact = memory.assembly, work.impact
     again = True
     solved = True
-    near = joints = count = 0
+    near = count = 0
     impact.relaxed = int(stays_wedged(memory.tally.steps, impact))
     at_once = impact.relaxed == 1
     while again:
@@ -865,30 +867,32 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
         for i in range(3):
             assembly.answer.residual[i] = 0.0
         near = select_candidates(model, work, memory)
-        count = select_stops(model, work, near, memory)
-        joints = count = hold_latched(model, count, memory)
+        note_group(POINT, 0, near, assembly)
+        count = hold_latched(model, select_stops(work, near, memory), memory)
+        first = note_group(STOP, near, count, assembly)
         count = select_dry_joints(
-            model, work.step, count, memory.dry_joint, memory.breakaway, reaction.dry_mode,
-            memory.next_v, assembly,
+            memory.rows, work.step, count, memory.breakaway, memory.reaction.mode, memory.next_v,
+            assembly,
         )  # fmt: skip
-        impact.corner.count = 0
+        first = note_group(DRY_JOINT, first, count, assembly)
         if impact.corner.near > 0:
             count = select_corners(model, count, work, memory)
-        first_loop = 2 * (model.nc + model.nv) + memory.dry_joint.shape[0]
-        count = append_loops(first_loop, count, memory.loops, assembly)
+        first = note_group(SECOND_FACE, first, count, assembly)
+        count = append_loops(count, memory.loops, assembly)
+        note_group(LOOP, first, count, assembly)
         free_loops(count, memory.loops, memory.next_v, 0.5 * work.step, assembly)
         if at_once:
-            deepest, bounces = left_alone(model, count, memory, impact)
+            deepest, bounces = left_alone(count, memory)
             if deepest == 0.0 and not bounces:  # the wedge is over
                 impact.relaxed = 0
         if impact.relaxed == 1 and is_linearised(work.scheme):
-            close_gaps(model, work.step, count, impact, memory)
+            close_gaps(work.step, count, memory)
         if count > 0:
-            solved = solve_candidates(model, near, joints, count, work, memory)
+            solved = solve_candidates(model, near, count, work, memory)
         v = impact.arriving if impact.happens == 1 else memory.next_v
         if not solved:
-            again = relax(model, is_linearised(work.scheme), count, memory, impact)
-        elif at_once and impact.relaxed == 1 and modes_change(model, count, memory, impact):
+            again = relax(is_linearised(work.scheme), count, memory, impact)
+        elif at_once and impact.relaxed == 1 and modes_change(memory):
             at_once, impact.relaxed = False, 0
         elif is_linearised(work.scheme):
             again = may_go_through(model, work, near, count, v, memory) and call_missed(
@@ -899,52 +903,53 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
     if impact.calls > 0:
         dismiss(impact)
     if work.scheme == IMPACT_RESOLVED:
-        note_touching(model, work.step, count, memory, impact)
-    note_answer(model, work.step, near, count, memory, impact.corner)
-    if impact.corner.count > 0:
-        join_forces(model, impact.corner, memory.contacts)
+        note_touching(work.step, count, memory, impact)
+    note_answer(model, work.step, memory)
+    if are_there(SECOND_FACE, assembly):
+        join_forces(model, memory.seconds, memory.contacts)
     return solved
 
 
 @dissolved_kernel
-def note_answer(
-    model: Model, step: float, near: int, count: int, memory: Memory, corner: Corner
-) -> None:
+def note_answer(model: Model, step: float, memory: Memory) -> None:
     """Keep the forces, slips and modes of the candidates; all others have none."""
-    answer, force, reaction = memory.assembly.answer, memory.contacts.force, memory.reaction
+    assembly, answer, rows = memory.assembly, memory.assembly.answer, memory.rows
+    candidate, begin, until, impulse = (
+        assembly.candidate,
+        assembly.begin,
+        assembly.until,
+        answer.impulse,
+    )
+    force, reaction, seconds = memory.contacts.force, memory.reaction, memory.seconds
     for joint in range(model.nv):
         reaction.stop_torque[joint] = 0.0
-        reaction.stop_mode[joint, 0] = 0
-        reaction.stop_mode[joint, 1] = 0
     for contact in range(model.nc):
         force[contact, 0] = 0.0
         force[contact, 1] = 0.0
         reaction.slip[contact] = 0.0
-        reaction.mode[contact] = 0
-    for place in range(near):
-        contact = memory.assembly.candidate[place]
-        force[contact, 0] = answer.impulse[2 * place] / step
-        force[contact, 1] = answer.impulse[2 * place + 1] / step
+    for entry in range(rows.first[DRY_JOINT]):
+        reaction.mode[entry] = OPEN
+    for place in range(begin[POINT], until[POINT]):
+        contact = candidate[place]
+        force[contact, 0] = impulse[2 * place] / step
+        force[contact, 1] = impulse[2 * place + 1] / step
         reaction.slip[contact] = answer.velocity[2 * place + 1]
         reaction.mode[contact] = answer.mode[place]
-    for place in range(near, count):
-        stop = memory.assembly.candidate[place] - model.nc
-        other = stop - 2 * model.nv
-        dry = other - model.nc
-        loop = dry - memory.dry_joint.shape[0]
-        if loop >= 0:
-            note_loop(model, loop, answer.impulse[2 * place] / step, memory.loops)
-        elif dry >= 0:
-            reaction.friction_torque[memory.dry_joint[dry]] = answer.impulse[2 * place + 1] / step
-            reaction.dry_mode[dry] = answer.mode[place]
-        elif other >= 0:
-            corner.contacts.force[other, 0] = answer.impulse[2 * place] / step
-            corner.contacts.force[other, 1] = answer.impulse[2 * place + 1] / step
-            corner.mode[other] = answer.mode[place]
-        else:
-            normal = answer.impulse[2 * place]
-            reaction.stop_torque[stop // 2] += (1.0 - 2.0 * (stop % 2)) * normal / step
-            reaction.stop_mode[stop // 2, stop % 2] = answer.mode[place] != 0
+    for place in range(begin[STOP], until[STOP]):
+        stop = candidate[place]
+        reaction.stop_torque[rows.owner[stop]] += rows.side[stop] * impulse[2 * place] / step
+        reaction.mode[stop] = answer.mode[place] != OPEN
+    for place in range(begin[DRY_JOINT], until[DRY_JOINT]):
+        dry = candidate[place]
+        reaction.friction_torque[rows.owner[dry]] = impulse[2 * place + 1] / step
+        reaction.mode[dry] = answer.mode[place]
+    for place in range(begin[SECOND_FACE], until[SECOND_FACE]):
+        second = candidate[place]
+        contact = rows.owner[second]
+        seconds.force[contact, 0] = impulse[2 * place] / step
+        seconds.force[contact, 1] = impulse[2 * place + 1] / step
+        reaction.mode[second] = answer.mode[place]
+    note_loops(rows, until[LOOP], step, impulse, memory.loops)
 
 
 @dissolved_kernel

@@ -1,0 +1,142 @@
+"""The table of rows: all that may hold a robot, kind by kind, numbered once for every method.
+
+Whatever acts on the robot from outside its tree of joints brings rows to the contact problem, with
+a set in which their impulses lie (:mod:`heelstrike.contact.sets`)::
+
+    kind           set         components   owner          gap
+    POINT          cone        2            contact point  to the nearest face of the ground
+    STOP           half-line   1            joint          to that end of its range
+    DRY_JOINT      interval    1            joint          none
+    SECOND_FACE    cone        2            contact point  to the other face of a concave corner
+    LOOP           line        1            closed loop    none: along x, then along z
+    COUPLING       line        1            coupled joint  none
+    BRAKE          line        1            brake          none
+
+The table is laid out before a simulation begins. An entry is whatever has one gap and one set; its
+number is its place in the table, and nothing else: what it is, and of what, is looked up. Kernels
+go kind by kind, ``for stop in range(rows.first[STOP], rows.end[STOP])``, so that a kind that a
+robot does not have costs nothing. Contact points come first: theirs are the same numbers as those
+in ``Contacts``. A latch is no kind of its own: while it holds, the set of its stop is the line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.compiler.bundle import Bundle, array
+from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
+from heelstrike.robot.model import Model
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+POINT, STOP, DRY_JOINT, SECOND_FACE, LOOP, COUPLING, BRAKE = range(7)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What entries of a kind have in common.
+
+    Attributes
+    ----------
+    name : str
+    set : int
+        Where their impulses lie.
+    components : int
+        How many rows of the contact problem each of them is.
+    """
+
+    name: str
+    set: int
+    components: int
+
+
+KINDS = (
+    Kind("contact point", CONE, 2),
+    Kind("joint stop", HALF_LINE, 1),
+    Kind("dry joint", INTERVAL, 1),
+    Kind("second face", CONE, 2),
+    Kind("loop", LINE, 1),
+    Kind("coupling", LINE, 1),
+    Kind("brake", LINE, 1),
+)
+
+
+class Rows(Bundle):
+    """The table of rows of a robot.
+
+    Attributes
+    ----------
+    first, end : (kinds,) int
+        The first entry of each kind, and the one after its last.
+    set, components : (kinds,) int
+        Where impulses of each kind lie, and how many rows each entry is.
+    kind, owner : (entries,) int
+        What each entry is, and of what: the contact point, joint, loop, coupling or brake.
+    side : (entries,) float
+        1 for the lower, -1 for the upper end of a joint's range; 1 for all other entries.
+    limit : (entries,) float
+        Position of the joint at that end (rad, m).
+    axis : (entries,) int
+        0 for the row along x, 1 for the row along z of a loop; 0 for all other entries.
+    gap : (entries,) float
+        How far each is from what would hold it (m, rad), infinite if it has no gap: of points and
+        second faces as they were located last, of stops as somebody wrote it.
+    latch_stop : (latches,) int
+        The stop that each latch is.
+    """
+
+    first: Integers = array("kinds", of=int)
+    end: Integers = array("kinds", of=int)
+    set: Integers = array("kinds", of=int)
+    components: Integers = array("kinds", of=int)
+    kind: Integers = array("entries", of=int)
+    owner: Integers = array("entries", of=int)
+    side: Floats = array("entries")
+    limit: Floats = array("entries")
+    axis: Integers = array("entries", of=int)
+    gap: Floats = array("entries")
+    latch_stop: Integers = array("latches", of=int)
+
+
+def dry_joints(model: Model) -> Integers:
+    """Return the joints that may have dry friction, of their own or of a brake that slips."""
+    slipping = model.brake_joint[np.isfinite(model.brake_limit)]
+    return np.union1d(np.flatnonzero(model.dry_friction > 0.0), slipping).astype(np.int64)
+
+
+def lay_out_rows(model: Model) -> Rows:
+    """Lay the table of a robot out."""
+    ends = np.column_stack((model.lower, model.upper))
+    joint, upper = np.nonzero(np.isfinite(ends))
+    points = np.arange(model.nc)
+    owners = (
+        points, joint, dry_joints(model), points, np.repeat(np.arange(model.loops), 2),
+        np.arange(model.couplings), np.arange(model.brakes),
+    )  # fmt: skip
+    sizes = [len(owner) for owner in owners]
+    end = np.cumsum(sizes)
+    first = end - sizes
+    stops = slice(first[STOP], end[STOP])
+    rows = Rows.allocate(
+        kinds=len(KINDS),
+        entries=int(end[-1]),
+        latches=model.latches,
+        first=first,
+        end=end,
+        set=np.array([kind.set for kind in KINDS]),
+        components=np.array([kind.components for kind in KINDS]),
+        kind=np.repeat(np.arange(len(KINDS)), sizes),
+        owner=np.concatenate(owners).astype(np.int64),
+        latch_stop=first[STOP]
+        + np.searchsorted(2 * joint + upper, 2 * model.latch_joint + (model.latch_side > 0)),
+    )
+    rows.side[:] = 1.0
+    rows.side[stops] = 1.0 - 2.0 * upper
+    rows.limit[stops] = ends[joint, upper]
+    rows.axis[first[LOOP] : end[LOOP]] = np.tile((0, 1), model.loops)
+    rows.gap[:] = np.inf
+    return rows
