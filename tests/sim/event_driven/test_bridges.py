@@ -16,6 +16,7 @@ from scenes.scene import random_scene
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.robot import RobotBuilder
 from heelstrike.sim import Event, EventKind, RunStatus, Simulation
 from heelstrike.sim.event_driven.bridge import MOST_BRIDGES
 
@@ -262,3 +263,33 @@ def test_what_slides_under_a_torque_that_switches_does_not_jam_forever() -> None
     assert run.completed
     assert len(bridges(run)) == 1
     assert sum(event.kind is EventKind.PAINLEVE for event in run.events) < 20
+
+
+def test_a_bridge_refuses_impulses_that_make_energy() -> None:
+    """A rod whose end strikes the ground askew: Newton's restitution alone would make energy.
+
+    With the normal velocity after the impact 0.9 times that before, and friction 1, the impulses of
+    the velocity-level problem multiply its kinetic energy by 2.49; without restitution they cannot
+    add to it: ½ p·(w⁻ + w⁺) ≤ 0 where w⁺ is perpendicular to what presses, and friction opposes it.
+    """
+    build = RobotBuilder("rod")
+    build.floating_base("rod", mass=1.0, inertia=1.0 / 12.0)
+    build.contact("rod", (0.0, -1.0))
+    robot = build.build()
+    simulation = Simulation(
+        robot, state=hs.State([0.0, 3.0, -0.5613], [0.0, 0.0, 0.0]), method=hs.EventDriven(),
+        ground=hs.Ground(friction=1.0, restitution=0.9), stop_when_fallen=False,
+    )  # fmt: skip
+    simulation.advance(1e-3)
+    work, memory = simulation._work, simulation._memory
+    struck = np.array([0.0, np.cos(0.5613), -0.5613, 0.2336, -0.3435, 2.586])
+    assert abs(contact_kinematics(robot, struck[:3], struck[3:]).gap[0]) < 1e-12
+    work.step.begin[:], memory.q[:], memory.v[:] = struck, struck[:3], struck[3:]
+    work.decision.bridging, work.series.count, work.series.begin = 1, 1, simulation.time
+    simulation.advance(1e-3 + 4e-6)
+    (bridge,) = bridges(simulation.record)
+    assert bridge.time == 1e-3
+    mass = dynamics.mass_matrix(robot, struck[:3])
+    before, after = (0.5 * v @ mass @ v for v in (struck[3:], work.bridge.after[3:]))
+    assert after < before
+    assert simulation.record.events[-1].impulse[0] > 0.0  # it was struck

@@ -41,6 +41,7 @@ from heelstrike.sim.contacts.loops import (
     rows_of,
     speed_along,
 )
+from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import free_acceleration, solve_candidates
@@ -58,7 +59,6 @@ from heelstrike.sim.event_driven.phase import (
     Bridge,
     Faces,
     Impact,
-    Layout,
     Modes,
     Motion,
     Phase,
@@ -94,9 +94,9 @@ FROM_HALVES, FROM_QUARTERS = 2.0, 4.0
 
 @kernel
 def write_free(
-    gap: float, length: float, contact: int, place: int, model: Model, layout: Layout,
-    breakaway: Floats, begin: Floats, equations: Equations, contacts: Contacts, faces: Faces,
-    added: Floats, assembly: Assembly,
+    gap: float, length: float, contact: int, place: int, model: Model, rows: Rows,
+    seconds: Contacts, breakaway: Floats, begin: Floats, equations: Equations, contacts: Contacts,
+    faces: Faces, added: Floats, assembly: Assembly,
 ) -> None:  # fmt: skip
     """Make a contact a candidate: what is left of its gap may still close, at leisure.
 
@@ -106,22 +106,22 @@ def write_free(
     v = begin[model.nq :]
     free, jacobian = assembly.problem.free, assembly.jacobian
     free_gap_acceleration(
-        model, contacts, equations, contact, place, layout, breakaway, faces, assembly
+        model, contacts, equations, contact, place, rows, seconds, breakaway, faces, assembly
     )
     for row in range(2 * place, 2 * place + 2):
         free[row] = row_product(jacobian, row, v) + length * free[row]
     added[place] = gap / length if gap > TOUCHING else 0.0
     free[2 * place] += added[place]
-    if layout.first_dry <= contact < layout.first_second:
+    if rows.kind[contact] == DRY_JOINT:
         assembly.problem.bound[place] *= length
     assembly.candidate[place] = contact
 
 
 @kernel
 def gather_near(
-    model: Model, length: float, bouncing: bool, layout: Layout, modes: Modes, begin: Floats,
-    equations: Equations, contacts: Contacts, restitution: Floats, faces: Faces, bridge: Bridge,
-    assembly: Assembly,
+    model: Model, length: float, bouncing: bool, rows: Rows, seconds: Contacts, modes: Modes,
+    begin: Floats, equations: Equations, contacts: Contacts, restitution: Floats, faces: Faces,
+    bridge: Bridge, assembly: Assembly,
 ) -> int:  # fmt: skip
     """List what could touch within a bridge, and dry joints, with Jacobian rows and free terms.
 
@@ -130,30 +130,30 @@ def gather_near(
     state, trial = begin, bridge.free_end
     jacobian = assembly.jacobian
     count = 0
-    for contact in range(layout.watched):
-        if contact < model.nc and modes.passing[contact] == 1:
+    for contact in range(modes.watched):
+        if rows.kind[contact] == POINT and modes.passing[contact] == 1:
             continue
-        if contact >= layout.first_second:
-            point = contact - layout.first_second
-            if modes.passing[point] == 1 or faces.seconds.gap[point] == np.inf:
+        if rows.kind[contact] == SECOND_FACE:
+            point = rows.owner[contact]
+            if modes.passing[point] == 1 or seconds.gap[point] == np.inf:
                 continue
-        if layout.first_dry <= contact < layout.first_second and modes.closed[contact] == 0:
+        if rows.kind[contact] == DRY_JOINT and modes.closed[contact] == 0:
             continue
-        gap_rows(model, equations.tree, contacts, layout, faces.seconds, contact, count, assembly)
-        if layout.first_dry <= contact < layout.first_second:
+        gap_rows(model, equations.tree, contacts, rows, seconds, contact, count, assembly)
+        if rows.kind[contact] == DRY_JOINT:
             write_free(
-                0.0, length, contact, count, model, layout, modes.breakaway, begin, equations,
-                contacts, faces, bridge.added, assembly,
+                0.0, length, contact, count, model, rows, seconds, modes.breakaway, begin,
+                equations, contacts, faces, bridge.added, assembly,
             )  # fmt: skip
             count += 1
             continue
-        gap = gap_now(contact, contacts, layout, faces.seconds, state)
+        gap = gap_now(contact, rows, state)
         normal = row_product(jacobian, 2 * count, trial[model.nq :])
         if gap > length * max(CLOSING_SPEED, -2.0 * normal):
             continue
         write_free(
-            gap, length, contact, count, model, layout, modes.breakaway, begin, equations, contacts,
-            faces, bridge.added, assembly,
+            gap, length, contact, count, model, rows, seconds, modes.breakaway, begin, equations,
+            contacts, faces, bridge.added, assembly,
         )  # fmt: skip
         came = row_product(jacobian, 2 * count, state[model.nq :])
         if bouncing and gap <= TOUCHING and came < -SLOW:
@@ -165,16 +165,18 @@ def gather_near(
 
 @kernel
 def find_faces(
-    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, layout: Layout,
-    closed: Integers, surface: Surface, faces: Faces,
+    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, rows: Rows,
+    closed: Integers, surface: Surface, seconds: Contacts, faces: Faces,
 ) -> None:  # fmt: skip
     """Put the open points on their nearest faces, for what else they could meet from there."""
-    if layout.watched == layout.first_second:
+    if faces.paired == 0:
         return
     for point in range(model.nc):
         if closed[point] == 0:
             faces.face[point] = NO_FACE
-            stand_on_face(model, ground, tree, point, contacts, layout, closed, surface, faces)
+            stand_on_face(
+                model, ground, tree, point, contacts, rows, closed, surface, seconds, faces
+            )
 
 
 @kernel
@@ -222,37 +224,35 @@ def made_energy(count: int, assembly: Assembly, added: Floats) -> bool:
 
 
 @kernel
-def lend_faces(
-    count: int, candidate: Integers, layout: Layout, closed: Integers, lent: Integers
-) -> None:
+def lend_faces(count: int, candidate: Integers, rows: Rows, modes: Modes, lent: Integers) -> None:
     """Keep the second faces of candidates, which open ones would look for anew wherever they are.
 
     Those that are lent so are marked in ``bridge.lent``.
     """
-    for contact in range(layout.first_second, layout.watched):
+    for contact in range(rows.first[SECOND_FACE], modes.watched):
         lent[contact] = 0
     for place in range(count):
         contact = candidate[place]
-        if contact >= layout.first_second and closed[contact] == 0:
-            lent[contact], closed[contact] = 1, 1
+        if rows.kind[contact] == SECOND_FACE and modes.closed[contact] == 0:
+            lent[contact], modes.closed[contact] = 1, 1
 
 
 @kernel
-def return_faces(layout: Layout, closed: Integers, lent: Integers) -> None:
+def return_faces(rows: Rows, modes: Modes, lent: Integers) -> None:
     """Take back what :func:`lend_faces` did."""
-    for contact in range(layout.first_second, layout.watched):
+    for contact in range(rows.first[SECOND_FACE], modes.watched):
         if lent[contact] == 1:
-            lent[contact], closed[contact] = 0, 0
+            lent[contact], modes.closed[contact] = 0, 0
 
 
 @kernel
-def keeps_face(
-    contact: int, model: Model, ground: GroundModel, layout: Layout, face: Integers
-) -> bool:
+def keeps_face(contact: int, ground: GroundModel, rows: Rows, face: Integers) -> bool:
     """Whether a candidate is a contact that will be on the same face at the end of a bridge."""
-    if layout.first_dry <= contact < layout.first_second:
+    if rows.kind[contact] == DRY_JOINT:
         return False
-    return contact >= model.nc or face[contact] != NO_FACE or not has_corners(ground)
+    if rows.kind[contact] in (STOP, SECOND_FACE):
+        return True
+    return face[contact] != NO_FACE or not has_corners(ground)
 
 
 @kernel
@@ -272,20 +272,21 @@ def reach_end(
 
 @kernel
 def observe_rows(
-    state: Floats, scene: Scene, layout: Layout, closed: Integers, tree: Workspace,
-    contacts: Contacts, surface: Surface, loops: Loops, faces: Faces,
+    state: Floats, scene: Scene, rows: Rows, modes: Modes, tree: Workspace, contacts: Contacts,
+    surface: Surface, loops: Loops, seconds: Contacts, faces: Faces,
 ) -> None:  # fmt: skip
     """Kinematics, contact points, and loops of a state (q, v)."""
     model = scene.model
-    observe_faces(model, scene.ground, state, layout, closed, faces, tree, contacts, surface)
+    observe_faces(model, scene.ground, state, rows, modes, seconds, faces, tree, contacts, surface)
     if rows_of(loops) > 0:
         find_loops(model, state[: model.nq], state[model.nq :], tree, loops)
 
 
 @kernel
 def put_in_place(
-    count: int, total: int, scene: Scene, begin: Floats, equations: Equations, contacts: Contacts,
-    surface: Surface, assembly: Assembly, loops: Loops, phase: Phase, bridge: Bridge,
+    count: int, total: int, scene: Scene, rows: Rows, begin: Floats, equations: Equations,
+    contacts: Contacts, surface: Surface, assembly: Assembly, loops: Loops, seconds: Contacts,
+    phase: Phase, bridge: Bridge,
 ) -> None:  # fmt: skip
     """Put on the ground what the bridge presses there at its end, and close the loops.
 
@@ -302,7 +303,7 @@ def put_in_place(
         kept[row] = impulse[row]
     for _ in range(2):
         observe_rows(
-            end, scene, phase.layout, phase.modes.closed, equations.tree, contacts, surface, loops,
+            end, scene, rows, phase.modes, equations.tree, contacts, surface, loops, seconds,
             phase.faces,
         )  # fmt: skip
         size = 0
@@ -312,7 +313,7 @@ def put_in_place(
             if (
                 kept[2 * place] > 0.0
                 and not leaves
-                and keeps_face(contact, model, scene.ground, phase.layout, phase.faces.face)
+                and keeps_face(contact, scene.ground, rows, phase.faces.face)
             ):
                 held.row[size] = 2 * place
                 size += 1
@@ -322,14 +323,12 @@ def put_in_place(
             size += 1
         for i in range(pressed):
             contact = assembly.candidate[held.row[i] // 2]
-            held.system[i, size] = -gap_now(
-                contact, contacts, phase.layout, phase.faces.seconds, end
-            )
+            held.system[i, size] = -gap_now(contact, rows, end)
         for i in range(pressed, size):
             held.system[i, size] = -loops.rows.displacement[i - pressed]
         observe_rows(
-            begin, scene, phase.layout, phase.modes.closed, equations.tree, contacts, surface,
-            loops, phase.faces,
+            begin, scene, rows, phase.modes, equations.tree, contacts, surface, loops, seconds,
+            phase.faces,
         )  # fmt: skip
         solve_constraints(size, 0.0, assembly.problem.delassus, held)
         for row in range(2 * total):
@@ -343,28 +342,26 @@ def put_in_place(
 
 @kernel
 def turn_rows(
-    count: int, total: int, scene: Scene, layout: Layout, closed: Integers, begin: Floats,
-    bridge: Bridge, tree: Workspace, contacts: Contacts, surface: Surface, assembly: Assembly,
-    loops: Loops, faces: Faces,
+    count: int, total: int, scene: Scene, rows: Rows, modes: Modes, begin: Floats, bridge: Bridge,
+    tree: Workspace, contacts: Contacts, surface: Surface, assembly: Assembly, loops: Loops,
+    seconds: Contacts, faces: Faces,
 ) -> None:  # fmt: skip
     """Let the free terms be those with which velocities at the end are what the problem says."""
     model = scene.model
     free, velocity = assembly.problem.free, assembly.answer.velocity
-    observe_rows(bridge.end, scene, layout, closed, tree, contacts, surface, loops, faces)
+    observe_rows(bridge.end, scene, rows, modes, tree, contacts, surface, loops, seconds, faces)
     for place in range(count, total):
         along = speed_along(place - count, loops, bridge.end[model.nq :])
         free[2 * place] += along - velocity[2 * place]
     for place in range(count):
         contact = assembly.candidate[place]
-        if not keeps_face(contact, model, scene.ground, layout, faces.face):
+        if not keeps_face(contact, scene.ground, rows, faces.face):
             continue
-        normal, tangent = gap_velocity(
-            contact, model, contacts, tree, layout, faces.seconds, bridge.end
-        )
+        normal, tangent = gap_velocity(contact, model, contacts, tree, rows, seconds, bridge.end)
         free[2 * place] += normal - (velocity[2 * place] - bridge.added[place])
-        if not model.nc <= contact < layout.first_dry:
+        if rows.kind[contact] != STOP:
             free[2 * place + 1] += tangent - velocity[2 * place + 1]
-    observe_rows(begin, scene, layout, closed, tree, contacts, surface, loops, faces)
+    observe_rows(begin, scene, rows, modes, tree, contacts, surface, loops, seconds, faces)
 
 
 @kernel
@@ -376,7 +373,7 @@ def solve_bridge(
     assembly, guess, friction = memory.assembly, memory.reaction.mode, memory.surface.friction
     for attempt in range(2):
         status = solve_candidates(
-            count, memory.loops, False, friction, guess, phase.layout, phase.modes.slide,
+            count, memory.loops, False, friction, guess, memory.rows, phase.modes.slide,
             phase.forces.solvers, assembly, memory.solver,
         )  # fmt: skip
         note_residual(assembly.answer.residual, memory.tally)
@@ -384,13 +381,13 @@ def solve_bridge(
             return False
         reach_end(total, length, free_end, scene, assembly, begin, memory.equations, bridge.end)
         put_in_place(
-            count, total, scene, begin, memory.equations, memory.contacts, memory.surface, assembly,
-            memory.loops, phase, bridge,
+            count, total, scene, memory.rows, begin, memory.equations, memory.contacts,
+            memory.surface, assembly, memory.loops, memory.seconds, phase, bridge,
         )  # fmt: skip
         if attempt == 0:
             turn_rows(
-                count, total, scene, phase.layout, phase.modes.closed, begin, bridge,
-                memory.equations.tree, memory.contacts, memory.surface, assembly, memory.loops,
+                count, total, scene, memory.rows, phase.modes, begin, bridge, memory.equations.tree,
+                memory.contacts, memory.surface, assembly, memory.loops, memory.seconds,
                 phase.faces,
             )  # fmt: skip
     return True
@@ -406,47 +403,47 @@ def find_impulses(
     The velocities behind the impulses of the contacts go to ``bridge.after``, the impulses to
     ``impact.impulse``, what the contacts do at the end of it to ``memory.reaction.mode``.
     """
-    layout, modes = phase.layout, phase.modes
+    modes = phase.modes
     model, equations, assembly = scene.model, memory.equations, memory.assembly
     begin, end, free_end = step.begin, bridge.end, bridge.free_end
     after, answer = bridge.after, memory.assembly.answer
     leave_faces(model, modes.closed, phase.faces.face)
     evaluate(scene, step.time, begin, control, memory, phase, step.slopes[0])
-    for contact in range(layout.first_dry, layout.first_second):
+    for contact in range(memory.rows.first[DRY_JOINT], memory.rows.end[DRY_JOINT]):
         modes.slide[contact] = 0
-    free_acceleration(model, begin, memory.torque, layout, modes, memory.pushes, equations)
+    free_acceleration(model, begin, memory.torque, memory.rows, modes, memory.pushes, equations)
     for i in range(model.nv):
         free_end[model.nq + i] = begin[model.nq + i] + length * equations.rate[i]
     find_faces(
-        model, scene.ground, equations.tree, memory.contacts, layout, modes.closed, memory.surface,
-        phase.faces,
+        model, scene.ground, equations.tree, memory.contacts, memory.rows, modes.closed,
+        memory.surface, memory.seconds, phase.faces,
     )  # fmt: skip
-    for contact in range(layout.watched):
+    for contact in range(modes.watched):
         memory.reaction.mode[contact] = OPEN
         impact.impulse[contact, 0] = 0.0
         impact.impulse[contact, 1] = 0.0
     count = gather_near(
-        model, length, bouncing, layout, modes, step.begin, equations, memory.contacts,
-        memory.surface.restitution, phase.faces, bridge, assembly,
+        model, length, bouncing, memory.rows, memory.seconds, modes, step.begin, equations,
+        memory.contacts, memory.surface.restitution, phase.faces, bridge, assembly,
     )  # fmt: skip
-    total = append_loops(modes.closed.shape[0], count, memory.loops, assembly)
+    total = append_loops(count, memory.loops, assembly)
     free_loops(total, memory.loops, free_end[model.nq :], 0.5 * length, assembly)
     for place in range(count, total):
         bridge.added[place] = 0.0
     reach_end(0, length, free_end, scene, assembly, step.begin, equations, bridge.end)
     if total > 0:
         assemble_delassus(model, total, equations, assembly)
-        lend_faces(count, assembly.candidate, layout, modes.closed, bridge.lent)
+        lend_faces(count, assembly.candidate, memory.rows, modes, bridge.lent)
         solved = solve_bridge(
             count, total, length, free_end, scene, step.begin, memory, phase, bridge
         )
-        return_faces(layout, modes.closed, bridge.lent)
+        return_faces(memory.rows, modes, bridge.lent)
         if not solved:
             return False
     collect_impulses(count, assembly, bridge.added, memory.reaction.mode, impact)
     for place in range(count):
         contact = assembly.candidate[place]
-        if layout.first_dry <= contact < layout.first_second:  # a finite force works on the way
+        if memory.rows.kind[contact] == DRY_JOINT:  # a finite force works on the way
             answer.impulse[2 * place] = 0.0
             answer.impulse[2 * place + 1] = 0.0
     finite = True
@@ -512,18 +509,22 @@ def find_bridge(
 
 @kernel
 def report_impulses(
-    model: Model, wrong: float, contacts: Contacts, layout: Layout, seconds: Contacts, time: float,
+    wrong: float, contacts: Contacts, rows: Rows, seconds: Contacts, paired: int, time: float,
     impact: Impact, length: float, reported: Reported, record: Record,
 ) -> None:  # fmt: skip
     """Append the bridge to the events, and the impulses of the contacts."""
     log_event(time, BRIDGE, 0, length, wrong, record)
-    for contact in range(layout.first_dry):
+    for contact in range(rows.end[STOP]):
         normal = impact.impulse[contact, 0]
-        struck = is_struck(contact, layout, impact.impulse) if contact < model.nc else normal > 0.0
+        struck = (
+            is_struck(contact, rows, paired, impact.impulse)
+            if rows.kind[contact] == POINT
+            else normal > 0.0
+        )
         if not struck:
             continue
-        if contact >= model.nc:
-            joint = layout.stop_joint[contact - model.nc]
+        if rows.kind[contact] == STOP:
+            joint = rows.owner[contact]
             log_event(time, JOINT_STOP, joint, normal, 0.0, record)
             reported.closed[contact] = 1
             continue
@@ -532,14 +533,14 @@ def report_impulses(
             kind = TOUCHDOWN
             reported.closed[contact] = 1
             reported.slipping[contact] = 0
-        log_impulse(kind, contact, contacts, layout, seconds, time, impact, record)
+        log_impulse(kind, contact, contacts, rows, seconds, paired, time, impact, record)
 
 
 @kernel
 def adopt_end(
-    model: Model, ground: GroundModel, mode: Integers, layout: Layout, begin: Floats,
-    equations: Equations, contacts: Contacts, surface: Surface, modes: Modes, faces: Faces,
-    meets: Integers,
+    model: Model, ground: GroundModel, mode: Integers, rows: Rows, begin: Floats,
+    equations: Equations, contacts: Contacts, surface: Surface, seconds: Contacts, modes: Modes,
+    faces: Faces, meets: Integers,
 ) -> None:  # fmt: skip
     """Let the contacts do at the end of the bridge what it found."""
     tree = equations.tree
@@ -547,23 +548,25 @@ def adopt_end(
     for contact in range(model.nc):
         faces.face[contact] = NO_FACE
         meets[contact] = 0
-    locate(model, ground, tree, layout, modes.closed, faces, contacts, surface)
-    for contact in range(layout.watched):
+    locate(model, ground, tree, rows, modes, seconds, faces, contacts, surface)
+    for contact in range(modes.watched):
         modes.stuck[contact] = 0
         modes.slide[contact] = 0
-        if contact >= layout.first_second:
-            point = contact - layout.first_second
+        kind = rows.kind[contact]
+        if kind == SECOND_FACE:
+            point = rows.owner[contact]
             if contacts.gap[point] <= TOUCHING:
                 stand_on_face(
-                    model, ground, tree, point, contacts, layout, modes.closed, surface, faces
-                )
-        elif contact >= layout.first_dry:
+                    model, ground, tree, point, contacts, rows, modes.closed, surface, seconds,
+                    faces,
+                )  # fmt: skip
+        elif kind == DRY_JOINT:
             if modes.closed[contact] == 1 and mode[contact] != STICK:
-                joint = layout.dry_joint[contact - layout.first_dry]
+                joint = rows.owner[contact]
                 modes.slide[contact] = heading(begin[model.nq + joint])
             continue
-        touches = gap_now(contact, contacts, layout, faces.seconds, begin) <= TOUCHING
-        normal, tangent = gap_velocity(contact, model, contacts, tree, layout, faces.seconds, begin)
+        touches = gap_now(contact, rows, begin) <= TOUCHING
+        normal, tangent = gap_velocity(contact, model, contacts, tree, rows, seconds, begin)
         # What has come down by the end of the bridge meets the ground there.
         holds = mode[contact] != OPEN and normal >= -SETTLED
         modes.closed[contact] = 1 if touches and holds else 0
@@ -580,7 +583,7 @@ def cross(
     ``step.begin`` becomes the state at its end, ``series.length`` its length.
     """
     phase = work.phase
-    layout, modes = phase.layout, phase.modes
+    modes = phase.modes
     step, bridge, series = work.step, work.bridge, work.series
     model = scene.model
     if work.output.last_row < step.time:
@@ -604,11 +607,11 @@ def cross(
     if not found:
         return False
     report_impulses(
-        model, wrong, memory.contacts, layout, phase.faces.seconds, step.time, work.impact,
-        series.length, memory.reported, record,
+        wrong, memory.contacts, memory.rows, memory.seconds, phase.faces.paired, step.time,
+        work.impact, series.length, memory.reported, record,
     )  # fmt: skip
-    for contact in range(layout.watched):
-        if not layout.first_dry <= contact < layout.first_second:
+    for contact in range(modes.watched):
+        if memory.rows.kind[contact] != DRY_JOINT:
             modes.closed[contact] = 0
         modes.carrier[contact] = 0
         modes.holder[contact] = 0
@@ -620,15 +623,15 @@ def cross(
         scene, step.time, step.begin, True, step, work.impact, control, memory, phase, work.output,
         record,
     )  # fmt: skip
-    for dry in range(layout.dry_joint.shape[0]):
-        torque = work.impact.impulse[layout.first_dry + dry, 1] / series.length
-        record.friction_torque[row, layout.dry_joint[dry]] = torque
+    for dry in range(memory.rows.first[DRY_JOINT], memory.rows.end[DRY_JOINT]):
+        torque = work.impact.impulse[dry, 1] / series.length
+        record.friction_torque[row, memory.rows.owner[dry]] = torque
     share_friction(model, modes.breakaway, record.friction_torque[row], record.brake_torque[row])
     for i in range(step.begin.shape[0]):
         step.begin[i] = bridge.end[i]
     adopt_end(
-        model, scene.ground, memory.reaction.mode, layout, step.begin, memory.equations,
-        memory.contacts, memory.surface, modes, phase.faces, work.impact.meets,
+        model, scene.ground, memory.reaction.mode, memory.rows, step.begin, memory.equations,
+        memory.contacts, memory.surface, memory.seconds, modes, phase.faces, work.impact.meets,
     )  # fmt: skip
     work.decision.bridging = 0
     return True

@@ -9,18 +9,19 @@ from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.contact.workspace import ContactWorkspace
 from heelstrike.dynamics.kernels import passive_force
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contacts.dry_friction import dry_force
+from heelstrike.sim.contacts.dry_friction import add_dry_force
 from heelstrike.sim.contacts.geometry import solve_mass_matrix
 from heelstrike.sim.contacts.latches import hold
 from heelstrike.sim.contacts.loops import rows_of
-from heelstrike.sim.event_driven.phase import Layout, Modes, Phase
+from heelstrike.sim.contacts.rows import DRY_JOINT, Rows
+from heelstrike.sim.event_driven.phase import Modes, Phase
 from heelstrike.sim.memory import Assembly, Equations, Loops
 from heelstrike.sim.push import Pushes, add_pushes
 
 
 @dissolved_kernel
 def known_force(
-    model: Model, state: Floats, torque: Floats, layout: Layout, modes: Modes, pushes: Pushes,
+    model: Model, state: Floats, torque: Floats, rows: Rows, modes: Modes, pushes: Pushes,
     equations: Equations,
 ) -> None:  # fmt: skip
     """Generalised force without contact, B Γ + passive + pushes − H, into ``equations.rate``.
@@ -33,28 +34,28 @@ def known_force(
     add_pushes(model, equations.tree, pushes, force)
     for i in range(model.nu):
         force[model.actuator_joint[i]] += torque[i]
-    dry_force(layout.dry_joint, modes.slide[layout.first_dry :], modes.breakaway, force)
+    add_dry_force(modes.slide, modes.breakaway, rows, force)
     for i in range(model.nv):
         rate[i] = force[i] - equations.bias[i]
 
 
 @dissolved_kernel
 def free_acceleration(
-    model: Model, state: Floats, torque: Floats, layout: Layout, modes: Modes, pushes: Pushes,
+    model: Model, state: Floats, torque: Floats, rows: Rows, modes: Modes, pushes: Pushes,
     equations: Equations,
 ) -> None:  # fmt: skip
     """Acceleration without contact, A⁻¹ (B Γ + passive + pushes − H), into ``equations.rate``.
 
     The equations of the state have been evaluated.
     """
-    known_force(model, state, torque, layout, modes, pushes, equations)
+    known_force(model, state, torque, rows, modes, pushes, equations)
     solve_mass_matrix(model, equations, equations.rate)
 
 
 @kernel
 def pose_problem(
-    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers,
-    layout: Layout, slide: Integers, assembly: Assembly,
+    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers, rows: Rows,
+    slide: Integers, assembly: Assembly,
 ) -> None:  # fmt: skip
     """Pose the contact problem of the candidates at the level of accelerations or velocities.
 
@@ -65,7 +66,7 @@ def pose_problem(
     problem, mode = assembly.problem, assembly.answer.mode
     for place in range(count):
         contact = assembly.candidate[place]
-        is_dry = layout.first_dry <= contact < layout.first_second
+        is_dry = rows.kind[contact] == DRY_JOINT
         problem.set[place] = INTERVAL if is_dry else CONE
         problem.friction[place] = friction[contact]
         mode[place] = STICK
@@ -76,7 +77,7 @@ def pose_problem(
                 mode[place] = SLIDING_BACKWARD
             elif guess[contact] < SLIDING_FORWARD:
                 mode[place] = guess[contact]
-    hold(count, layout.latch_stop, loops.held, assembly)
+    hold(count, rows.latch_stop, loops.held, assembly)
     problem.count = count + rows_of(loops)
     for place in range(count, problem.count):
         mode[place] = STICK
@@ -84,22 +85,21 @@ def pose_problem(
 
 @kernel
 def solve_candidates(
-    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers,
-    layout: Layout, slide: Integers, solvers: Integers, assembly: Assembly,
-    solver: ContactWorkspace,
+    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers, rows: Rows,
+    slide: Integers, solvers: Integers, assembly: Assembly, solver: ContactWorkspace,
 ) -> int:  # fmt: skip
     """Pose the contact problem of the candidates and solve it; return the solver's status.
 
     Forces or impulses and modes go to ``assembly.answer``.
     """
-    pose_problem(count, loops, accelerations, friction, guess, layout, slide, assembly)
+    pose_problem(count, loops, accelerations, friction, guess, rows, slide, assembly)
     return int(solve_contact_kernel(solvers, assembly.problem, solver, assembly.answer))
 
 
 @kernel
 def share_redundant(
-    count: int, loops: Loops, friction: Floats, guess: Integers, phase: Phase, assembly: Assembly,
-    solver: ContactWorkspace,
+    count: int, loops: Loops, friction: Floats, guess: Integers, rows: Rows, phase: Phase,
+    assembly: Assembly, solver: ContactWorkspace,
 ) -> None:  # fmt: skip
     """Find forces within their limits where the equations leave open who carries what.
 
@@ -117,17 +117,9 @@ def share_redundant(
     if not short:
         return
     status = solve_candidates(
-        count,
-        loops,
-        True,
-        friction,
-        guess,
-        phase.layout,
-        modes.slide,
-        phase.forces.solvers,
-        assembly,
+        count, loops, True, friction, guess, rows, modes.slide, phase.forces.solvers, assembly,
         solver,
-    )
+    )  # fmt: skip
     if status != SOLVED:
         return
     for place in range(count):

@@ -15,30 +15,30 @@ from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.geometry import contact_velocity
+from heelstrike.sim.contacts.rows import SECOND_FACE, Rows, second_of
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.location import shortest_step
-from heelstrike.sim.event_driven.phase import Impact, Layout
+from heelstrike.sim.event_driven.phase import Impact
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import log_event
 
 
 @kernel
-def is_cornered(point: int, layout: Layout, impact: Impact) -> bool:
+def is_cornered(point: int, rows: Rows, paired: int, impact: Impact) -> bool:
     """Whether a second face acts on a point, or gives it its frame."""
-    if layout.watched == layout.first_second:
+    if paired == 0:
         return False
-    second = layout.first_second + point
+    second = second_of(point, rows)
     pushed = impact.impulse[second, 0] != 0.0 or impact.impulse[second, 1] != 0.0
     return pushed or impact.meets[point] == 1
 
 
 @kernel
 def joined(
-    point: int, force: Floats, contacts: Contacts, first_second: int, seconds: Contacts,
-    meets: Integers,
-) -> tuple[float, float]:  # fmt: skip
+    point: int, force: Floats, contacts: Contacts, rows: Rows, seconds: Contacts, meets: Integers
+) -> tuple[float, float]:
     """Resultant (normal, tangent) of the forces, or impulses, of both faces of a point."""
-    second, other = first_second + point, seconds.normal[point]
+    second, other = second_of(point, rows), seconds.normal[point]
     own_x, own_z = out_of_frame(contacts.normal[point], (force[point, 0], force[point, 1]))
     x, z = out_of_frame(other, (force[second, 0], force[second, 1]))
     frame = other if meets[point] == 1 else contacts.normal[point]
@@ -47,11 +47,11 @@ def joined(
 
 @kernel
 def impulse_of(
-    point: int, contacts: Contacts, layout: Layout, seconds: Contacts, impact: Impact
+    point: int, contacts: Contacts, rows: Rows, seconds: Contacts, paired: int, impact: Impact
 ) -> tuple[float, float]:
     """Impulse (normal, tangent) on a point in this instant, of both faces."""
-    if is_cornered(point, layout, impact):
-        return joined(point, impact.impulse, contacts, layout.first_second, seconds, impact.meets)
+    if is_cornered(point, rows, paired, impact):
+        return joined(point, impact.impulse, contacts, rows, seconds, impact.meets)
     return impact.impulse[point, 0], impact.impulse[point, 1]
 
 
@@ -66,8 +66,8 @@ def first_row(time: float, record: Record) -> int:
 
 @kernel
 def log_impulse(
-    kind: int, point: int, contacts: Contacts, layout: Layout, seconds: Contacts, time: float,
-    impact: Impact, record: Record,
+    kind: int, point: int, contacts: Contacts, rows: Rows, seconds: Contacts, paired: int,
+    time: float, impact: Impact, record: Record,
 ) -> None:  # fmt: skip
     """Append the impulse on a point in this instant to the events.
 
@@ -76,10 +76,8 @@ def log_impulse(
     """
     frame = contacts.normal[point]
     normal, tangent = impact.impulse[point, 0], impact.impulse[point, 1]
-    if is_cornered(point, layout, impact):
-        normal, tangent = joined(
-            point, impact.impulse, contacts, layout.first_second, seconds, impact.meets
-        )
+    if is_cornered(point, rows, paired, impact):
+        normal, tangent = joined(point, impact.impulse, contacts, rows, seconds, impact.meets)
         if impact.meets[point] == 1:
             frame = seconds.normal[point]
     row = first_row(time, record)
@@ -91,26 +89,26 @@ def log_impulse(
 
 
 @kernel
-def is_struck(point: int, layout: Layout, impulse: Floats) -> bool:
+def is_struck(point: int, rows: Rows, paired: int, impulse: Floats) -> bool:
     """Whether an impulse acts on a point in this instant, of either face."""
     if impulse[point, 0] > 0.0:
         return True
-    second = layout.first_second + point
-    return bool(layout.watched > layout.first_second and impulse[second, 0] > 0.0)
+    second = second_of(point, rows)
+    return bool(paired == 1 and impulse[second, 0] > 0.0)
 
 
 @kernel
 def show_forces(
-    force: Floats, layout: Layout, seconds: Contacts, meets: Integers, contacts: Contacts
+    force: Floats, rows: Rows, seconds: Contacts, watched: int, meets: Integers, contacts: Contacts
 ) -> None:
     """Let controllers see the forces of the contact points; what stands after them is of joints."""
     for contact in range(contacts.force.shape[0]):
         contacts.force[contact, 0] = force[contact, 0]
         contacts.force[contact, 1] = force[contact, 1]
-    for second in range(layout.first_second, layout.watched):
+    for second in range(rows.first[SECOND_FACE], watched):
         if force[second, 0] != 0.0 or force[second, 1] != 0.0:
-            point = second - layout.first_second
-            both = joined(point, force, contacts, layout.first_second, seconds, meets)
+            point = rows.owner[second]
+            both = joined(point, force, contacts, rows, seconds, meets)
             contacts.force[point, 0], contacts.force[point, 1] = both
 
 

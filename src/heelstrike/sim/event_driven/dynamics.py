@@ -23,7 +23,8 @@ from heelstrike.sim.contacts.geometry import (
     row_product,
     weigh,
 )
-from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, rows_of
+from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, row_of, rows_of
+from heelstrike.sim.contacts.rows import DRY_JOINT, LOOP, POINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
@@ -34,7 +35,6 @@ from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_now, gap
 from heelstrike.sim.event_driven.phase import (
     Faces,
     HeldRows,
-    Layout,
     Modes,
     Phase,
     SaddlePoint,
@@ -63,15 +63,15 @@ PLACED, STILL = 5e-11, 1e-9
 
 @kernel
 def tangential_place(
-    model: Model, angle: Floats, contacts: Contacts, contact: int, first_second: int, faces: Faces
-) -> float:
+    model: Model, angle: Floats, contacts: Contacts, contact: int, rows: Rows, seconds: Contacts,
+    face: Integers,
+) -> float:  # fmt: skip
     """Where a contact point is along the ground, less the length that its disc has rolled."""
-    its, point = contacts, contact
-    if contact >= first_second:
-        its, point = faces.seconds, contact - first_second
+    point = rows.owner[contact]
+    its = seconds if rows.kind[contact] == SECOND_FACE else contacts
     position, normal, radius = its.position[point], its.normal[point], model.contact_radius[point]
     rolled = radius * angle[model.contact_link[point]]
-    if faces.face[contact] >= 0 and faces.face[contact] % 2 == 1:
+    if face[contact] >= 0 and face[contact] % 2 == 1:
         # The way of the contact point round the disc that pivots on a corner.
         return radius * math.atan2(normal[0], normal[1]) - rolled
     return normal[1] * position[0] - normal[0] * position[1] - rolled
@@ -142,11 +142,11 @@ def friction_limit(
 
 @dissolved_kernel
 def share_forces(
-    count: int, assembly: Assembly, friction: Floats, watched: int, modes: Modes, force: Floats
+    count: int, assembly: Assembly, friction: Floats, modes: Modes, force: Floats
 ) -> None:
     """Write the force of every contact point, that of a group split like its normal forces."""
     candidate, impulse = assembly.candidate, assembly.answer.impulse
-    for contact in range(watched):
+    for contact in range(modes.watched):
         force[contact, 0] = 0.0
         force[contact, 1] = 0.0
     for place in range(count):
@@ -167,12 +167,12 @@ def share_forces(
 
 @kernel
 def watch_second_faces(
-    model: Model, tree: Workspace, first_second: int, modes: Modes, seconds: Contacts, watch: Watch
+    model: Model, tree: Workspace, rows: Rows, seconds: Contacts, modes: Modes, watch: Watch
 ) -> None:
     """Event functions of the second faces: gaps to those that points on the ground could meet."""
     value, rate = watch.value, watch.rate
-    for point in range(model.nc):
-        contact = first_second + point
+    for contact in range(rows.first[SECOND_FACE], rows.end[SECOND_FACE]):
+        point = rows.owner[contact]
         value[2 * contact], value[2 * contact + 1] = 1.0, 1.0
         rate[2 * contact] = 0.0
         if modes.closed[point] == 0 or seconds.gap[point] == math.inf:
@@ -188,7 +188,7 @@ def watch_second_faces(
 @kernel
 def watch_geometry(
     model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, state: Floats,
-    layout: Layout, modes: Modes, faces: Faces, watch: Watch,
+    rows: Rows, seconds: Contacts, modes: Modes, faces: Faces, watch: Watch,
 ) -> None:  # fmt: skip
     """Event functions that need no forces: gaps of open points, speeds of what slides, corners.
 
@@ -197,21 +197,19 @@ def watch_geometry(
     """
     value, rate, corners = watch.value, watch.rate, has_corners(ground)
     if corners:
-        watch_corners(model, ground, contacts, layout, modes.closed, faces.face, value)
-        if layout.watched > layout.first_second:
-            watch_second_faces(model, tree, layout.first_second, modes, faces.seconds, watch)
-    for dry in range(layout.dry_joint.shape[0]):
-        contact = layout.first_dry + dry
+        watch_corners(model, ground, contacts, rows, modes, faces, value)
+        if faces.paired == 1:
+            watch_second_faces(model, tree, rows, seconds, modes, watch)
+    table = rows
+    for contact in range(table.first[DRY_JOINT], table.end[DRY_JOINT]):
         slide = modes.slide[contact]
         value[2 * contact + 1] = 1.0
         if slide != 0:
-            value[2 * contact + 1] = slide * state[model.nq + layout.dry_joint[dry]]
-    for stop in range(layout.stop_joint.shape[0]):
-        contact = model.nc + stop
+            value[2 * contact + 1] = slide * state[model.nq + table.owner[contact]]
+    for contact in range(table.first[STOP], table.end[STOP]):
         if modes.closed[contact] == 0:
-            joint = layout.stop_joint[stop]
-            side = layout.stop_side[stop]
-            value[2 * contact] = side * (state[joint] - layout.stop_limit[stop])
+            joint, side = table.owner[contact], table.side[contact]
+            value[2 * contact] = side * (state[joint] - table.limit[contact])
             rate[2 * contact] = side * state[model.nq + joint]
     for contact in range(model.nc):
         normal, tangent = contact_velocity(model, tree, contacts, contact)
@@ -251,17 +249,17 @@ def watch_forces(
 
 
 @dissolved_kernel
-def trust_latches(held: Integers, latch_stop: Integers, closed: Integers, value: Floats) -> None:
+def trust_latches(held: Integers, rows: Rows, closed: Integers, value: Floats) -> None:
     """Stops that hold their joint never open, whatever the sign of their force."""
     for latch in range(held.shape[0]):
-        stop = latch_stop[latch]
+        stop = rows.latch_stop[latch]
         if held[latch] == 1 and closed[stop] == 1:
             value[2 * stop] = 1.0
 
 
 @kernel
 def gather_closed(
-    model: Model, contacts: Contacts, layout: Layout, modes: Modes, seconds: Contacts, loops: Loops,
+    model: Model, contacts: Contacts, rows: Rows, seconds: Contacts, modes: Modes, loops: Loops,
     equations: Equations, assembly: Assembly,
 ) -> int:  # fmt: skip
     """Jacobian rows and Delassus matrix of the closed contacts; return their number.
@@ -270,13 +268,13 @@ def gather_closed(
     after those of the contacts and are not counted; they have been found for the state.
     """
     count = 0
-    for contact in range(layout.watched):
-        moves = layout.first_dry <= contact < layout.first_second and modes.slide[contact] != 0
+    for contact in range(modes.watched):
+        moves = rows.kind[contact] == DRY_JOINT and modes.slide[contact] != 0
         if modes.closed[contact] == 1 and not moves:
-            gap_rows(model, equations.tree, contacts, layout, seconds, contact, count, assembly)
+            gap_rows(model, equations.tree, contacts, rows, seconds, contact, count, assembly)
             assembly.candidate[count] = contact
             count += 1
-    total = append_loops(modes.closed.shape[0], count, loops, assembly)
+    total = append_loops(count, loops, assembly)
     if total > 0:
         assemble_delassus(model, total, equations, assembly)
     return count
@@ -284,7 +282,7 @@ def gather_closed(
 
 @kernel
 def list_pressing(
-    size: int, count: int, candidate: Integers, loops: Loops, latch_stop: Integers, held: HeldRows
+    size: int, count: int, candidate: Integers, loops: Loops, rows: Rows, held: HeldRows
 ) -> None:
     """Write to ``held.presses`` which unknown forces can press only.
 
@@ -296,14 +294,15 @@ def list_pressing(
         if held.presses[k] == 1:
             contact = candidate[place]
             for latch in range(loops.held.shape[0]):
-                if loops.held[latch] == 1 and latch_stop[latch] == contact:
+                if loops.held[latch] == 1 and rows.latch_stop[latch] == contact:
                     held.presses[k] = 0
 
 
 @kernel
 def hold_by_saddle_point(
     size: int, count: int, model: Model, state: Floats, contacts: Contacts, loops: Loops,
-    torque: Floats, equations: Equations, assembly: Assembly, pushes: Pushes, phase: Phase,
+    torque: Floats, rows: Rows, seconds: Contacts, equations: Equations, assembly: Assembly,
+    pushes: Pushes, phase: Phase,
 ) -> None:  # fmt: skip
     """Contact forces that keep the modes, and the acceleration, from the full equations.
 
@@ -314,8 +313,9 @@ def hold_by_saddle_point(
     nv, saddle = model.nv, phase.saddle
     impulse, velocity, rate = assembly.answer.impulse, assembly.answer.velocity, equations.rate
     state_accelerations(
-        count, model, state, contacts, loops, torque, equations, assembly, pushes, phase
-    )
+        count, model, state, contacts, loops, torque, rows, seconds, equations, assembly, pushes,
+        phase,
+    )  # fmt: skip
     write_equations(size, model, assembly.jacobian, held, equations, phase.saddle.system)
     for i in range(nv):
         saddle.system[i, nv + size] = saddle.force[i]
@@ -328,7 +328,7 @@ def hold_by_saddle_point(
             nv, nv + size, rank, saddle.scale, held.lean, saddle.order, saddle.system,
             saddle.unknown,
         )  # fmt: skip
-        list_pressing(size, count, assembly.candidate, loops, phase.layout.latch_stop, held)
+        list_pressing(size, count, assembly.candidate, loops, rows, held)
         raise_to_zero(nv, nv + size, rank, held.presses, saddle.system, saddle.unknown)
     saddle.needed = 1
     for i in range(nv):
@@ -354,22 +354,23 @@ def watch_slips(count: int, assembly: Assembly, modes: Modes, rate: Floats) -> N
 
 @dissolved_kernel
 def hold_closed(
-    model: Model, count: int, state: Floats, friction: Floats, contacts: Contacts, loops: Loops,
-    torque: Floats, phase: Phase, equations: Equations, assembly: Assembly, pushes: Pushes,
+    model: Model, count: int, state: Floats, friction: Floats, rows: Rows, seconds: Contacts,
+    contacts: Contacts, loops: Loops, torque: Floats, phase: Phase, equations: Equations,
+    assembly: Assembly, pushes: Pushes,
 ) -> None:  # fmt: skip
     """Contact forces that keep the modes of the candidates, and the acceleration under them."""
-    layout, held, forces = phase.layout, phase.held, phase.forces
+    held, forces = phase.held, phase.forces
     impulse = assembly.answer.impulse
     for place in range(count):
         contact = assembly.candidate[place]
         free_gap_acceleration(
-            model, contacts, equations, contact, place, layout, phase.modes.breakaway, phase.faces,
-            assembly,
+            model, contacts, equations, contact, place, rows, seconds, phase.modes.breakaway,
+            phase.faces, assembly,
         )  # fmt: skip
         impulse[2 * place] = 0.0
         impulse[2 * place + 1] = 0.0
-        if layout.first_dry <= contact < layout.first_second:
-            joint = layout.dry_joint[contact - layout.first_dry]
+        if rows.kind[contact] == DRY_JOINT:
+            joint = rows.owner[contact]
             impulse[2 * place] = phase.modes.breakaway[joint]
     loop_rows = rows_of(loops)
     total = count + loop_rows
@@ -382,13 +383,14 @@ def hold_closed(
     rank = solve_constraints(size, 1.0, assembly.problem.delassus, held)
     if is_delicate(size, rank, held.system):
         hold_by_saddle_point(
-            size, count, model, state, contacts, loops, torque, equations, assembly, pushes, phase
-        )
+            size, count, model, state, contacts, loops, torque, rows, seconds, equations, assembly,
+            pushes, phase,
+        )  # fmt: skip
         return
     forces.deficient = 1 if rank < size else 0
     if forces.deficient == 1:
         shorten(0, size, rank, held.scale, held.lean, held.column, held.system, held.unknown)
-        list_pressing(size, count, assembly.candidate, loops, layout.latch_stop, held)
+        list_pressing(size, count, assembly.candidate, loops, rows, held)
         raise_to_zero(0, size, rank, held.presses, held.system, held.unknown)
     for i in range(size):
         impulse[held.row[i]] += held.unknown[i]
@@ -399,23 +401,23 @@ def hold_closed(
 
 @kernel
 def observe_faces(
-    model: Model, ground: GroundModel, state: Floats, layout: Layout, closed: Integers,
+    model: Model, ground: GroundModel, state: Floats, rows: Rows, modes: Modes, seconds: Contacts,
     faces: Faces, tree: Workspace, contacts: Contacts, surface: Surface,
 ) -> None:  # fmt: skip
     """Kinematics, velocities and contact points of a state (q, v)."""
     forward_kinematics(model, state[: model.nq], tree)
     link_velocities(model, state[model.nq :], tree)
-    locate(model, ground, tree, layout, closed, faces, contacts, surface)
+    locate(model, ground, tree, rows, modes, seconds, faces, contacts, surface)
 
 
 @kernel
 def look(
-    model: Model, ground: GroundModel, state: Floats, layout: Layout, modes: Modes, tree: Workspace,
-    contacts: Contacts, surface: Surface, faces: Faces, watch: Watch,
+    model: Model, ground: GroundModel, state: Floats, rows: Rows, modes: Modes, tree: Workspace,
+    contacts: Contacts, surface: Surface, seconds: Contacts, faces: Faces, watch: Watch,
 ) -> None:  # fmt: skip
     """Pose, contact points, and the event functions that need no forces, of a state (q, v)."""
-    observe_faces(model, ground, state, layout, modes.closed, faces, tree, contacts, surface)
-    watch_geometry(model, ground, tree, contacts, state, layout, modes, faces, watch)
+    observe_faces(model, ground, state, rows, modes, seconds, faces, tree, contacts, surface)
+    watch_geometry(model, ground, tree, contacts, state, rows, seconds, modes, faces, watch)
 
 
 @kernel
@@ -428,71 +430,75 @@ def evaluate(
     Pose, contact points, torque, slope (v, v̇), contact forces and all event functions. A continuous
     controller is asked without letting it remember.
     """
-    layout, forces, saddle = phase.layout, phase.forces, phase.saddle
+    forces, saddle = phase.forces, phase.saddle
     model = scene.model
     q, v = state[: model.nq], state[model.nq :]
     equations, assembly, friction = memory.equations, memory.assembly, memory.surface.friction
     rate = equations.rate
     evaluate_equations(model, q, v, equations)
     locate(
-        model, scene.ground, equations.tree, layout, phase.modes.closed, phase.faces,
+        model, scene.ground, equations.tree, memory.rows, phase.modes, memory.seconds, phase.faces,
         memory.contacts, memory.surface,
     )  # fmt: skip
     watch_geometry(
-        model, scene.ground, equations.tree, memory.contacts, state, layout, phase.modes,
-        phase.faces, phase.watch,
+        model, scene.ground, equations.tree, memory.contacts, state, memory.rows, memory.seconds,
+        phase.modes, phase.faces, phase.watch,
     )  # fmt: skip
     if control.continuous == 1:
         consult(scene.controller, time, q, v, model, memory, control, memory.command)
     try_torque(model, control, q, v, memory.tally, memory.command, memory.torque)
-    free_acceleration(model, state, memory.torque, layout, phase.modes, memory.pushes, equations)
+    free_acceleration(
+        model, state, memory.torque, memory.rows, phase.modes, memory.pushes, equations
+    )
     loop_rows = rows_of(memory.loops)
     if loop_rows > 0:
         find_loops(model, q, v, equations.tree, memory.loops)
     count = gather_closed(
-        model, memory.contacts, layout, phase.modes, phase.faces.seconds, memory.loops, equations,
+        model, memory.contacts, memory.rows, memory.seconds, phase.modes, memory.loops, equations,
         assembly,
     )  # fmt: skip
     forces.count = count
     saddle.needed = 0
     if count + loop_rows > 0:
         hold_closed(
-            model, count, state, friction, memory.contacts, memory.loops, memory.torque, phase,
-            equations, assembly, memory.pushes,
+            model, count, state, friction, memory.rows, memory.seconds, memory.contacts,
+            memory.loops, memory.torque, phase, equations, assembly, memory.pushes,
         )  # fmt: skip
-    share_forces(count, assembly, friction, layout.watched, phase.modes, forces.force)
+    share_forces(count, assembly, friction, phase.modes, forces.force)
     watch_forces(count, loop_rows, assembly, friction, phase.modes, phase.watch)
     if saddle.needed == 1:
         watch_slips(count, assembly, phase.modes, phase.watch.rate)
-    trust_latches(memory.loops.held, layout.latch_stop, phase.modes.closed, phase.watch.value)
+    trust_latches(memory.loops.held, memory.rows, phase.modes.closed, phase.watch.value)
     if count > 0 and forces.deficient == 1:
         share_redundant(
-            count, memory.loops, friction, memory.reaction.mode, phase, assembly, memory.solver
-        )
+            count, memory.loops, friction, memory.reaction.mode, memory.rows, phase, assembly,
+            memory.solver,
+        )  # fmt: skip
     for i in range(model.nv):
         slope[i] = v[i]
         slope[model.nq + i] = rate[i]
-    for dry in range(layout.dry_joint.shape[0]):
-        contact = layout.first_dry + dry
-        phase.watch.rate[2 * contact + 1] = phase.modes.slide[contact] * rate[layout.dry_joint[dry]]
+    for contact in range(memory.rows.first[DRY_JOINT], memory.rows.end[DRY_JOINT]):
+        phase.watch.rate[2 * contact + 1] = (
+            phase.modes.slide[contact] * rate[memory.rows.owner[contact]]
+        )
 
 
 @kernel
 def displacement(
-    row: int, model: Model, angle: Floats, contacts: Contacts, candidate: Integers,
-    displacement: Floats, layout: Layout, modes: Modes, faces: Faces, state: Floats,
+    row: int, model: Model, angle: Floats, contacts: Contacts, candidate: Integers, loops: Loops,
+    rows: Rows, seconds: Contacts, modes: Modes, face: Integers, state: Floats,
 ) -> float:  # fmt: skip
     """How far a candidate is along its row from where its constraint wants it."""
     contact = candidate[row // 2]
-    if contact >= modes.closed.shape[0]:
-        return displacement[contact - modes.closed.shape[0]]
+    if rows.kind[contact] >= LOOP:
+        return loops.rows.displacement[row_of(contact, loops)]
     if row % 2 == 0:
-        return gap_now(contact, contacts, layout, faces.seconds, state)
-    if layout.first_dry <= contact < layout.first_second:
-        return state[layout.dry_joint[contact - layout.first_dry]] - modes.anchor[contact]
+        return gap_now(contact, rows, state)
+    if rows.kind[contact] == DRY_JOINT:
+        return state[rows.owner[contact]] - modes.anchor[contact]
     if modes.stuck[contact] == 1:
         return -modes.anchor[contact] + tangential_place(
-            model, angle, contacts, contact, layout.first_second, faces
+            model, angle, contacts, contact, rows, seconds, face
         )
     return 0.0
 
@@ -520,8 +526,8 @@ def move_by_saddle_point(
 
 @kernel
 def gather_sunk(
-    count: int, model: Model, contacts: Contacts, state: Floats, layout: Layout, modes: Modes,
-    seconds: Contacts, fired: Integers, loops: Loops, equations: Equations, assembly: Assembly,
+    count: int, model: Model, contacts: Contacts, state: Floats, rows: Rows, seconds: Contacts,
+    modes: Modes, fired: Integers, loops: Loops, equations: Equations, assembly: Assembly,
 ) -> int:  # fmt: skip
     """Append the open contacts that are beyond the ground, or their range, by rounding.
 
@@ -529,18 +535,18 @@ def gather_sunk(
     none of them: it is the instant that is corrected. Returns how many there are.
     """
     sunk = 0
-    for contact in range(layout.first_dry):
+    for contact in range(rows.end[STOP]):
         if modes.closed[contact] == 1 or fired[2 * contact] == 1:
             continue
-        if contact < model.nc and modes.passing[contact] == 1:
+        if rows.kind[contact] == POINT and modes.passing[contact] == 1:
             continue
-        if -DEEP < gap_now(contact, contacts, layout, seconds, state) < -SHALLOW:
+        if -DEEP < gap_now(contact, rows, state) < -SHALLOW:
             place = count + sunk
-            gap_rows(model, equations.tree, contacts, layout, seconds, contact, place, assembly)
+            gap_rows(model, equations.tree, contacts, rows, seconds, contact, place, assembly)
             assembly.candidate[place] = contact
             sunk += 1
     if sunk > 0:
-        total = append_loops(modes.closed.shape[0], count + sunk, loops, assembly)
+        total = append_loops(count + sunk, loops, assembly)
         assemble_delassus(model, total, equations, assembly)
     return sunk
 
@@ -559,8 +565,9 @@ def list_sunk(size: int, count: int, sunk: int, loop_rows: int, held: HeldRows) 
 
 @kernel
 def project(
-    model: Model, ground: GroundModel, equations: Equations, contacts: Contacts, surface: Surface,
-    assembly: Assembly, loops: Loops, phase: Phase, state: Floats,
+    model: Model, ground: GroundModel, rows: Rows, equations: Equations, contacts: Contacts,
+    surface: Surface, assembly: Assembly, loops: Loops, seconds: Contacts, phase: Phase,
+    state: Floats,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Put a state back on its contact constraints, along the shortest way that the masses allow.
 
@@ -577,21 +584,20 @@ def project(
     strayed, fastest = 0.0, 0.0
     for attempt in range(5):
         observe_faces(
-            model, ground, state, phase.layout, phase.modes.closed, phase.faces, equations.tree,
-            contacts, surface,
+            model, ground, state, rows, phase.modes, seconds, phase.faces, equations.tree, contacts,
+            surface,
         )  # fmt: skip
         weigh(model, equations)
         if loop_rows > 0:
             find_loops(model, q, v, equations.tree, loops)
         count = gather_closed(
-            model, contacts, phase.layout, phase.modes, phase.faces.seconds, loops, equations,
-            assembly,
-        )  # fmt: skip
+            model, contacts, rows, seconds, phase.modes, loops, equations, assembly
+        )
         sunk = 0
         if attempt < 4:
             sunk = gather_sunk(
-                count, model, contacts, state, phase.layout, phase.modes, phase.faces.seconds,
-                phase.watch.fired, loops, equations, assembly,
+                count, model, contacts, state, rows, seconds, phase.modes, phase.watch.fired, loops,
+                equations, assembly,
             )  # fmt: skip
         total = count + sunk + loop_rows
         if total == 0:
@@ -604,8 +610,8 @@ def project(
         worst = 0.0
         for i in range(size):
             error = displacement(
-                row[i], model, equations.tree.angle, contacts, assembly.candidate,
-                loops.rows.displacement, phase.layout, phase.modes, phase.faces, state,
+                row[i], model, equations.tree.angle, contacts, assembly.candidate, loops, rows,
+                seconds, phase.modes, phase.faces.face, state,
             )  # fmt: skip
             system[i, size] = -error
             worst = max(worst, abs(error))

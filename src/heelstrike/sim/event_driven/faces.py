@@ -32,8 +32,9 @@ from heelstrike.sim.contacts.faces import (
     take_surface,
 )
 from heelstrike.sim.contacts.geometry import locate_contacts
+from heelstrike.sim.contacts.rows import SECOND_FACE, Rows, second_of
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.phase import Bounces, Faces, Layout, Modes, Watch
+from heelstrike.sim.event_driven.phase import Bounces, Faces, Modes, Watch
 from heelstrike.sim.memory import Surface
 
 # Two normals are one when one minus the cosine of the angle between them is below this.
@@ -52,30 +53,30 @@ def has_corners(ground: GroundModel) -> bool:
 
 @kernel
 def locate_second(
-    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts,
-    first_second: int, closed: Integers, surface: Surface, faces: Faces,
+    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts, rows: Rows,
+    closed: Integers, surface: Surface, seconds: Contacts, face: Integers,
 ) -> None:  # fmt: skip
     """Contact point, gap and normal of a point on its second face, the one it is on or could meet.
 
     Where there is none the gap is infinite.
     """
-    second, seconds = first_second + point, faces.seconds
+    second = second_of(point, rows)
     seconds.gap[point] = np.inf
-    if faces.face[point] == NO_FACE:
+    if face[point] == NO_FACE:
         return
     if closed[second] == 0:
         x, z = center_of(model, contacts, point)
-        _, faces.face[second] = second_face(
-            ground, faces.face[point], NO_FACE, x, z, model.contact_radius[point]
+        _, face[second] = second_face(
+            ground, face[point], NO_FACE, x, z, model.contact_radius[point]
         )
-    if faces.face[second] != NO_FACE:
-        locate_on_face(model, ground, tree, point, faces.face[second], seconds)
-        take_surface(model, ground, point, second, faces.face[second], surface)
+    if face[second] != NO_FACE:
+        locate_on_face(model, ground, tree, point, face[second], seconds)
+        take_surface(model, ground, point, second, face[second], surface)
 
 
 @kernel
 def locate(
-    model: Model, ground: GroundModel, tree: Workspace, layout: Layout, closed: Integers,
+    model: Model, ground: GroundModel, tree: Workspace, rows: Rows, modes: Modes, seconds: Contacts,
     faces: Faces, contacts: Contacts, surface: Surface,
 ) -> None:  # fmt: skip
     """Contact points, gaps, normals and ground coefficients of the state now."""
@@ -93,17 +94,17 @@ def locate(
         ):
             locate_on_face(model, ground, tree, contact, face, contacts)
             take_surface(model, ground, contact, contact, face, surface)
-    for second in range(layout.first_second, layout.watched):
-        point = second - layout.first_second
+    for second in range(rows.first[SECOND_FACE], modes.watched):
+        point = rows.owner[second]
         locate_second(
-            model, ground, tree, point, contacts, layout.first_second, closed, surface, faces
+            model, ground, tree, point, contacts, rows, modes.closed, surface, seconds, faces.face
         )
 
 
 @kernel
 def stand_on_face(
-    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts,
-    layout: Layout, closed: Integers, surface: Surface, faces: Faces,
+    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts, rows: Rows,
+    closed: Integers, surface: Surface, seconds: Contacts, faces: Faces,
 ) -> None:  # fmt: skip
     """Put a point that has reached the ground on the face that its normal is of.
 
@@ -112,18 +113,17 @@ def stand_on_face(
     if faces.face[point] == NO_FACE and has_corners(ground):
         x, z = center_of(model, contacts, point)
         faces.face[point] = nearest_face(ground, x, z, model.contact_radius[point])
-        if layout.watched > layout.first_second:
+        if faces.paired == 1:
             locate_second(
-                model, ground, tree, point, contacts, layout.first_second, closed, surface, faces
+                model, ground, tree, point, contacts, rows, closed, surface, seconds, faces.face
             )
-            own, other = contacts.normal[point], faces.seconds.normal[point]
+            own, other = contacts.normal[point], seconds.normal[point]
             twice = own[0] * other[0] + own[1] * other[1] > 1.0 - ONE_NORMAL
-            if twice and abs(faces.seconds.gap[point] - contacts.gap[point]) < ONE_GAP:
-                faces.face[point] = faces.face[layout.first_second + point]
+            if twice and abs(seconds.gap[point] - contacts.gap[point]) < ONE_GAP:
+                faces.face[point] = faces.face[second_of(point, rows)]
                 locate_second(
-                    model, ground, tree, point, contacts, layout.first_second, closed, surface,
-                    faces,
-                )  # fmt: skip
+                    model, ground, tree, point, contacts, rows, closed, surface, seconds, faces.face
+                )
 
 
 @kernel
@@ -134,11 +134,11 @@ def exchange_entries(first: int, second: int, values: Any) -> None:
 
 @kernel
 def exchange(
-    point: int, first_second: int, mode: Integers, modes: Modes, face: Integers, hit: Integers,
+    point: int, rows: Rows, mode: Integers, modes: Modes, face: Integers, hit: Integers,
     bounces: Bounces,
 ) -> None:  # fmt: skip
     """Let the first face of a point be the one that was its second."""
-    second = first_second + point
+    second = second_of(point, rows)
     exchange_entries(point, second, modes.closed)
     exchange_entries(point, second, modes.slide)
     exchange_entries(point, second, modes.stuck)
@@ -153,18 +153,18 @@ def exchange(
 
 @kernel
 def choose_faces(
-    model: Model, ground: GroundModel, tree: Workspace, layout: Layout, mode: Integers,
-    modes: Modes, faces: Faces, hit: Integers, bounces: Bounces,
+    model: Model, ground: GroundModel, tree: Workspace, rows: Rows, mode: Integers, modes: Modes,
+    faces: Faces, hit: Integers, bounces: Bounces,
 ) -> None:  # fmt: skip
     """Put the closed points that are on no face yet on the nearest; open ones are on none.
 
     A point that is on one face only is there with its first contact.
     """
     place = faces.place
-    for second in range(layout.first_second, layout.watched):
-        point = second - layout.first_second
+    for second in range(rows.first[SECOND_FACE], modes.watched):
+        point = rows.owner[second]
         if modes.closed[second] == 1 and modes.closed[point] == 0:
-            exchange(point, layout.first_second, mode, modes, faces.face, hit, bounces)
+            exchange(point, rows, mode, modes, faces.face, hit, bounces)
     for contact in range(model.nc):
         if modes.closed[contact] == 0 or not has_corners(ground):
             faces.face[contact] = NO_FACE
@@ -222,37 +222,37 @@ def turn_corner(
 
 @kernel
 def watch_corners(
-    model: Model, ground: GroundModel, contacts: Contacts, layout: Layout, closed: Integers,
-    face: Integers, value: Floats,
+    model: Model, ground: GroundModel, contacts: Contacts, rows: Rows, modes: Modes, faces: Faces,
+    value: Floats,
 ) -> None:  # fmt: skip
     """Event functions of the points on faces: how far each is from the end of its own."""
-    first = 2 * layout.watched
+    first = 2 * modes.watched
     for contact in range(model.nc):
         value[first + contact] = 1.0
-        if face[contact] != NO_FACE:
+        if faces.face[contact] != NO_FACE:
             x, z = center_of(model, contacts, contact)
             left = way_left(
-                ground, contact, x, z, model.contact_radius[contact], layout, closed, face
+                ground, contact, x, z, model.contact_radius[contact], rows, modes.closed, faces
             )
             value[first + contact] = min(left, 1.0)
 
 
 @kernel
 def way_left(
-    ground: GroundModel, point: int, x: float, z: float, radius: float, layout: Layout,
-    closed: Integers, face: Integers,
+    ground: GroundModel, point: int, x: float, z: float, radius: float, rows: Rows,
+    closed: Integers, faces: Faces,
 ) -> float:  # fmt: skip
     """How far a disc on a face is from the end of it, or what there is to meet or leave besides."""
-    left, _ = following_face(ground, face[point], x, z, radius)
-    if layout.watched > layout.first_second:
-        left = min(left, *way_out(ground, point, x, z, radius, layout.first_second, closed, face))
+    left, _ = following_face(ground, faces.face[point], x, z, radius)
+    if faces.paired == 1:
+        left = min(left, *way_out(ground, point, x, z, radius, rows, closed, faces.face))
     return float(left)
 
 
 @kernel
 def rate_corners(
-    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, layout: Layout,
-    closed: Integers, face: Integers, watch: Watch,
+    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, rows: Rows,
+    modes: Modes, faces: Faces, watch: Watch,
 ) -> None:  # fmt: skip
     """Rates of the event functions of corners that have fired.
 
@@ -260,31 +260,31 @@ def rate_corners(
     """
     center = watch.center
     for contact in range(model.nc):
-        corner = 2 * layout.watched + contact
-        if watch.fired[corner] == 0 or face[contact] == NO_FACE:
+        corner = 2 * modes.watched + contact
+        if watch.fired[corner] == 0 or faces.face[contact] == NO_FACE:
             continue
         x, z = center_of(model, contacts, contact)
         center[0], center[1] = x, z
         link, radius = model.contact_link[contact], model.contact_radius[contact]
         along_x, along_z = velocity_at(tree.velocity, link, place_of(tree, center))
         later = way_left(
-            ground, contact, x + SOON * along_x, z + SOON * along_z, radius, layout, closed, face
+            ground, contact, x + SOON * along_x, z + SOON * along_z, radius, rows, modes.closed, faces
         )  # fmt: skip
         watch.rate[corner] = (
-            later - way_left(ground, contact, x, z, radius, layout, closed, face)
+            later - way_left(ground, contact, x, z, radius, rows, modes.closed, faces)
         ) / SOON
 
 
 @kernel
 def way_out(
-    ground: GroundModel, point: int, x: float, z: float, radius: float, first_second: int,
+    ground: GroundModel, point: int, x: float, z: float, radius: float, rows: Rows,
     closed: Integers, face: Integers,
 ) -> tuple[float, float]:  # fmt: skip
     """How far a disc that is on two faces is from the end of the second, and from a third.
 
     Between parallel walls a disc can move on both.
     """
-    second = first_second + point
+    second = second_of(point, rows)
     if closed[second] == 0:
         return np.inf, np.inf
     left, _ = following_face(ground, face[second], x, z, radius)
@@ -294,24 +294,24 @@ def way_out(
 
 @kernel
 def leave_second_face(
-    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts,
-    first_second: int, surface: Surface, modes: Modes, faces: Faces, fired: Integers,
+    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts, rows: Rows,
+    surface: Surface, seconds: Contacts, modes: Modes, face: Integers, fired: Integers,
 ) -> bool:  # fmt: skip
     """Let a point that is on two faces go over from the second to a third that it meets.
 
     Or off the end of the second. Returns false if it has come to the end of the first.
     """
     x, z = center_of(model, contacts, point)
-    second, radius = first_second + point, model.contact_radius[point]
-    own, _ = following_face(ground, faces.face[point], x, z, radius)
-    left, third = way_out(ground, point, x, z, radius, first_second, modes.closed, faces.face)
+    second, radius = second_of(point, rows), model.contact_radius[point]
+    own, _ = following_face(ground, face[point], x, z, radius)
+    left, third = way_out(ground, point, x, z, radius, rows, modes.closed, face)
     if own < min(left, third):
         return False
     modes.closed[second], modes.slide[second], modes.stuck[second] = 0, 0, 0
     if third <= left:
-        _, its = second_face(ground, faces.face[point], faces.face[second], x, z, radius)
-        faces.face[second] = its
-        locate_on_face(model, ground, tree, point, its, faces.seconds)
+        _, its = second_face(ground, face[point], face[second], x, z, radius)
+        face[second] = its
+        locate_on_face(model, ground, tree, point, its, seconds)
         take_surface(model, ground, point, second, its, surface)
         fired[2 * second] = 1
     return True
@@ -319,11 +319,11 @@ def leave_second_face(
 
 @kernel
 def is_at_second(
-    model: Model, ground: GroundModel, point: int, reach: float, contacts: Contacts,
-    first_second: int, faces: Faces,
+    model: Model, ground: GroundModel, point: int, reach: float, contacts: Contacts, rows: Rows,
+    faces: Faces,
 ) -> bool:  # fmt: skip
     """Whether a point is within reach of its second face itself, and not only of the line of it."""
-    face = faces.face[first_second + point]
+    face = faces.face[second_of(point, rows)]
     x, z = center_of(model, contacts, point)
     return room_to(ground, face, x, z, model.contact_radius[point]) <= reach
 

@@ -16,13 +16,14 @@ from heelstrike.sim.contacts.geometry import (
     row_product,
 )
 from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
+from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, STOP, Rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import free_acceleration
 from heelstrike.sim.event_driven.corners import is_struck, log_impulse
 from heelstrike.sim.event_driven.dynamics import gather_closed
 from heelstrike.sim.event_driven.faces import locate
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
-from heelstrike.sim.event_driven.phase import Bounces, Impact, Layout, Modes, Phase, Step
+from heelstrike.sim.event_driven.phase import Bounces, Impact, Modes, Phase, Step
 from heelstrike.sim.event_driven.saddle_point import (
     add_impulses,
     solve_accelerations,
@@ -85,20 +86,20 @@ def collide(
     impulses go to ``impact.impulse``; ``modes.closed`` and ``modes.slide`` become
     those after the impact.
     """
-    layout, modes = phase.layout, phase.modes
+    modes = phase.modes
     v = state[model.nq :]
     equations, assembly = memory.equations, memory.assembly
     jacobian, free, impulse = assembly.jacobian, assembly.problem.free, assembly.answer.impulse
     count = 0
-    for contact in range(layout.watched):
+    for contact in range(modes.watched):
         impact.impulse[contact, 0] = 0.0
         impact.impulse[contact, 1] = 0.0
-        if layout.first_dry <= contact < layout.first_second:
+        if memory.rows.kind[contact] == DRY_JOINT:
             continue
         if modes.closed[contact] == 0 and impact.hit[contact] == 0:
             continue
         gap_rows(
-            model, equations.tree, memory.contacts, layout, phase.faces.seconds, contact, count,
+            model, equations.tree, memory.contacts, memory.rows, memory.seconds, contact, count,
             assembly,
         )  # fmt: skip
         normal = row_product(jacobian, 2 * count, v)
@@ -111,7 +112,7 @@ def collide(
     if count + rows_of(memory.loops) == 0:
         return True, 0.0, 0.0
     find_loops(model, state[: model.nq], v, equations.tree, memory.loops)
-    total = append_loops(modes.closed.shape[0], count, memory.loops, assembly)
+    total = append_loops(count, memory.loops, assembly)
     free_loops(total, memory.loops, v, 0.0, assembly)
     clear_rounding(count, total, free)
     assemble_delassus(model, total, equations, assembly)
@@ -123,7 +124,7 @@ def collide(
         work = impulse[row] * row_product(jacobian, row, v)
         made += work
         through += abs(work)
-    note_loops(model, total, impulse, memory.loops)
+    note_loops(memory.rows, total, 1.0, impulse, memory.loops)
     add_impulses(model, assembly, phase.saddle, equations, v)
     for place in range(count):
         contact = assembly.candidate[place]
@@ -141,9 +142,8 @@ def collide(
         work = impulse[row] * row_product(jacobian, row, v)
         made += work
         through += abs(work)
-    for dry in range(layout.dry_joint.shape[0]):
-        contact = layout.first_dry + dry
-        modes.slide[contact] = modes.closed[contact] * heading(v[layout.dry_joint[dry]])
+    for contact in range(memory.rows.first[DRY_JOINT], memory.rows.end[DRY_JOINT]):
+        modes.slide[contact] = modes.closed[contact] * heading(v[memory.rows.owner[contact]])
     return status == SOLVED, 0.5 * made, 0.5 * through
 
 
@@ -172,47 +172,44 @@ def short_bounces(
     Their bounces are taken to go on shrinking in the ratio of the next to the last; the geometric
     series gives the time at which they end.
     """
+    modes = phase.modes
     was_closed = memory.reported.closed
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
     evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
     locate(
-        model, ground, equations.tree, phase.layout, phase.modes.closed, phase.faces, contacts,
+        model, ground, equations.tree, memory.rows, modes, memory.seconds, phase.faces, contacts,
         memory.surface,
     )  # fmt: skip
-    free_acceleration(
-        model, state, memory.torque, phase.layout, phase.modes, memory.pushes, equations
-    )
+    free_acceleration(model, state, memory.torque, memory.rows, modes, memory.pushes, equations)
     loop_rows = rows_of(memory.loops)
     find_loops(model, state[: model.nq], state[model.nq :], equations.tree, memory.loops)
     count = gather_closed(
-        model, contacts, phase.layout, phase.modes, phase.faces.seconds, memory.loops, equations,
-        assembly,
-    )  # fmt: skip
+        model, contacts, memory.rows, memory.seconds, modes, memory.loops, equations, assembly
+    )
     for place in range(count):
         contact = assembly.candidate[place]
         free_gap_acceleration(
-            model, contacts, equations, contact, place, phase.layout, phase.modes.breakaway,
-            phase.faces, assembly,
+            model, contacts, equations, contact, place, memory.rows, memory.seconds,
+            modes.breakaway, phase.faces, assembly,
         )  # fmt: skip
     total = count + loop_rows
     free_loops(total, memory.loops, equations.rate, 1.0, assembly)
     if total > 0:
         adopt_accelerations(count, model, state, memory, phase)
     found = False
-    for contact in range(phase.layout.watched):
+    for contact in range(modes.watched):
         touched = hit[contact] == 1 or was_closed[contact] == 1
-        if phase.modes.closed[contact] == 1 or not touched:
+        if modes.closed[contact] == 1 or not touched:
             continue
         gap_rows(
-            model, equations.tree, contacts, phase.layout, phase.faces.seconds, contact, total,
-            assembly,
-        )  # fmt: skip
+            model, equations.tree, contacts, memory.rows, memory.seconds, contact, total, assembly
+        )
         free_gap_acceleration(
-            model, contacts, equations, contact, total, phase.layout, phase.modes.breakaway,
-            phase.faces, assembly,
+            model, contacts, equations, contact, total, memory.rows, memory.seconds,
+            modes.breakaway, phase.faces, assembly,
         )  # fmt: skip
         normal, _ = gap_velocity(
-            contact, model, contacts, equations.tree, phase.layout, phase.faces.seconds, state
+            contact, model, contacts, equations.tree, memory.rows, memory.seconds, state
         )
         pull = -assembly.problem.free[2 * total]
         if not (pull > 0.0 and 0.0 < 2.0 * normal <= SHORTEST_BOUNCE * pull):
@@ -231,14 +228,12 @@ def short_bounces(
 
 
 @kernel
-def restore(
-    before: Floats, reported: Reported, layout: Layout, modes: Modes, begin: Floats
-) -> None:
+def restore(before: Floats, reported: Reported, rows: Rows, modes: Modes, begin: Floats) -> None:
     """Go back to the state and the modes before an impact."""
     for i in range(before.shape[0]):
         begin[i] = before[i]
-    for contact in range(layout.watched):
-        if not layout.first_dry <= contact < layout.first_second:
+    for contact in range(modes.watched):
+        if rows.kind[contact] != DRY_JOINT:
             modes.closed[contact] = reported.closed[contact]
             modes.slide[contact] = reported.slipping[contact]
 
@@ -252,6 +247,7 @@ def strike(
 
     The equations of now have been evaluated. ``memory.reported`` still holds the modes from before.
     """
+    modes = phase.modes
     state, before, reported = step.begin, impact.before, memory.reported
     time, contacts = step.time, memory.contacts
     for i in range(state.shape[0]):
@@ -260,58 +256,63 @@ def strike(
     for attempt in range(2):
         solved, made, through = collide(model, 0.0, bounces.plastic, memory, phase, impact, state)
         if not solved:
-            restore(before, reported, phase.layout, phase.modes, step.begin)
+            restore(before, reported, memory.rows, modes, step.begin)
             return False
         if attempt == 1 or not short_bounces(
             model, ground, state, step.time, impact.hit, memory, phase, bounces
         ):
             break
-        restore(before, reported, phase.layout, phase.modes, step.begin)
+        restore(before, reported, memory.rows, modes, step.begin)
     bounces.last_blow = time
-    for contact in range(phase.layout.watched):
-        if bounces.plastic[contact] != 0 and phase.modes.closed[contact] == 0:
+    for contact in range(modes.watched):
+        if bounces.plastic[contact] != 0 and modes.closed[contact] == 0:
             # Others throw it up again, and it is followed.
             bounces.accumulation[contact] = np.inf
         bounces.plastic[contact] = 0
         if impact.hit[contact] == 1:
             bounces.last_impact[contact] = time
     made_at = report_impacts(
-        model, time, contacts, phase.layout, phase.faces.seconds, step, impact, reported, record
-    )
+        time, contacts, memory.rows, memory.seconds, phase.faces.paired, step, impact, reported,
+        record,
+    )  # fmt: skip
     if made > NOTICEABLE * through:
         memory.tally.energy_gain += made
         log_impulse(
-            ENERGY_GAIN, made_at, contacts, phase.layout, phase.faces.seconds, step.time, impact,
-            record,
+            ENERGY_GAIN, made_at, contacts, memory.rows, memory.seconds, phase.faces.paired,
+            step.time, impact, record,
         )  # fmt: skip
     return True
 
 
 @kernel
 def report_impacts(
-    model: Model, time: float, contacts: Contacts, layout: Layout, seconds: Contacts, step: Step,
+    time: float, contacts: Contacts, rows: Rows, seconds: Contacts, paired: int, step: Step,
     impact: Impact, reported: Reported, record: Record,
 ) -> int:  # fmt: skip
     """Append the impulses of an impact to the events; return the point with the largest."""
     impulse = impact.impulse
     largest = 0
-    for contact in range(layout.first_dry):
+    for contact in range(rows.end[STOP]):
         normal = impulse[contact, 0]
-        struck = is_struck(contact, layout, impact.impulse) if contact < model.nc else normal != 0.0
-        if contact < model.nc and normal > impulse[largest, 0]:
+        struck = (
+            is_struck(contact, rows, paired, impact.impulse)
+            if rows.kind[contact] == POINT
+            else normal != 0.0
+        )
+        if rows.kind[contact] == POINT and normal > impulse[largest, 0]:
             largest = contact
         if not struck:  # a stop may pull, as a latch does
             continue
         landed = reported.closed[contact] == 0
         reported.closed[contact] = 1
-        if contact >= model.nc:
-            joint = layout.stop_joint[contact - model.nc]
+        if rows.kind[contact] == STOP:
+            joint = rows.owner[contact]
             log_event(time, JOINT_STOP, joint, normal, 0.0, record)
             continue
         if landed:
             reported.slipping[contact] = 0
         log_impulse(
-            TOUCHDOWN if landed else IMPACT, contact, contacts, layout, seconds, step.time, impact,
-            record,
+            TOUCHDOWN if landed else IMPACT, contact, contacts, rows, seconds, paired, step.time,
+            impact, record,
         )  # fmt: skip
     return largest

@@ -14,6 +14,7 @@ import numpy as np
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.faces import center_of, nearest_face
+from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.dormand_prince import (
@@ -106,8 +107,9 @@ def evaluate_within(
         evaluate(scene, time, samples.state, control, memory, phase, slope)
     else:
         look(
-            scene.model, scene.ground, samples.state, phase.layout, phase.modes,
-            memory.equations.tree, memory.contacts, memory.surface, phase.faces, phase.watch,
+            scene.model, scene.ground, samples.state, memory.rows, phase.modes,
+            memory.equations.tree, memory.contacts, memory.surface, memory.seconds, phase.faces,
+            phase.watch,
         )  # fmt: skip
 
 
@@ -136,7 +138,7 @@ def take_step(
             if not error <= 1.0:
                 return error
             copy_events(watch.value, watch.rate, samples.end_value, samples.end_rate)
-            for contact in range(phase.layout.watched):
+            for contact in range(phase.modes.watched):
                 step.end_force[contact, 0] = forces.force[contact, 0]
                 step.end_force[contact, 1] = forces.force[contact, 1]
             for i in range(memory.torque.shape[0]):
@@ -146,25 +148,25 @@ def take_step(
 
 
 @kernel
-def is_geometric(function: int, watched: int, modes: Modes) -> bool:
+def is_geometric(function: int, modes: Modes) -> bool:
     """Whether an event function needs no forces: a gap, or the speed of what slides."""
     contact = function // 2
-    if contact >= watched:
+    if contact >= modes.watched:
         return True
     slides = function % 2 == 1 and modes.slide[contact] != 0
     return bool(modes.closed[contact] == 0 or slides)
 
 
 @kernel
-def noise(function: int, watched: int, modes: Modes, weight: float, samples: Samples) -> float:
+def noise(function: int, modes: Modes, weight: float, samples: Samples) -> float:
     """How far an event function may be below zero without meaning it."""
-    if function >= 2 * watched:
+    if function >= 2 * modes.watched:
         return CORNER_NOISE
     if modes.closed[function // 2] == 0:
         # An event is found to a time, and so a gap to what it closes in that time.
         speed = max(abs(samples.before_rate[function]), abs(samples.sample_rate[function]))
         return max(GAP_NOISE, EVENT_TIME * speed)
-    return SPEED_NOISE if is_geometric(function, watched, modes) else FORCE_NOISE * weight
+    return SPEED_NOISE if is_geometric(function, modes) else FORCE_NOISE * weight
 
 
 @kernel
@@ -181,9 +183,7 @@ def find_root(
     """
     watch = phase.watch
     low, low_value, high, high_value = bracket
-    with_forces = (function % 2 == 1 and turn != 0.0) or not is_geometric(
-        function, phase.layout.watched, phase.modes
-    )
+    with_forces = (function % 2 == 1 and turn != 0.0) or not is_geometric(function, phase.modes)
     width = EVENT_TIME / length
     going_back = low_value <= 0.0
     for attempt in range(200):
@@ -206,20 +206,20 @@ def find_root(
 
 
 @kernel
-def just_left(function: int, watched: int, closed: Integers, samples: Samples) -> bool:
+def just_left(function: int, modes: Modes, samples: Samples) -> bool:
     """Whether it is the gap of an open contact still on the ground, or rising close above it."""
     contact = function // 2
-    if contact >= watched or function % 2 == 1 or closed[contact] == 1:
+    if contact >= modes.watched or function % 2 == 1 or modes.closed[contact] == 1:
         return False
     rises = samples.before_rate[function] >= 0.0
     return bool(samples.before[function] <= (LOW if rises else TOGETHER))
 
 
 @kernel
-def is_sliding_speed(function: int, watched: int, modes: Modes) -> bool:
+def is_sliding_speed(function: int, modes: Modes) -> bool:
     """Whether it is the speed of what slides, whose rate is known."""
     contact = function // 2
-    if contact >= watched or function % 2 == 0 or modes.slide[contact] == 0:
+    if contact >= modes.watched or function % 2 == 0 or modes.slide[contact] == 0:
         return False
     return bool(modes.group[contact] == contact)
 
@@ -239,7 +239,7 @@ def may_dip(function: int, span: float, samples: Samples) -> bool:
 
 
 @dissolved_kernel
-def may_cross(function: int, span: float, watched: int, modes: Modes, samples: Samples) -> bool:
+def may_cross(function: int, span: float, modes: Modes, samples: Samples) -> bool:
     """Whether a function that is positive at two samples may pass zero between them.
 
     A gap has to fall by all that it is at the lower of its ends. A cubic falls by less than a sixth
@@ -250,7 +250,7 @@ def may_cross(function: int, span: float, watched: int, modes: Modes, samples: S
     if not (before > 0.0 and value > 0.0):
         return True
     contact = function // 2
-    if contact >= watched:
+    if contact >= modes.watched:
         return False
     rate, later_rate = samples.before_rate[function], samples.sample_rate[function]
     if function % 2 == 1:
@@ -292,25 +292,23 @@ def crossing(
     Of a point that has just left the ground the gap is zero but for rounding: it cannot come back
     before it turned round. If it got no higher than noise until then, it ends there, at rest.
     """
-    watch = phase.watch
+    modes, watch = phase.modes, phase.watch
     samples = step.samples
     before, begin = samples.before[function], low
     value, end = samples.sample[function], high
     rate, later_rate = samples.before_rate[function], samples.sample_rate[function]
-    is_gap = function < 2 * phase.layout.watched
-    is_gap = is_gap and function % 2 == 0 and phase.modes.closed[function // 2] == 0
+    is_gap = function < 2 * modes.watched
+    is_gap = is_gap and function % 2 == 0 and modes.closed[function // 2] == 0
     dips = rate < 0.0 and later_rate > 0.0 and value >= 0.0
     if dips and not is_gap:
         span = length * (high - low)
-        dips = is_sliding_speed(function, phase.layout.watched, phase.modes) and may_dip(
-            function, span, samples
-        )
+        dips = is_sliding_speed(function, modes) and may_dip(function, span, samples)
     if dips:
         # An open point came down and went up again, or what slides was slower: how near to zero?
         bracket = low, -rate, high, -later_rate
         end = find_root(scene, function, -1.0, bracket, length, control, memory, phase, step)
         value = watch.value[function]
-    least = noise(function, phase.layout.watched, phase.modes, watch.weight, samples)
+    least = noise(function, modes, watch.weight, samples)
     if is_gap and rate >= 0.0 and later_rate >= 0.0 and before <= least:
         # It rises: it is no nearer than before, but for the error of the dense output.
         least = step.absolute + step.relative
@@ -462,7 +460,7 @@ def first_event(
     watch = phase.watch
     samples = step.samples
     sample, sample_rate = samples.sample, samples.sample_rate
-    functions, corners = 2 * phase.layout.watched, has_corners(scene.ground)
+    functions, corners = 2 * phase.modes.watched, has_corners(scene.ground)
     if corners:
         functions += scene.model.nc
     together = min(EVENT_TIME / length, 0.5)  # there are steps shorter than that near poles
@@ -482,13 +480,9 @@ def first_event(
                 i, span, scene.model.contact_radius, phase.modes.closed, samples
             ):
                 root = crossing_by_faces(scene, i, low, high, length, control, memory, phase, step)
-            elif may_cross(i, span, phase.layout.watched, phase.modes, samples):
+            elif may_cross(i, span, phase.modes, samples):
                 root = crossing(scene, i, low, high, length, control, memory, phase, step)
-            if (
-                k == 1
-                and root == NO_EVENT
-                and just_left(i, phase.layout.watched, phase.modes.closed, samples)
-            ):
+            if k == 1 and root == NO_EVENT and just_left(i, phase.modes, samples):
                 root = early_crossing(scene, i, high, length, control, memory, phase, step)
             if root < first - together:
                 for j in range(i):
@@ -529,16 +523,17 @@ def longest_good_step(
 
 @kernel
 def settle(
-    scene: Scene, equations: Equations, contacts: Contacts, surface: Surface, assembly: Assembly,
-    loops: Loops, phase: Phase, step: Step,
+    scene: Scene, rows: Rows, equations: Equations, contacts: Contacts, surface: Surface,
+    assembly: Assembly, loops: Loops, seconds: Contacts, phase: Phase, step: Step,
 ) -> bool:  # fmt: skip
     """Put the end of the step on its constraints; return whether its error explains how far."""
     end, before = step.end, step.unsettled
     for i in range(end.shape[0]):
         before[i] = end[i]
     left, _, _ = project(
-        scene.model, scene.ground, equations, contacts, surface, assembly, loops, phase, end
-    )
+        scene.model, scene.ground, rows, equations, contacts, surface, assembly, loops, seconds,
+        phase, end,
+    )  # fmt: skip
     return left <= max(TOGETHER, 2.0 * step.left) and explained(before, end, EXPLAINED, step)
 
 
@@ -555,29 +550,25 @@ def end_at_event(
         if not take_step(scene, length, control, memory, phase, step) <= 1.0:
             return length, False, True
         if not settle(
-            scene, memory.equations, memory.contacts, memory.surface, memory.assembly, memory.loops,
-            phase, step,
+            scene, memory.rows, memory.equations, memory.contacts, memory.surface, memory.assembly,
+            memory.loops, memory.seconds, phase, step,
         ):  # fmt: skip
             return length, True, False
         look(
-            scene.model, scene.ground, step.end, phase.layout, phase.modes, memory.equations.tree,
-            memory.contacts, memory.surface, phase.faces, watch,
+            scene.model, scene.ground, step.end, memory.rows, phase.modes, memory.equations.tree,
+            memory.contacts, memory.surface, memory.seconds, phase.faces, watch,
         )  # fmt: skip
         if has_corners(scene.ground):
             rate_corners(
-                scene.model, scene.ground, memory.equations.tree, memory.contacts, phase.layout,
-                phase.modes.closed, phase.faces.face, watch,
+                scene.model, scene.ground, memory.equations.tree, memory.contacts, memory.rows,
+                phase.modes, phase.faces, watch,
             )  # fmt: skip
         value, rate = watch.value, watch.rate
         change = 0.0
         for i in range(watch.fired.shape[0]):
-            passes = (
-                watch.fired[i] == 1
-                and is_geometric(i, phase.layout.watched, phase.modes)
-                and rate[i] < 0.0
-            )
+            passes = watch.fired[i] == 1 and is_geometric(i, phase.modes) and rate[i] < 0.0
             if passes and abs(value[i]) > NEAR_ENOUGH * noise(
-                i, phase.layout.watched, phase.modes, watch.weight, step.samples
+                i, phase.modes, watch.weight, step.samples
             ):
                 change = -value[i] / rate[i]
         # Where it turns round rather than passes zero, its rate does not tell where zero is.
@@ -588,14 +579,14 @@ def end_at_event(
 
 
 @kernel
-def missed(watched: int, closed: Integers, watch: Watch) -> bool:
+def missed(modes: Modes, watch: Watch) -> bool:
     """Whether a point is in the ground at the end of a step that ends with another's event.
 
     The step is not the one on whose dense output that was found first.
     """
-    for contact in range(watched):
+    for contact in range(modes.watched):
         gap = watch.value[2 * contact]
-        if closed[contact] == 0 and watch.fired[2 * contact] == 0 and gap < -TOGETHER:
+        if modes.closed[contact] == 0 and watch.fired[2 * contact] == 0 and gap < -TOGETHER:
             return True
     return False
 
@@ -651,15 +642,15 @@ def integrate(
             if part == NO_EVENT:
                 break
             length, good, fits = end_at_event(scene, length * part, control, memory, phase, step)
-            if not (good and fits and missed(phase.layout.watched, phase.modes.closed, watch)):
+            if not (good and fits and missed(phase.modes, watch)):
                 break
             look_back(scene, control, memory, phase, step)
             part = first_event(scene, length, control, memory, phase, step)
             step.has_fired = 0 if part == NO_EVENT else 1
         if step.has_fired == 0:
             fits = settle(
-                scene, memory.equations, memory.contacts, memory.surface, memory.assembly,
-                memory.loops, phase, step,
+                scene, memory.rows, memory.equations, memory.contacts, memory.surface,
+                memory.assembly, memory.loops, memory.seconds, phase, step,
             )  # fmt: skip
         if good and fits:
             break

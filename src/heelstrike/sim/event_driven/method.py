@@ -32,6 +32,15 @@ from heelstrike.sim.contacts.faces import NO_FACE, locate_on_face, take_surface
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import close_loops, rows_of, steady_loops
+from heelstrike.sim.contacts.rows import (
+    DRY_JOINT,
+    POINT,
+    SECOND_FACE,
+    STOP,
+    Rows,
+    contact_count,
+    second_of,
+)
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
@@ -66,7 +75,6 @@ from heelstrike.sim.event_driven.phase import (
     Decision,
     Faces,
     Impact,
-    Layout,
     Modes,
     Motion,
     Phase,
@@ -83,7 +91,7 @@ from heelstrike.sim.event_driven.rows import (
 )
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
-from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, Tally, contact_capacity
+from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, Tally
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
 from heelstrike.sim.record.record import Record
@@ -235,7 +243,7 @@ class EventDriven(Method):
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
         others = 2 * robot.model.latches + robot.model.brakes
-        contacts = contact_capacity(robot) + robot.nc
+        contacts = contact_count(robot.model)
         return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contacts + others + 8
 
     def check(self, setting: Setting) -> None:
@@ -280,7 +288,7 @@ class EventDriven(Method):
     ) -> None:
         """Look for what touches the ground as at the beginning."""
         modes = work.phase.modes
-        kept = slice(0, 0) if stops else slice(robot.nc, work.phase.layout.first_second)
+        kept = slice(0, 0) if stops else slice(robot.nc, len(modes.closed) - robot.nc)
         for told, nothing in (
             *((each, 0) for each in (modes.closed, modes.slide, modes.stuck, modes.passing)),
             (work.bounces.accumulation, np.inf),
@@ -315,9 +323,9 @@ def extrapolate(model: Model, ahead: float, begin: Floats, slope: Floats, state:
 
 
 @kernel
-def insist(watched: int, fired: Integers, force: Floats, modes: Modes) -> None:
+def insist(fired: Integers, force: Floats, modes: Modes) -> None:
     """Switch what fired, without asking the acceleration-level problem first."""
-    for contact in range(watched):
+    for contact in range(modes.watched):
         if modes.closed[contact] == 1 and fired[2 * contact] == 1:
             modes.closed[contact] = 0
             modes.slide[contact] = 0
@@ -340,26 +348,28 @@ def jump(
     plastic: Integers, record: Record,
 ) -> bool:  # fmt: skip
     """Let velocities jump without a collision (Painlevé's paradox); return success."""
-    layout = phase.layout
+    modes = phase.modes
     begin, before = step.begin, impact.before
     for i in range(begin.shape[0]):
         before[i] = begin[i]
-    for contact in range(layout.watched):
+    for contact in range(modes.watched):
         impact.hit[contact] = 0
-        plastic[contact] = phase.modes.closed[contact]
+        plastic[contact] = modes.closed[contact]
     solved, _, _ = collide(model, nudge, plastic, memory, phase, impact, step.begin)
-    for contact in range(layout.watched):
+    for contact in range(modes.watched):
         plastic[contact] = 0
-    for contact in range(layout.first_dry):
+    for contact in range(memory.rows.end[STOP]):
         if not solved:
             continue
-        if contact >= model.nc and impact.impulse[contact, 0] > 0.0:
-            joint = layout.stop_joint[contact - model.nc]
+        if memory.rows.kind[contact] == STOP and impact.impulse[contact, 0] > 0.0:
+            joint = memory.rows.owner[contact]
             log_event(step.time, JOINT_STOP, joint, impact.impulse[contact, 0], 0.0, record)
-        elif contact < model.nc and is_struck(contact, layout, impact.impulse):
+        elif memory.rows.kind[contact] == POINT and is_struck(
+            contact, memory.rows, phase.faces.paired, impact.impulse
+        ):
             log_impulse(
-                PAINLEVE, contact, memory.contacts, layout, phase.faces.seconds, step.time, impact,
-                record,
+                PAINLEVE, contact, memory.contacts, memory.rows, memory.seconds, phase.faces.paired,
+                step.time, impact, record,
             )  # fmt: skip
     if not solved:
         for i in range(begin.shape[0]):
@@ -369,7 +379,7 @@ def jump(
 
 @kernel
 def leave_if_possible(
-    count: int, friction: Floats, layout: Layout, slide: Integers, time: float, assembly: Assembly,
+    count: int, friction: Floats, rows: Rows, slide: Integers, time: float, assembly: Assembly,
     record: Record,
 ) -> None:  # fmt: skip
     """Let all points leave the ground, if that is one of several solutions."""
@@ -378,19 +388,19 @@ def leave_if_possible(
     apart = True
     for place in range(count):
         contact, row = assembly.candidate[place], 2 * place
-        if layout.first_dry <= contact < layout.first_second:
+        if rows.kind[contact] == DRY_JOINT:
             continue
         apart = apart and free[row] >= 0.0
         lean = -slide[contact] * friction[contact]
         if delassus[row, row] + lean * delassus[row, row + 1] <= 0.0:
             # Pressing it harder would push it into the ground: there are other solutions.
             several = True
-            point = contact - layout.first_second if contact >= layout.first_second else contact
+            point = rows.owner[contact]
             log_event(time, PAINLEVE, point, 0.0, 0.0, record)
     if several and apart:
         for place in range(count):
             contact = assembly.candidate[place]
-            is_dry = layout.first_dry <= contact < layout.first_second
+            is_dry = rows.kind[contact] == DRY_JOINT
             if not is_dry and assembly.problem.set[place] != LINE:
                 assembly.answer.mode[place] = OPEN
 
@@ -408,29 +418,31 @@ def begin_phase(
     assembly, friction = memory.assembly, memory.surface.friction
     if rows_of(memory.loops) == 0:  # with loops neither matrix nor free term tell enough
         leave_if_possible(
-            count, friction, phase.layout, phase.modes.slide, step.time, assembly, record
+            count, friction, memory.rows, phase.modes.slide, step.time, assembly, record
         )
     if count > 0:
         note_residual(assembly.answer.residual, memory.tally)
-    adopt_modes(model, count, assembly, phase.layout.first_dry, phase.modes, memory.reaction.mode)
+    adopt_modes(count, assembly, memory.rows, phase.modes, memory.reaction.mode)
     tree, contacts = memory.equations.tree, memory.contacts
     forward_kinematics(model, step.begin[: model.nq], tree)
     choose_faces(
-        model, ground, tree, phase.layout, memory.reaction.mode, phase.modes, phase.faces,
+        model, ground, tree, memory.rows, memory.reaction.mode, phase.modes, phase.faces,
         work.impact.hit, work.bounces,
     )  # fmt: skip
     locate(
-        model, ground, tree, phase.layout, phase.modes.closed, phase.faces, contacts, memory.surface
-    )
+        model, ground, tree, memory.rows, phase.modes, memory.seconds, phase.faces, contacts,
+        memory.surface,
+    )  # fmt: skip
     form_groups(
-        model, tree.angle, contacts, friction, phase.layout, phase.faces, step.begin, phase.modes
-    )
+        model, tree.angle, contacts, friction, memory.rows, memory.seconds, phase.faces.face,
+        step.begin, phase.modes,
+    )  # fmt: skip
     begin, before = step.begin, decision.before
     for i in range(begin.shape[0]):
         before[i] = begin[i]
     step.left, strayed, fastest = project(
-        model, ground, memory.equations, contacts, memory.surface, assembly, memory.loops, phase,
-        begin,
+        model, ground, memory.rows, memory.equations, contacts, memory.surface, assembly,
+        memory.loops, memory.seconds, phase, begin,
     )  # fmt: skip
     closest, slip = (ON_THE_GROUND, FITTING) if decision.started == BEGUN else (TOUCHING, UNSEEN)
     if series.last_end == step.time:
@@ -446,8 +458,7 @@ def begin_phase(
     if fits:
         first = record.events
         report_modes(
-            model, step.time, decision.started == BEGUN, phase.layout, phase.modes, memory.reported,
-            record,
+            step.time, decision.started == BEGUN, memory.rows, phase.modes, memory.reported, record,
         )  # fmt: skip
         react(model, first, begin[: model.nq], record, memory.loops)
     return fits
@@ -482,7 +493,7 @@ def decide_modes(
                 ahead *= 4.0
                 continue
             if decision.burst >= INSISTENT:
-                insist(phase.layout.watched, phase.watch.fired, phase.forces.force, phase.modes)
+                insist(phase.watch.fired, phase.forces.force, phase.modes)
                 decision.burst += 1
                 continue
         count = phase.forces.count
@@ -523,21 +534,22 @@ def behind(contact: int, direction: float, contacts: Contacts, modes: Modes) -> 
 
 
 @kernel
-def rubs_otherwise(breakaway: Floats, dry_joint: Integers, modes: Modes) -> bool:
+def rubs_otherwise(breakaway: Floats, rows: Rows, modes: Modes) -> bool:
     """Whether a joint has other dry friction from now on."""
     found = False
-    for joint in dry_joint:
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        joint = rows.owner[dry]
         found = found or modes.breakaway[joint] != breakaway[joint]
     return found
 
 
 @kernel
 def begin_rubbing(
-    v: Floats, breakaway: Floats, layout: Layout, modes: Modes, reported: Reported
+    v: Floats, breakaway: Floats, rows: Rows, modes: Modes, reported: Reported
 ) -> None:
     """Let joints with dry friction begin as they move, and those with none any more be free."""
-    for dry in range(layout.dry_joint.shape[0]):
-        contact, joint = layout.first_dry + dry, layout.dry_joint[dry]
+    for contact in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        joint = rows.owner[contact]
         modes.breakaway[joint] = breakaway[joint]
         rubs = 1 if breakaway[joint] > 0.0 else 0
         if modes.closed[contact] != rubs:
@@ -549,16 +561,17 @@ def begin_rubbing(
 
 @kernel
 def turns_over(
-    model: Model, ground: GroundModel, tree: Workspace, contact: int, layout: Layout,
-    contacts: Contacts, surface: Surface, modes: Modes, faces: Faces, fired: Integers,
+    model: Model, ground: GroundModel, tree: Workspace, contact: int, rows: Rows,
+    contacts: Contacts, surface: Surface, seconds: Contacts, modes: Modes, faces: Faces,
+    fired: Integers,
 ) -> bool:  # fmt: skip
     """Let a point that has come to the end of its face go over to the next; tell whether it has."""
-    if contact >= model.nc or fired[2 * layout.watched + contact] == 0:
+    if rows.kind[contact] != POINT or fired[2 * modes.watched + contact] == 0:
         return False
-    fired[2 * layout.watched + contact] = 0
-    two_faces = layout.watched > layout.first_second and modes.closed[layout.first_second + contact]
+    fired[2 * modes.watched + contact] = 0
+    two_faces = faces.paired == 1 and modes.closed[second_of(contact, rows)]
     if two_faces and leave_second_face(
-        model, ground, tree, contact, contacts, layout.first_second, surface, modes, faces, fired
+        model, ground, tree, contact, contacts, rows, surface, seconds, modes, faces.face, fired
     ):
         return False
     if turn_corner(model, ground, contact, contacts, modes.stuck, faces):
@@ -570,10 +583,10 @@ def turns_over(
 
 
 @kernel
-def touches_at_start(model: Model, contact: int, gap: float, modes: Modes) -> bool:
+def touches_at_start(contact: int, gap: float, rows: Rows, modes: Modes) -> bool:
     """Whether an open contact is on its limit when the run begins, and may not pass below it."""
     modes.group[contact] = contact
-    if contact < model.nc and gap < -ON_THE_GROUND:
+    if rows.kind[contact] == POINT and gap < -ON_THE_GROUND:
         modes.passing[contact] = modes.let_pass
     return bool(gap <= ON_THE_GROUND and modes.passing[contact] == 0)
 
@@ -581,7 +594,8 @@ def touches_at_start(model: Model, contact: int, gap: float, modes: Modes) -> bo
 @kernel
 def find_what_happened(
     starting: bool, direction: float, model: Model, ground: GroundModel, tree: Workspace,
-    step: Step, contacts: Contacts, surface: Surface, phase: Phase, hit: Integers, bounces: Bounces,
+    rows: Rows, step: Step, contacts: Contacts, surface: Surface, seconds: Contacts, phase: Phase,
+    hit: Integers, bounces: Bounces,
 ) -> tuple[bool, bool]:  # fmt: skip
     """Tell what ended the step: whether an impact, or contact forces at their limits.
 
@@ -589,47 +603,48 @@ def find_what_happened(
     that stop are at rest; an impact goes through those that touch without force. At the start of a
     run every point near the ground touches it.
     """
-    layout, modes, watch = phase.layout, phase.modes, phase.watch
+    modes, watch = phase.modes, phase.watch
     strikes = False
     forced = False
     rest = ON_THE_GROUND if starting else REST
-    for contact in range(layout.watched):
+    for contact in range(modes.watched):
         hit[contact] = 0
         first = watch.fired[2 * contact] == 1
         second = watch.fired[2 * contact + 1] == 1
         turns = turns_over(
-            model, ground, tree, contact, layout, contacts, surface, modes, phase.faces, watch.fired
-        )
-        if contact >= layout.first_second:
-            point = contact - layout.first_second
+            model, ground, tree, contact, rows, contacts, surface, seconds, modes, phase.faces,
+            watch.fired,
+        )  # fmt: skip
+        kind = rows.kind[contact]
+        if kind == SECOND_FACE:
+            point = rows.owner[contact]
             if modes.closed[point] == 0 and hit[point] == 0:
                 continue  # it is met from the other face only
             stand_on_face(
-                model, ground, tree, point, contacts, layout, modes.closed, surface, phase.faces
-            )
-            if phase.faces.seconds.gap[point] == np.inf:
+                model, ground, tree, point, contacts, rows, modes.closed, surface, seconds,
+                phase.faces,
+            )  # fmt: skip
+            if seconds.gap[point] == np.inf:
                 continue
             if starting and not is_at_second(
-                model, ground, point, rest, contacts, layout.first_second, phase.faces
+                model, ground, point, rest, contacts, rows, phase.faces
             ):
                 continue
         if modes.closed[contact] == 1:
             if second and modes.slide[contact] != 0:
-                for other in range(layout.watched):
+                for other in range(modes.watched):
                     if modes.group[other] == modes.group[contact]:
                         modes.slide[other] = 0
             elif first or second:
                 forced = True
             continue
-        if layout.first_dry <= contact < layout.first_second:
+        if kind == DRY_JOINT:
             continue
-        gap = gap_now(contact, contacts, layout, phase.faces.seconds, step.begin)
-        normal, tangent = gap_velocity(
-            contact, model, contacts, tree, layout, phase.faces.seconds, step.begin
-        )
+        gap = gap_now(contact, rows, step.begin)
+        normal, tangent = gap_velocity(contact, model, contacts, tree, rows, seconds, step.begin)
         if starting:
-            first = touches_at_start(model, contact, gap, modes) and normal <= rest
-        may_pass = first and not starting and contact < model.nc
+            first = touches_at_start(contact, gap, rows, modes) and normal <= rest
+        may_pass = first and not starting and kind == POINT
         if turns:
             first = normal <= rest
         if modes.passing[contact] == 1:
@@ -649,10 +664,10 @@ def find_what_happened(
                 bounces.accumulation[contact] = step.time
         elif gap <= TOGETHER and normal <= rest:
             hit[contact] = UNPRESSED
-            if abs(gap) <= GAP_NOISE and contact < layout.first_second:
+            if abs(gap) <= GAP_NOISE and rows.kind[contact] != SECOND_FACE:
                 hit[contact] = LYING
                 modes.slide[contact] = heading(tangent)
-    for contact in range(layout.watched):
+    for contact in range(modes.watched):
         if hit[contact] == LYING and not strikes:
             modes.closed[contact] = 1
         if hit[contact] >= UNPRESSED:
@@ -680,13 +695,13 @@ def next_stop(watched: int, accumulation: Floats, next_push: float, clock: Clock
 
 @kernel
 def end_bounces(
-    model: Model, layout: Layout, time: float, accumulation: Floats, record: Record
+    rows: Rows, watched: int, time: float, accumulation: Floats, record: Record
 ) -> None:
     """Let the points rest whose accumulating impacts have come to an end by now."""
-    for contact in range(layout.watched):
+    for contact in range(watched):
         if accumulation[contact] <= time:
-            point = contact - layout.first_second if contact >= layout.first_second else contact
-            if point < model.nc:
+            if rows.kind[contact] in (POINT, SECOND_FACE):
+                point = rows.owner[contact]
                 log_event(accumulation[contact], ZENO, point, 0.0, 0.0, record)
             accumulation[contact] = np.inf
 
@@ -702,19 +717,17 @@ def pass_time(length: float, stop: float, step: Step, decision: Decision) -> Non
 
 @kernel
 def end_step(
-    model: Model, clock: Clock, layout: Layout, seconds: Contacts, meets: Integers,
-    contacts: Contacts, tally: Tally, step: Step, accumulation: Floats, decision: Decision,
-    record: Record,
+    clock: Clock, rows: Rows, seconds: Contacts, watched: int, meets: Integers, contacts: Contacts,
+    tally: Tally, step: Step, accumulation: Floats, decision: Decision, record: Record,
 ) -> None:  # fmt: skip
     """Move time and state to the end of the finished step."""
     pass_time(
-        step.length, next_stop(layout.watched, accumulation, decision.next_push, clock), step,
-        decision,
-    )  # fmt: skip
+        step.length, next_stop(watched, accumulation, decision.next_push, clock), step, decision
+    )
     for i in range(step.begin.shape[0]):
         step.begin[i] = step.end[i]
-    show_forces(step.end_force, layout, seconds, meets, contacts)
-    end_bounces(model, layout, step.time, accumulation, record)
+    show_forces(step.end_force, rows, seconds, watched, meets, contacts)
+    end_bounces(rows, watched, step.time, accumulation, record)
     step.finished = 0
     tally.steps += 1
     if step.has_fired == 1:
@@ -735,13 +748,12 @@ def meet_event(
 
     The equations of now have been evaluated.
     """
-    layout = phase.layout
     contacts, tree, direction = memory.contacts, memory.equations.tree, impact.momentum
     momentum(model, tree, direction)
     first = record.events
     strikes, forced = find_what_happened(
-        starting, direction[0], model, ground, tree, step, contacts, memory.surface, phase,
-        impact.hit, bounces,
+        starting, direction[0], model, ground, tree, memory.rows, step, contacts, memory.surface,
+        memory.seconds, phase, impact.hit, bounces,
     )  # fmt: skip
     if strikes and not strike(model, ground, memory, phase, step, impact, bounces, record):
         decision.bridging = 1
@@ -749,10 +761,12 @@ def meet_event(
         # The controller shall know before the modes are decided under its torques.
         for contact in range(model.nc):
             if impact.hit[contact] == 1 and impact.impulse[contact, 0] > 0.0:
-                force = impulse_of(contact, contacts, layout, phase.faces.seconds, impact)
+                force = impulse_of(
+                    contact, contacts, memory.rows, memory.seconds, phase.faces.paired, impact
+                )
                 contacts.force[contact, 0], contacts.force[contact, 1] = force
         react(model, first, step.begin[: model.nq], record, memory.loops)
-    for point in range(layout.watched - layout.first_second):
+    for point in range(impact.meets.shape[0]):
         impact.meets[point] = 0
     decision.started = BEGUN if starting else WALKING
     decision.undecided = 1
@@ -764,7 +778,7 @@ def meet_event(
 def begin(model: Model, ground: GroundModel, memory: Memory, work: Motion, record: Record) -> int:
     """Find what the robot stands on when the simulation begins."""
     phase = work.phase
-    layout = phase.layout
+    modes = phase.modes
     step = work.step
     q, v, equations = memory.q, memory.v, memory.equations
     # Modes that are guessed here are those of another instant: where forces or accelerations are
@@ -775,19 +789,19 @@ def begin(model: Model, ground: GroundModel, memory: Memory, work: Motion, recor
         if not close_loops(model, equations, memory.loops, q):
             return DIVERGED
         steady_loops(model, q, equations, memory.loops, v)
-    layout.watched = layout.first_second
+    modes.watched, phase.faces.paired = memory.rows.first[SECOND_FACE], ground.concave
     for point in range(model.nc):
-        phase.faces.seconds.gap[point] = np.inf
+        memory.seconds.gap[point] = np.inf
     if ground.concave == 1:
-        layout.watched += model.nc
+        modes.watched = memory.rows.end[SECOND_FACE]
     for i in range(model.nv):
         step.begin[i] = q[i]
         step.begin[model.nq + i] = v[i]
-    begin_rubbing(v, memory.breakaway, layout, phase.modes, memory.reported)
+    begin_rubbing(v, memory.breakaway, memory.rows, modes, memory.reported)
     evaluate_equations(model, q, v, equations)
     locate(
-        model, ground, equations.tree, layout, phase.modes.closed, phase.faces, memory.contacts,
-        memory.surface,
+        model, ground, equations.tree, memory.rows, modes, memory.seconds, phase.faces,
+        memory.contacts, memory.surface,
     )  # fmt: skip
     code = meet_event(
         True, model, ground, memory, phase, step, work.impact, work.bounces, work.decision, record
@@ -804,7 +818,7 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Motion) -> 
     forward_kinematics(model, memory.q, memory.equations.tree)
     link_velocities(model, memory.v, memory.equations.tree)
     locate(
-        model, ground, memory.equations.tree, phase.layout, phase.modes.closed, phase.faces,
+        model, ground, memory.equations.tree, memory.rows, phase.modes, memory.seconds, phase.faces,
         memory.contacts, memory.surface,
     )  # fmt: skip
 
@@ -824,7 +838,7 @@ def brake(scene: Scene, control: Control, memory: Memory, work: Motion, record: 
             work.output, record,
         )  # fmt: skip
     begin_rubbing(
-        step.begin[model.nq :], memory.breakaway, phase.layout, phase.modes, memory.reported
+        step.begin[model.nq :], memory.breakaway, memory.rows, phase.modes, memory.reported
     )
     stops = take_hold(model, memory.loops)
     # Of joints at rest there is no impact to solve: its data would be rounding.
@@ -838,7 +852,7 @@ def brake(scene: Scene, control: Control, memory: Memory, work: Motion, record: 
 
 
 @kernel
-def contradicts_itself(watched: int, modes: Modes, watch: Watch, deficient: int) -> bool:
+def contradicts_itself(modes: Modes, watch: Watch, deficient: int) -> bool:
     """Whether forces of the phase that begins are far beyond limits at once.
 
     At a pole of the forces, before which they grow without bound, the modes of a moment later may
@@ -847,7 +861,7 @@ def contradicts_itself(watched: int, modes: Modes, watch: Watch, deficient: int)
     if deficient == 1:
         return False
     least = -CONTRADICTION * watch.weight
-    for contact in range(watched):
+    for contact in range(modes.watched):
         if modes.carrier[contact] == 1 and watch.value[2 * contact] < least:
             return True
         if modes.holder[contact] == 1 and watch.value[2 * contact + 1] < least:
@@ -868,9 +882,7 @@ def decide(
         change = abs(memory.torque[i] - step.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
         step.torque[i] = memory.torque[i]
-    if awaits_hold(memory.loops) or rubs_otherwise(
-        memory.breakaway, phase.layout.dry_joint, phase.modes
-    ):
+    if awaits_hold(memory.loops) or rubs_otherwise(memory.breakaway, memory.rows, phase.modes):
         brake(scene, control, memory, work, record)
     decision.at_event = decision.undecided
     open_modes = decision.at_event == 1 or jumped
@@ -884,16 +896,14 @@ def decide(
     decision.forced = 0
     decision.jammed = 0
     evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
-    if open_modes and contradicts_itself(
-        phase.layout.watched, phase.modes, phase.watch, phase.forces.deficient
-    ):
+    if open_modes and contradicts_itself(phase.modes, phase.watch, phase.forces.deficient):
         decision.bridging = 1
         decision.at_event = 0
         decision.undecided = 1
         return DONE
     if decision.at_event == 1:
         show_forces(
-            phase.forces.force, phase.layout, phase.faces.seconds, work.impact.meets,
+            phase.forces.force, memory.rows, memory.seconds, phase.modes.watched, work.impact.meets,
             memory.contacts,
         )  # fmt: skip
     return DONE
@@ -951,7 +961,7 @@ def move_over(
     pass_time(series.length, end, step, decision)
     clock.time = step.time
     series.last_end = step.time
-    for contact in range(phase.layout.watched):
+    for contact in range(phase.modes.watched):
         if bounces.accumulation[contact] <= step.time:
             bounces.accumulation[contact] = np.inf
     memory.tally.steps += 1
@@ -1001,14 +1011,16 @@ def move(
             next_due(decision.next_push, clock)
             if decision.bridging == 1
             else next_stop(
-                phase.layout.watched, work.bounces.accumulation, decision.next_push, clock
+                phase.modes.watched, work.bounces.accumulation, decision.next_push, clock
             )
         )
         if stop - step.time < shortest_step(step.time):
             # The same time but for rounding: 0.3 for one, 3 · 0.1 for the other.
             step.time = stop
             clock.time = stop
-            end_bounces(model, phase.layout, step.time, work.bounces.accumulation, record)
+            end_bounces(
+                memory.rows, phase.modes.watched, step.time, work.bounces.accumulation, record,
+            )  # fmt: skip
             return DONE
         turn = longest_turn(model, memory.equations.tree.motion, step.begin)
         step.next_length = min(step.next_length, turn)
@@ -1032,7 +1044,7 @@ def move(
         step.finished = 0
         return DONE
     end_step(
-        model, clock, phase.layout, phase.faces.seconds, work.impact.meets, memory.contacts,
+        clock, memory.rows, memory.seconds, phase.modes.watched, work.impact.meets, memory.contacts,
         memory.tally, step, work.bounces.accumulation, decision, record,
     )  # fmt: skip
     clock.time = step.time

@@ -1,7 +1,13 @@
 """What event-driven simulation remembers: contact modes, the step in progress, its clock.
 
-A bundle a purpose, each with the scratch of its own kernels. Contacts are numbered as
-:class:`Layout` says; in the shapes below ``contacts`` counts all of them.
+A bundle a purpose, each with the scratch of its own kernels. Contacts are numbered by the table of
+rows (:mod:`heelstrike.sim.contacts.rows`): points, joint stops, joints with dry friction, second
+faces. In the shapes below ``contacts`` counts all of these.
+
+A dry joint is always closed, on a contact of its own (:mod:`heelstrike.sim.contacts.dry_friction`),
+but for one that has friction of a brake alone (:mod:`heelstrike.sim.contacts.brakes`), which opens
+and closes with it. The second faces are contacts of their own on ground with concave corners, and
+none elsewhere.
 """
 
 from __future__ import annotations
@@ -9,51 +15,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, array, cell, number, part
+from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.dynamics.loops import most_rows
-from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
-from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.contacts.rows import contact_count
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
-from heelstrike.sim.memory import contact_capacity, dry_joints
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
-
-class Layout(Bundle):
-    """How contacts are numbered: points, joint stops, joints with dry friction, second faces.
-
-    A dry joint is always closed, on a contact of its own
-    (:mod:`heelstrike.sim.contacts.dry_friction`), but for one that has friction of a brake alone
-    (:mod:`heelstrike.sim.contacts.brakes`), which opens and closes with it. The second faces of the
-    contact points, one each, are contacts of their own on ground with concave corners, and none
-    elsewhere.
-
-    Attributes
-    ----------
-    first_dry, first_second : int
-        Number of the first dry joint, and of the first second face.
-    watched : int
-        How many contacts there are on this ground.
-    stop_joint : (ns,) int
-    stop_side, stop_limit : (ns,) float
-        Joint of each stop; 1 for a lower, -1 for an upper end of its range; that end.
-    dry_joint : (nd,) int
-        Joints that may have dry friction.
-    latch_stop : (latches,) int
-        The stop that each latch is.
-    """
-
-    first_dry: int = number(int)
-    first_second: int = number(int)
-    watched: int = cell(int)
-    stop_joint: Integers = array("ns", of=int)
-    stop_side: Floats = array("ns")
-    stop_limit: Floats = array("ns")
-    dry_joint: Integers = array("nd", of=int)
-    latch_stop: Integers = array("latches", of=int)
 
 
 class Modes(Bundle):
@@ -65,6 +35,8 @@ class Modes(Bundle):
 
     Attributes
     ----------
+    watched : int
+        How many contacts there are on this ground: all, or those before the second faces.
     closed : (contacts,) int
         Whether each contact point is on the ground, each joint at its stop.
     slide : (contacts,) int
@@ -84,6 +56,7 @@ class Modes(Bundle):
         The most that dry friction is of each joint in this phase.
     """
 
+    watched: int = cell(int)
     closed: Integers = array("contacts", of=int)
     slide: Integers = array("contacts", of=int)
     group: Integers = array("contacts", of=int)
@@ -104,8 +77,8 @@ class Faces(Bundle):
     face : (contacts,) int
         Face of the ground that each closed contact point is on, -1 for none; the second that it
         is on, or could meet (:mod:`heelstrike.sim.event_driven.faces`).
-    seconds : Contacts
-        The contact points on their second faces; the gap is infinite where there is none.
+    paired : int
+        Whether the ground has concave corners, where points have second faces.
     place : (3,) float
         Scratch of :func:`~heelstrike.sim.event_driven.faces.choose_faces`.
     center, acceleration : (3,) float
@@ -113,7 +86,7 @@ class Faces(Bundle):
     """
 
     face: Integers = array("contacts", of=int)
-    seconds: Contacts = part(Contacts)
+    paired: int = cell(int)
     place: Floats = array(3)
     center: Floats = array(3)
     acceleration: Floats = array(3)
@@ -476,7 +449,6 @@ class Phase(Bundle):
 
     Attributes
     ----------
-    layout : Layout
     modes : Modes
     faces : Faces
     watch : Watch
@@ -485,7 +457,6 @@ class Phase(Bundle):
     saddle : SaddlePoint
     """
 
-    layout: Layout = part(Layout)
     modes: Modes = part(Modes)
     faces: Faces = part(Faces)
     watch: Watch = part(Watch)
@@ -522,47 +493,19 @@ class Motion(Bundle):
 def allocate_motion(robot: Robot) -> Motion:
     """Allocate the memory of an event-driven simulation of `robot`."""
     model = robot.model
-    layout = layout_of(robot)
-    contacts, loops = layout.watched + robot.nc, most_rows(model)
+    contacts, loops = contact_count(model), most_rows(model)
     rows = 2 * contacts + loops
     extents = model.extents | {
         "contacts": contacts, "components": 2, "rows": rows, "unknowns": model.nv + rows,
         "capacity": contacts + loops, "functions": 2 * contacts + robot.nc,
         "stages": SLOPES, "dense_rows": DENSE_ROWS,
     }  # fmt: skip
-    phase = Phase.allocate(extents, layout=layout)
+    phase = Phase.allocate(extents)
     mass, gravity = float(sum(model.mass)), np.sqrt(np.sum(model.gravity**2))
     phase.watch.weight = mass * gravity if gravity > 0.0 else mass
     phase.watch.value[:] = 1.0
     phase.faces.face[:] = NO_FACE
-    phase.faces.seconds.gap[:] = np.inf
     motion = Motion.allocate(extents, phase=phase)
     motion.bounces.last_impact[:] = -np.inf
     motion.bounces.accumulation[:] = np.inf
     return motion
-
-
-def layout_of(robot: Robot) -> Layout:
-    """Number the contacts of a robot."""
-    model = robot.model
-    lower = np.flatnonzero(np.isfinite(model.lower))
-    upper = np.flatnonzero(np.isfinite(model.upper))
-    dry, firsts = dry_joints(model), contact_capacity(robot)
-    return Layout.allocate(
-        model.extents, ns=len(lower) + len(upper), nd=len(dry), first_dry=firsts - len(dry),
-        first_second=firsts, watched=firsts,
-        stop_joint=np.concatenate((lower, upper)).astype(np.int64),
-        stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
-        stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
-        dry_joint=dry, latch_stop=_stops_of_latches(model, lower, upper),
-    )  # fmt: skip
-
-
-def _stops_of_latches(model: Model, lower: Integers, upper: Integers) -> Integers:
-    """Number of the stop that each latch is: lower ends of ranges come before upper ones."""
-    ends = model.nc + np.where(
-        model.latch_side > 0,
-        len(lower) + np.searchsorted(upper, model.latch_joint),
-        np.searchsorted(lower, model.latch_joint),
-    )
-    return ends.astype(np.int64)

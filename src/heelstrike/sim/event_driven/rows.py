@@ -5,9 +5,10 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.brakes import share_friction
-from heelstrike.sim.contacts.dry_friction import dry_force
+from heelstrike.sim.contacts.dry_friction import add_dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.loops import note_loops, rows_of
+from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import slides
@@ -58,8 +59,9 @@ def note_state(model: Model, row: int, state: Floats, record: Record) -> None:
 
 @kernel
 def put_right(
-    scene: Scene, state: Floats, step: Step, equations: Equations, contacts: Contacts,
-    surface: Surface, assembly: Assembly, loops: Loops, phase: Phase, output: Output,
+    scene: Scene, state: Floats, rows: Rows, step: Step, equations: Equations, contacts: Contacts,
+    surface: Surface, assembly: Assembly, loops: Loops, seconds: Contacts, phase: Phase,
+    output: Output,
 ) -> bool:  # fmt: skip
     """Write a state that is to become a row, put on its constraints, to ``output.state``.
 
@@ -69,8 +71,9 @@ def put_right(
     for i in range(state.shape[0]):
         trial[i] = state[i]
     _, strayed, fastest = project(
-        scene.model, scene.ground, equations, contacts, surface, assembly, loops, phase, trial
-    )
+        scene.model, scene.ground, rows, equations, contacts, surface, assembly, loops, seconds,
+        phase, trial,
+    )  # fmt: skip
     if explained(state, trial, INTERPOLATED, step):
         return True
     for i in range(state.shape[0]):
@@ -108,8 +111,8 @@ def write_row(
     Where no contact forces obey the laws there are none in the row, and none of loops.
     """
     put_right(
-        scene, state, step, memory.equations, memory.contacts, memory.surface, memory.assembly,
-        memory.loops, phase, output,
+        scene, state, memory.rows, step, memory.equations, memory.contacts, memory.surface,
+        memory.assembly, memory.loops, memory.seconds, phase, output,
     )  # fmt: skip
     write_right(scene, time, lawful, impact, control, memory, phase, output, record)
 
@@ -120,7 +123,7 @@ def write_right(
     phase: Phase, output: Output, record: Record,
 ) -> None:  # fmt: skip
     """Append the state in ``output.state``, as :func:`write_row` does."""
-    layout, modes, faces, forces = phase.layout, phase.modes, phase.faces, phase.forces
+    modes, forces = phase.modes, phase.forces
     model, contacts, assembly = scene.model, memory.contacts, memory.assembly
     trial, residual, impulse = output.state, assembly.answer.residual, assembly.answer.impulse
     evaluate(scene, time, trial, control, memory, phase, output.slope)
@@ -131,7 +134,7 @@ def write_right(
         count = 0
         for place in range(loop_rows):
             impulse[2 * place] = 0.0
-        note_loops(model, loop_rows, impulse, memory.loops)
+        note_loops(memory.rows, loop_rows, 1.0, impulse, memory.loops)
     elif count + loop_rows > 0:
         solve_accelerations(count, model, trial, memory, phase)
         note_residual(residual, memory.tally)
@@ -140,30 +143,29 @@ def write_right(
                 count, memory.surface.friction, modes.slide, phase.watch.value, forces.force,
                 assembly,
             )  # fmt: skip
-        note_loops(model, count + loop_rows, impulse, memory.loops)
+        note_loops(memory.rows, count + loop_rows, 1.0, impulse, memory.loops)
     row, friction_torque = record.rows, record.friction_torque[record.rows]
     note_row(time, memory, record)
     note_state(model, row, trial, record)
-    slide = modes.slide[layout.first_dry :]
-    dry_force(layout.dry_joint, slide, modes.breakaway, friction_torque)
+    add_dry_force(modes.slide, modes.breakaway, memory.rows, friction_torque)
     deepest = memory.tally.penetration
     for contact in range(model.nc):
         if modes.passing[contact] == 0:
-            deepest = max(deepest, -contacts.gap[contact], -faces.seconds.gap[contact])
-        faces.seconds.force[contact, 0] = 0.0
-        faces.seconds.force[contact, 1] = 0.0
+            deepest = max(deepest, -contacts.gap[contact], -memory.seconds.gap[contact])
+        memory.seconds.force[contact, 0] = 0.0
+        memory.seconds.force[contact, 1] = 0.0
     memory.tally.penetration = deepest
     for place in range(count):
         contact = assembly.candidate[place]
         normal, tangent = impulse[2 * place], impulse[2 * place + 1]
-        if contact >= layout.first_second:
-            faces.seconds.force[contact - layout.first_second, 0] = normal
-            faces.seconds.force[contact - layout.first_second, 1] = tangent
-        elif contact >= layout.first_dry:
-            friction_torque[layout.dry_joint[contact - layout.first_dry]] = tangent
-        elif contact >= model.nc:
-            stop = contact - model.nc
-            record.stop_torque[row, layout.stop_joint[stop]] += layout.stop_side[stop] * normal
+        kind, owner = memory.rows.kind[contact], memory.rows.owner[contact]
+        if kind == SECOND_FACE:
+            memory.seconds.force[owner, 0] = normal
+            memory.seconds.force[owner, 1] = tangent
+        elif kind == DRY_JOINT:
+            friction_torque[owner] = tangent
+        elif kind == STOP:
+            record.stop_torque[row, owner] += memory.rows.side[contact] * normal
         else:
             record.contact_force[row, contact, 0] = normal
             record.contact_force[row, contact, 1] = tangent
@@ -171,10 +173,10 @@ def write_right(
                 model, memory.equations.tree, contacts, contact
             )
     share_friction(model, modes.breakaway, friction_torque, record.brake_torque[row])
-    for second in range(layout.first_second, layout.watched):
+    for second in range(memory.rows.first[SECOND_FACE], modes.watched):
         record_corner(
-            row, second - layout.first_second, model, memory.equations.tree, contacts,
-            faces.seconds, impact, record,
+            row, memory.rows.owner[second], model, memory.equations.tree, contacts, memory.seconds,
+            impact, record,
         )  # fmt: skip
     output.last_row = time
     period = output.period * output.every
@@ -210,19 +212,19 @@ def write_rows_within(
     at the row: nothing but integration finds the state there. Rows before it are taken back, since
     the shorter step may meet an event that the longer one has passed.
     """
-    layout, modes, watch = phase.layout, phase.modes, phase.watch
+    modes, watch = phase.modes, phase.watch
     period = output.period * output.every
     last = step.time + step.length
     first, next_row, last_row = record.rows, output.next_row, output.last_row
     touch = False
     if step.has_fired == 1:
         last -= 1e-12
-        for contact in range(layout.watched):
+        for contact in range(modes.watched):
             touch = touch or (
                 modes.closed[contact] == 0 and comes_down(contact, watch.fired, step.samples)
             )
-        for corner in range(2 * layout.watched, 2 * layout.watched + scene.model.nc):
-            touch = touch or watch.fired[corner] == 1
+        for point in range(scene.model.nc):
+            touch = touch or watch.fired[2 * modes.watched + point] == 1
     state = output.dense_state
     while True:
         time = output.next_row * period
@@ -234,9 +236,9 @@ def write_rows_within(
                 return WRITTEN
             touch = False
             time = step.time + step.length
-            for second in range(layout.first_second, layout.watched):
+            for second in range(memory.rows.first[SECOND_FACE], modes.watched):
                 meets = modes.closed[second] == 0 and watch.fired[2 * second] == 1
-                impact.meets[second - layout.first_second] = 1 if meets else 0
+                impact.meets[memory.rows.owner[second]] = 1 if meets else 0
         if record.rows + ROWS_OF_AN_INSTANT > record.time.shape[0]:
             return NO_ROOM
         if part < 1.0:
@@ -245,8 +247,8 @@ def write_rows_within(
             for i in range(state.shape[0]):
                 state[i] = step.end[i]
         fits = put_right(
-            scene, state, step, memory.equations, memory.contacts, memory.surface, memory.assembly,
-            memory.loops, phase, output,
+            scene, state, memory.rows, step, memory.equations, memory.contacts, memory.surface,
+            memory.assembly, memory.loops, memory.seconds, phase, output,
         )  # fmt: skip
         inside = is_inside(time, step.time, step.length)
         if not fits and inside and not last_row > step.time:

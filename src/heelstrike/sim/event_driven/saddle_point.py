@@ -37,6 +37,7 @@ from heelstrike.dynamics.kernels import mass_matrix
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.geometry import add_impulse, row_product
 from heelstrike.sim.contacts.loops import rows_of
+from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import known_force, pose_problem, solve_candidates
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration
@@ -117,7 +118,8 @@ def write_equations(
 @kernel
 def state_accelerations(
     count: int, model: Model, state: Floats, contacts: Contacts, loops: Loops, torque: Floats,
-    equations: Equations, assembly: Assembly, pushes: Pushes, phase: Phase,
+    rows: Rows, seconds: Contacts, equations: Equations, assembly: Assembly, pushes: Pushes,
+    phase: Phase,
 ) -> None:  # fmt: skip
     """State the problem of accelerations: the known force, and J̇ v of the candidates.
 
@@ -133,7 +135,7 @@ def state_accelerations(
         normal, tangent = problem.free[2 * place], problem.free[2 * place + 1]
         contact = assembly.candidate[place]
         free_gap_acceleration(
-            model, contacts, equations, contact, place, phase.layout, phase.modes.breakaway,
+            model, contacts, equations, contact, place, rows, seconds, phase.modes.breakaway,
             phase.faces, assembly,
         )  # fmt: skip
         for row in range(2 * place, 2 * place + 2):
@@ -142,7 +144,7 @@ def state_accelerations(
     for row in range(rows_of(loops)):
         bias[2 * (count + row)] = loops.rows.bias[row]
         bias[2 * (count + row) + 1] = 0.0
-    known_force(model, state, torque, phase.layout, phase.modes, pushes, equations)
+    known_force(model, state, torque, rows, phase.modes, pushes, equations)
     for i in range(model.nv):
         saddle.force[i] = rate[i]
         rate[i] = kept[i]
@@ -370,8 +372,8 @@ def is_proven(
 
 @kernel
 def solve_by_saddle_point(
-    count: int, total: int, accelerations: bool, model: Model, modes: Modes, equations: Equations,
-    assembly: Assembly, held: HeldRows, saddle: SaddlePoint,
+    count: int, total: int, accelerations: bool, model: Model, equations: Equations,
+    assembly: Assembly, phase: Phase,
 ) -> bool:  # fmt: skip
     """Solve the contact problem of the candidates from the full equations; return whether proven.
 
@@ -381,10 +383,14 @@ def solve_by_saddle_point(
     """
     nv = model.nv
     for _ in range(ROUNDS):
-        size = solve_modes(count, total, model, equations, assembly, held, saddle)
-        data = size_of_data(total, nv, assembly.jacobian, saddle)
-        if not amend_modes(total, accelerations, nv, data, modes, saddle.scale, assembly):
-            return is_proven(size, total, data, model, held, saddle, equations, assembly)
+        size = solve_modes(count, total, model, equations, assembly, phase.held, phase.saddle)
+        data = size_of_data(total, nv, assembly.jacobian, phase.saddle)
+        if not amend_modes(
+            total, accelerations, nv, data, phase.modes, phase.saddle.scale, assembly
+        ):
+            return is_proven(
+                size, total, data, model, phase.held, phase.saddle, equations, assembly
+            )
     return False
 
 
@@ -411,14 +417,12 @@ def solve_at_once(count: int, model: Model, memory: Memory, phase: Phase) -> boo
     assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode
     answer, tally = assembly.answer, memory.solver.tally
     pose_problem(
-        count, memory.loops, True, friction, guess, phase.layout, phase.modes.slide, assembly
+        count, memory.loops, True, friction, guess, memory.rows, phase.modes.slide, assembly
     )
     total = assembly.problem.count
     for row in range(2 * total):
         answer.impulse[row] = 0.0
-    if not solve_by_saddle_point(
-        count, total, True, model, phase.modes, memory.equations, assembly, phase.held, phase.saddle
-    ):
+    if not solve_by_saddle_point(count, total, True, model, memory.equations, assembly, phase):
         return False
     tally.solves += 1
     tally.shortcuts += 1
@@ -439,20 +443,19 @@ def guess_modes(total: int, bias: Floats, assembly: Assembly) -> None:
 
 @kernel
 def solve_once_more(
-    status: int, count: int, accelerations: bool, model: Model, modes: Modes, tally: Tally,
-    equations: Equations, assembly: Assembly, held: HeldRows, saddle: SaddlePoint,
+    status: int, count: int, accelerations: bool, model: Model, tally: Tally, equations: Equations,
+    assembly: Assembly, phase: Phase,
 ) -> bool:  # fmt: skip
     """Solve again what the solvers left like this; return whether what comes out is proven."""
+    saddle = phase.saddle
     answer, total = assembly.answer, assembly.problem.count
     copy_answer(total, answer, saddle)
     for attempt in range(1 if status == SOLVED or accelerations else 2):
         if attempt == 1:
-            guess_modes(total, saddle.bias, assembly)
+            guess_modes(total, phase.saddle.bias, assembly)
         for row in range(2 * total if status != SOLVED else 0):
             answer.impulse[row] = 0.0
-        if solve_by_saddle_point(
-            count, total, accelerations, model, modes, equations, assembly, held, saddle
-        ):
+        if solve_by_saddle_point(count, total, accelerations, model, equations, assembly, phase):
             if status != SOLVED:
                 tally.failures -= 1
                 tally.fallbacks += 1
@@ -476,26 +479,25 @@ def solve_accelerations(
     saddle.used = 0
     if saddle.needed == 1:
         state_accelerations(
-            count, model, state, memory.contacts, memory.loops, memory.torque, memory.equations,
-            assembly, memory.pushes, phase,
+            count, model, state, memory.contacts, memory.loops, memory.torque, memory.rows,
+            memory.seconds, memory.equations, assembly, memory.pushes, phase,
         )  # fmt: skip
         if solve_at_once(count, model, memory, phase):
             saddle.used = 1
             return SOLVED
     status = solve_candidates(
-        count, memory.loops, True, friction, guess, phase.layout, phase.modes.slide,
+        count, memory.loops, True, friction, guess, memory.rows, phase.modes.slide,
         phase.forces.solvers, assembly, memory.solver,
     )  # fmt: skip
     if status == SOLVED and not memory.solver.yardstick.effort > STRAINED:
         return status
     state_accelerations(
-        count, model, state, memory.contacts, memory.loops, memory.torque, memory.equations,
-        assembly, memory.pushes, phase,
+        count, model, state, memory.contacts, memory.loops, memory.torque, memory.rows,
+        memory.seconds, memory.equations, assembly, memory.pushes, phase,
     )  # fmt: skip
     if solve_once_more(
-        status, count, True, model, phase.modes, memory.solver.tally, memory.equations, assembly,
-        phase.held, saddle,
-    ):  # fmt: skip
+        status, count, True, model, memory.solver.tally, memory.equations, assembly, phase
+    ):
         saddle.used = 1
         return SOLVED
     return status
@@ -508,16 +510,15 @@ def solve_velocities(count: int, model: Model, memory: Memory, phase: Phase) -> 
     assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode
     saddle.used = 0
     status = solve_candidates(
-        count, memory.loops, False, friction, guess, phase.layout, phase.modes.slide,
+        count, memory.loops, False, friction, guess, memory.rows, phase.modes.slide,
         phase.forces.solvers, assembly, memory.solver,
     )  # fmt: skip
     if status == SOLVED and not memory.solver.yardstick.effort > STRAINED:
         return status
     state_velocities(assembly.problem.count, assembly.problem.free, saddle)
     if solve_once_more(
-        status, count, False, model, phase.modes, memory.solver.tally, memory.equations, assembly,
-        phase.held, saddle,
-    ):  # fmt: skip
+        status, count, False, model, memory.solver.tally, memory.equations, assembly, phase
+    ):
         saddle.used = 1
         return SOLVED
     return status
