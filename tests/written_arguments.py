@@ -1,4 +1,4 @@
-"""What kernels write to, read from their source."""
+"""What kernels write to, what they read, and what they could reach, read from their source."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ import textwrap
 from collections.abc import Iterable, Iterator
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import Any, get_type_hints
 
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.compilation import Kernel
 from heelstrike.compiler.straight_line import play
+from heelstrike.robot.model import Model
 from heelstrike.sim.contacts.straight_line import KERNELS
 
 NOTHING: frozenset[str] = frozenset()
+NOWHERE: frozenset[tuple[str, ...]] = frozenset()
 
 
 def kernels_of(package: ModuleType) -> Iterator[Kernel]:
@@ -51,63 +53,105 @@ def arguments_of(kernel: Kernel) -> list[str]:
     return [argument.arg for argument in (*arguments.posonlyargs, *arguments.args)]
 
 
-class _Reading(ast.NodeVisitor):
-    """Which arguments of a kernel its names stand for, and which it writes to.
+Path = tuple[str, ...]
+"""An argument, a bundle that it is, or something in it: ``("memory", "assembly", "jacobian")``."""
 
-    A name that is given an array or bundle stands for the arguments that this may be a part of,
-    whatever else it is given elsewhere.
+
+class _Reading(ast.NodeVisitor):
+    """What of its arguments the names of a kernel stand for, what it touches, and what it writes.
+
+    A name that is given an array or bundle stands for all that this may be, whatever else it is
+    given elsewhere.
     """
 
     def __init__(self, kernel: Kernel) -> None:
         self.kernel = kernel
         self.scope = kernel.py_func.__globals__
-        self.stands_for = {name: frozenset({name}) for name in arguments_of(kernel)}
+        self.kinds = kinds_of(kernel)
+        self.stands_for = {name: frozenset({(name,)}) for name in arguments_of(kernel)}
         self.given: dict[str, ast.expr] = {}
         self.written: set[str] = set()
+        self.touched: set[Path] = set()
         known = -1
-        while known != (known := sum(map(len, self.stands_for.values())) + len(self.written)):
+        while known != (known := sum(map(len, (*self.stands_for.values(), self.written)))):
+            self.touched.clear()
             for statement in definition_of(kernel).body:
                 self.visit(statement)
 
-    def roots(self, node: ast.AST) -> frozenset[str]:
-        """Return the arguments that an expression may be a part of."""
+    def paths(self, node: ast.AST) -> frozenset[Path]:
+        """Return what of the arguments an expression may be, or be a part of."""
         if isinstance(node, ast.Name):
-            return self.stands_for.get(node.id, NOTHING)
-        if isinstance(node, ast.Attribute | ast.Subscript | ast.Starred):
-            return self.roots(node.value)
+            return self.stands_for.get(node.id, NOWHERE)
+        if isinstance(node, ast.Attribute):
+            return frozenset(self._members(node))
+        if isinstance(node, ast.Subscript | ast.Starred):
+            return self.paths(node.value)
         if isinstance(node, ast.IfExp):
-            return self.roots(node.body) | self.roots(node.orelse)
+            return self.paths(node.body) | self.paths(node.orelse)
         if isinstance(node, ast.Tuple):
-            return NOTHING.union(*map(self.roots, node.elts))
+            return NOWHERE.union(*map(self.paths, node.elts))
         if isinstance(node, ast.Call) and self._makes_a_tuple(node):
-            return NOTHING.union(*map(self.roots, node.args))
-        return NOTHING
+            return NOWHERE.union(*map(self.paths, node.args))
+        return NOWHERE
+
+    def _members(self, node: ast.Attribute) -> Iterator[Path]:
+        """What is by a name in a bundle: extents are none of it. Of an array it is this one."""
+        for path in self.paths(node.value):
+            kind = kind_at(self.kinds, path)
+            if kind is None:
+                yield path
+            elif node.attr in members_of(kind):
+                yield (*path, node.attr)
 
     def visit_Assign(self, node: ast.Assign) -> None:
         for target in node.targets:
             self._assign(target, node.value)
-        self.generic_visit(node)
+        self._visit_values(node)
 
     def visit_AugAssign(self, node: ast.AugAssign) -> None:
         self._write(node.target)
-        self.generic_visit(node)
+        self._visit_values(node)
+
+    def _visit_values(self, node: ast.Assign | ast.AugAssign) -> None:
+        """Visit an assignment: a bundle that only gets another name is not touched by that."""
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+        for each in (*targets, *_each_of(node.value)):
+            if not isinstance(each, ast.Name | ast.Attribute) or not self._is_bundle(each):
+                self.visit(each)
+
+    def _is_bundle(self, node: ast.expr) -> bool:
+        return all(kind_at(self.kinds, path) is not None for path in self.paths(node))
+
+    def visit_Name(self, node: ast.Name) -> None:
+        if isinstance(node.ctx, ast.Load):
+            self.touched |= self.paths(node)
+
+    def visit_Attribute(self, node: ast.Attribute) -> None:
+        self.touched |= self.paths(node)
+        if not self.paths(node.value):
+            self.visit(node.value)
 
     def visit_Call(self, node: ast.Call) -> None:
         called = self._called(node.func)
+        values: list[ast.expr] = []
         if called is play:
             program = self._program(node.args[0])
             assert isinstance(node.args[1], ast.Tuple)
+            self.visit(node.args[0])
             self._hand_over(program, node.args[1].elts)
         elif isinstance(called, Kernel):
             self._hand_over(called, node.args)
-        elif isinstance(node.func, ast.Attribute):
-            method = self._method(node.func)
-            if method is not None:
-                self._hand_over(method, [node.func.value, *node.args])
-        elif isinstance(node.func, ast.Name) and node.func.id in self.stands_for:
-            # A function that was handed over: a controller, which writes its last argument.
-            self._write_to(self.roots(node.args[-1]))
-        self.generic_visit(node)
+        elif isinstance(node.func, ast.Attribute) and (method := self._method(node.func)):
+            self._hand_over(method, [node.func.value, *node.args])
+        elif self._makes_a_tuple(node):
+            values = [value for value in node.args if not self._is_bundle(value)]
+        else:
+            values = [node.func, *node.args]
+            if isinstance(node.func, ast.Name) and node.func.id in self.stands_for:
+                # A function that was handed over: a controller, which writes its last argument.
+                self._write_to(self.paths(node.args[-1]))
+        for value in values:
+            self.visit(value)
 
     def _called(self, node: ast.AST) -> Any:
         return self.scope.get(node.id) if isinstance(node, ast.Name) else None
@@ -117,15 +161,11 @@ class _Reading(ast.NodeVisitor):
         return isinstance(made, type) and issubclass(made, tuple)
 
     def _method(self, node: ast.Attribute) -> Kernel | None:
-        """Kernel of the class of an argument, as that is annotated."""
-        if not isinstance(node.value, ast.Name):
-            return None
-        arguments = definition_of(self.kernel).args.args
-        for argument in arguments:
-            if argument.arg == node.value.id and isinstance(argument.annotation, ast.Name):
-                kind = self.scope.get(argument.annotation.id)
-                found = getattr(kind, node.attr, None)
-                return found if isinstance(found, Kernel) else None
+        """Kernel of the class of a bundle, as that is annotated."""
+        for path in self.paths(node.value):
+            found = getattr(kind_at(self.kinds, path), node.attr, None)
+            if isinstance(found, Kernel):
+                return found
         return None
 
     def _program(self, node: ast.expr) -> Kernel | None:
@@ -143,11 +183,22 @@ class _Reading(ast.NodeVisitor):
     def _hand_over(self, kernel: Kernel | None, values: Iterable[ast.expr]) -> None:
         values = list(values)
         if kernel is None:  # straight-line code of another kind: its last argument
-            self._write_to(self.roots(values[-1]))
+            self._write_to(self.paths(values[-1]))
+            for value in values:
+                self.visit(value)
             return
-        for name, value in zip(arguments_of(kernel), values, strict=False):
+        names = arguments_of(kernel)
+        for name, value in zip(names, values, strict=False):
+            handed = self.paths(value)
             if name in written_by(kernel):
-                self._write_to(self.roots(value))
+                self._write_to(handed)
+            if not handed or any(isinstance(each, ast.Slice) for each in ast.walk(value)):
+                self.visit(value)
+            for path in handed:
+                for touched in touched_by(kernel):
+                    if touched[0] == name:
+                        is_bundle = kind_at(self.kinds, path) is not None
+                        self.touched.add((*path, *touched[1:]) if is_bundle else path)
 
     def _assign(self, target: ast.expr, value: ast.expr) -> None:
         if isinstance(target, ast.Tuple | ast.List):
@@ -156,33 +207,109 @@ class _Reading(ast.NodeVisitor):
                 self._assign(each, part)
         elif isinstance(target, ast.Name):
             self.given.setdefault(target.id, value)
-            known = self.stands_for.get(target.id, NOTHING)
-            self.stands_for[target.id] = known | self.roots(value)
+            known = self.stands_for.get(target.id, NOWHERE)
+            self.stands_for[target.id] = known | self.paths(value)
         else:
             self._write(target)
 
     def _write(self, target: ast.expr) -> None:
         if isinstance(target, ast.Attribute | ast.Subscript):
-            self._write_to(self.roots(target))
+            self._write_to(self.paths(target))
 
-    def _write_to(self, arguments: frozenset[str]) -> None:
-        self.written |= arguments
+    def _write_to(self, paths: frozenset[Path]) -> None:
+        self.written |= {path[0] for path in paths}
 
 
-_being_read: list[Kernel] = []
+def _each_of(value: ast.expr) -> list[ast.expr]:
+    return value.elts if isinstance(value, ast.Tuple) else [value]
+
+
+def members_of(kind: type) -> dict[str, Any]:
+    """Return the members of a bundle, or of a tuple with names, each with its class if known."""
+    if issubclass(kind, Bundle):
+        return {name: member.kind for name, member in kind.declared.items()}
+    return get_type_hints(kind)
+
+
+def holds_others(kind: Any) -> bool:
+    """Whether something is a class of bundles, or of tuples with names."""
+    is_class = isinstance(kind, type)
+    return is_class and (issubclass(kind, Bundle) or hasattr(kind, "_fields"))
 
 
 @cache
+def kinds_of(kernel: Kernel) -> dict[str, type]:
+    """Return the classes of the arguments of a kernel that are bundles, as they are annotated."""
+    scope, kinds = kernel.py_func.__globals__, {}
+    arguments = definition_of(kernel).args
+    for argument in (*arguments.posonlyargs, *arguments.args):
+        names = ast.walk(argument.annotation) if argument.annotation is not None else ()
+        for node in names:
+            kind = scope.get(node.id) if isinstance(node, ast.Name) else None
+            if kind is not None and holds_others(kind):
+                kinds[argument.arg] = kind
+    return kinds
+
+
+def kind_at(kinds: dict[str, type], path: Path) -> type | None:
+    """Return the class of bundles that something in the arguments is of, None for no bundle."""
+    kind: Any = kinds.get(path[0])
+    for name in path[1:]:
+        kind = members_of(kind).get(name)
+    return kind if holds_others(kind) else None
+
+
+def leaves_of(kind: type | None) -> int:
+    """Return how many arrays and numbers there are in a bundle, and in the bundles in it.
+
+    The robot's numbers count as none: no kernel writes to them.
+    """
+    if kind is None:
+        return 1
+    if kind is Model:
+        return 0
+    return sum(leaves_of(each if holds_others(each) else None) for each in members_of(kind).values())
+
+
+def reach_of(kernel: Kernel) -> int:
+    """Return how many arrays and numbers a kernel could reach."""
+    return sum(leaves_of(kinds_of(kernel).get(name)) for name in arguments_of(kernel))
+
+
+def use_of(kernel: Kernel) -> int:
+    """Return how many arrays and numbers a kernel touches, itself or by what it calls."""
+    kinds = kinds_of(kernel)
+    touched = {
+        path
+        for path in touched_by(kernel)
+        if Model not in [kind_at(kinds, path[:k]) for k in range(1, len(path))]
+    }
+    whole = {path for path in touched if kind_at(kinds, path) is not None}
+    inside = {path for path in touched if any(path[:k] in whole for k in range(1, len(path)))}
+    return sum(leaves_of(kind_at(kinds, path)) for path in touched - inside)
+
+
+_readings: dict[Kernel, _Reading | None] = {}
+
+
+def _read(kernel: Kernel) -> _Reading | None:
+    """Read a kernel; None while it is being read: it calls itself, with the same arguments."""
+    if kernel not in _readings:
+        _readings[kernel] = None
+        _readings[kernel] = _Reading(kernel)
+    return _readings[kernel]
+
+
 def written_by(kernel: Kernel) -> frozenset[str]:
     """Return the names of the arguments that a kernel writes to, itself or by what it calls."""
-    if kernel in _being_read:
-        return NOTHING  # it calls itself, with the same arguments
-    _being_read.append(kernel)
-    try:
-        reading = _Reading(kernel)
-    finally:
-        _being_read.pop()
-    return frozenset(reading.written & set(arguments_of(kernel)))
+    reading = _read(kernel)
+    return NOTHING if reading is None else frozenset(reading.written & set(arguments_of(kernel)))
+
+
+def touched_by(kernel: Kernel) -> frozenset[Path]:
+    """Return what of its arguments a kernel reads or writes, itself or by what it calls."""
+    reading = _read(kernel)
+    return NOWHERE if reading is None else frozenset(reading.touched)
 
 
 @cache

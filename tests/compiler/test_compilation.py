@@ -429,10 +429,10 @@ def test_memory_put_back_knows_the_machine_code_made_meanwhile() -> None:
     robot = load_robot("bravo7")
     memory = allocate_memory(robot)
     before = copy.deepcopy(memory)
-    before.assembly.solver.solvers[:] = 0
+    before.solver.solvers[:] = 0
     try_solvers.finish()
     memory.become(before)
-    assert memory.assembly.solver.solvers[0] == try_solvers.address[0] != 0
+    assert memory.solver.solvers[0] == try_solvers.address[0] != 0
 
 
 @pytest.mark.skipif(BY_DOCUMENTED_NAMES, reason="Numba counts references there")

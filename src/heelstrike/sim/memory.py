@@ -135,8 +135,6 @@ class Assembly(Bundle):
         The contact problem of the candidates.
     answer : ContactAnswer
         Its solution.
-    solver : ContactWorkspace
-        Memory of the contact solvers.
     """
 
     candidate: Integers = array("capacity", of=int)
@@ -148,7 +146,6 @@ class Assembly(Bundle):
     half: Floats = array("nv", "2 capacity")
     problem: ContactProblem = part(ContactProblem)
     answer: ContactAnswer = part(ContactAnswer)
-    solver: ContactWorkspace = part(ContactWorkspace)
 
 
 class UsualPoints(Bundle):
@@ -303,6 +300,8 @@ class Memory(Bundle):
         The ground under them.
     assembly : Assembly
         The contact problem.
+    solver : ContactWorkspace
+        Memory of the contact solvers.
     usual : UsualPoints
         What straight-line programs make it of.
     reaction : Reaction
@@ -331,6 +330,7 @@ class Memory(Bundle):
     seconds: Contacts = part(Contacts)
     surface: Surface = part(Surface, flat=True)
     assembly: Assembly = part(Assembly, flat=True)
+    solver: ContactWorkspace = part(ContactWorkspace)
     usual: UsualPoints = part(UsualPoints, flat=True)
     reaction: Reaction = part(Reaction, flat=True)
     loops: Loops = part(Loops)
@@ -380,7 +380,6 @@ def _laid_out(robot: Robot) -> Memory:
         extents,
         problem=ContactProblem.allocate(nc=most),
         answer=ContactAnswer.allocate(nc=most),
-        solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
     )
     problem = assembly.problem
     memory = Memory.allocate(
@@ -394,6 +393,7 @@ def _laid_out(robot: Robot) -> Memory:
             extents, gap=rows.gap[rows.first[SECOND_FACE] : rows.end[SECOND_FACE]]
         ),
         assembly=assembly,
+        solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
         usual=UsualPoints.allocate(
             extents,
             usual_problem=ContactProblem.allocate(

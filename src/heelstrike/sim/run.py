@@ -510,7 +510,7 @@ COUNTS = ("steps", "saturations", *SOLVED)
 
 def counted(memory: Memory) -> dict[str, Any]:
     """Return counts and worst values of a simulation."""
-    tally, solver = memory.tally, memory.assembly.solver.tally
+    tally, solver = memory.tally, memory.solver.tally
     return {name: getattr(solver if name in SOLVED else tally, name) for name in COUNTS + WORST}
 
 

@@ -29,7 +29,7 @@ SIM = Path(hs.__file__).parent / "sim"
 
 TABLE = SIM / "contacts" / "rows.py"
 
-PENDING = ("event_driven",)
+PENDING: tuple[str, ...] = ()
 """Rooms whose kernels still compute with numbers of their own."""
 
 KERNELS = ("kernel", "dissolved_kernel")

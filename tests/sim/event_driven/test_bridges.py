@@ -16,6 +16,7 @@ from scenes.scene import random_scene
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.robot import RobotBuilder
 from heelstrike.sim import Event, EventKind, RunStatus, Simulation
 from heelstrike.sim.event_driven.bridge import MOST_BRIDGES
 
@@ -56,8 +57,9 @@ def bridged(begin: float, longer: int) -> tuple[hs.Run, hs.Run]:
         )  # fmt: skip
         simulation.advance(begin)
         if forced:
-            simulation._work.bridging, simulation._work.bridges = 1, longer
-            simulation._work.series = begin
+            work = simulation._work
+            work.decision.bridging, work.series.count = 1, longer
+            work.series.begin = begin
         simulation.advance(begin + 1e-6 * 4.0**longer)
         runs.append(simulation.record)
     return runs[0], runs[1]
@@ -88,7 +90,8 @@ def test_what_a_bridge_in_free_fall_is_wrong_by() -> None:
     )  # fmt: skip
     simulation.advance(0.01)
     length, phase = 1e-6 * 4.0**4, simulation._work
-    phase.bridging, phase.bridges, phase.series = 1, 4, simulation.time
+    phase.decision.bridging = 1
+    phase.series.count, phase.series.begin = 4, simulation.time
     simulation.advance(0.0105)
     (bridge,) = bridges(simulation.record)
     assert bridge.impulse[0] == pytest.approx(length)
@@ -110,7 +113,8 @@ def test_a_bridge_says_how_wrong_it_may_be_with_the_doubt_about_that() -> None:
     simulation.advance(0.01)
     begin = simulation.state
     phase, length = simulation._work, 1e-6 * 4.0**4
-    phase.bridging, phase.bridges, phase.series = 1, 4, simulation.time
+    phase.decision.bridging = 1
+    phase.series.count, phase.series.begin = 4, simulation.time
     simulation.advance(0.01 + length)
     (bridge,) = bridges(simulation.record)
 
@@ -137,9 +141,10 @@ def test_loops_hold_at_the_end_of_a_bridge() -> None:
     )  # fmt: skip
     simulation.advance(0.01)
     phase, length = simulation._work, 1e-6 * 4.0**4
-    phase.bridging, phase.bridges, phase.series = 1, 4, simulation.time
+    phase.decision.bridging = 1
+    phase.series.count, phase.series.begin = 4, simulation.time
     simulation.advance(0.01 + length)
-    run, reached = simulation.record, phase.end  # before the next phase puts it right
+    run, reached = simulation.record, phase.bridge.end  # before the next phase puts it right
     (bridge,) = bridges(run)
     assert run.completed
     assert np.abs(dynamics.loop_displacement(robot, reached[:3])).max() <= 1e-12
@@ -213,7 +218,8 @@ def test_a_robot_that_no_bridge_helps_is_given_up_in_words() -> None:
     )  # fmt: skip
     simulation.advance(0.01)
     phase = simulation._work
-    phase.bridging, phase.bridges, phase.series = 1, MOST_BRIDGES, simulation.time
+    phase.decision.bridging = 1
+    phase.series.count, phase.series.begin = MOST_BRIDGES, simulation.time
     simulation.advance(0.02)
     run = simulation.record
     assert run.status is RunStatus.SOLVER_FAILED
@@ -257,3 +263,33 @@ def test_what_slides_under_a_torque_that_switches_does_not_jam_forever() -> None
     assert run.completed
     assert len(bridges(run)) == 1
     assert sum(event.kind is EventKind.PAINLEVE for event in run.events) < 20
+
+
+def test_a_bridge_refuses_impulses_that_make_energy() -> None:
+    """A rod whose end strikes the ground askew: Newton's restitution alone would make energy.
+
+    With the normal velocity after the impact 0.9 times that before, and friction 1, the impulses of
+    the velocity-level problem multiply its kinetic energy by 2.49; without restitution they cannot
+    add to it: ½ p·(w⁻ + w⁺) ≤ 0 where w⁺ is perpendicular to what presses, and friction opposes it.
+    """
+    build = RobotBuilder("rod")
+    build.floating_base("rod", mass=1.0, inertia=1.0 / 12.0)
+    build.contact("rod", (0.0, -1.0))
+    robot = build.build()
+    simulation = Simulation(
+        robot, state=hs.State([0.0, 3.0, -0.5613], [0.0, 0.0, 0.0]), method=hs.EventDriven(),
+        ground=hs.Ground(friction=1.0, restitution=0.9), stop_when_fallen=False,
+    )  # fmt: skip
+    simulation.advance(1e-3)
+    work, memory = simulation._work, simulation._memory
+    struck = np.array([0.0, np.cos(0.5613), -0.5613, 0.2336, -0.3435, 2.586])
+    assert abs(contact_kinematics(robot, struck[:3], struck[3:]).gap[0]) < 1e-12
+    work.step.begin[:], memory.q[:], memory.v[:] = struck, struck[:3], struck[3:]
+    work.decision.bridging, work.series.count, work.series.begin = 1, 1, simulation.time
+    simulation.advance(1e-3 + 4e-6)
+    (bridge,) = bridges(simulation.record)
+    assert bridge.time == 1e-3
+    mass = dynamics.mass_matrix(robot, struck[:3])
+    before, after = (0.5 * v @ mass @ v for v in (struck[3:], work.bridge.after[3:]))
+    assert after < before
+    assert simulation.record.events[-1].impulse[0] > 0.0  # it was struck

@@ -20,7 +20,7 @@ from heelstrike.sim import (
     RunStatus,
 )
 from heelstrike.sim.event_driven.method import LOOKS, NO_BRIDGE
-from heelstrike.sim.event_driven.phase import allocate_phase
+from heelstrike.sim.event_driven.phase import allocate_motion
 from heelstrike.sim.frame import Outcome
 
 Floats = NDArray[np.float64]
@@ -290,7 +290,7 @@ def test_why_it_could_not_go_on_is_told() -> None:
     simulation = hs.Simulation(
         walking.bravo7(), state=walking.gait().initial_state, method=hs.EventDriven()
     )
-    simulation._work.reason = NO_BRIDGE
+    simulation._work.series.reason = NO_BRIDGE
     status, message = simulation._ending(Outcome.SOLVER_FAILED)
     assert status is RunStatus.SOLVER_FAILED
     assert "events followed each other" in message
@@ -313,7 +313,7 @@ def test_the_events_of_an_instant_have_room() -> None:
     robot = dataclasses.replace(robot, model=model)
     simulation = hs.Simulation(robot, state=walking.gait().initial_state, method=hs.EventDriven())
     simulation.step()
-    contacts = len(allocate_phase(robot).closed)
+    contacts = len(allocate_motion(robot).phase.modes.closed)
     assert contacts == 2 * robot.nc + 3 * robot.nv
     assert len(simulation._records[0].event_time) > 2 * ((LOOKS + 6) * contacts + 8)
 

@@ -74,33 +74,34 @@ def test_no_gap_is_passed_over_that_a_cubic_takes_below_zero() -> None:
     """Of two open points with the same ends; one far above what its rates take away is."""
     draw = np.random.default_rng(4)
     part, span, below, passed = np.linspace(0.0, 1.0, 2001), 2.5e-3, 0, 0
-    phase = SimpleNamespace(watched=2, closed=[0, 0], slide=[0, 0])
+    modes = SimpleNamespace(watched=2, closed=[0, 0], slide=[0, 0])
+    samples = SimpleNamespace()
     for _ in range(300):
         before, value = draw.uniform(0.0, 0.4, size=2)
         rate, later = draw.normal(size=2)
         rise = value - before
         cubic = before + part * (rate + part * (3.0 * rise - 2.0 * rate - later))
         cubic += part**3 * (rate + later - 2.0 * rise)
-        phase.before, phase.sample = [9.0, 1.0, before, 1.0], [9.0, 1.0, value, 1.0]
-        phase.before_rate = [rate / span, 0.0, rate / span, 0.0]
-        phase.sample_rate = [later / span, 0.0, later / span, 0.0]
-        asked = uncompiled(may_cross)(2, span, phase)
+        samples.before, samples.sample = [9.0, 1.0, before, 1.0], [9.0, 1.0, value, 1.0]
+        samples.before_rate = [rate / span, 0.0, rate / span, 0.0]
+        samples.sample_rate = [later / span, 0.0, later / span, 0.0]
+        asked = uncompiled(may_cross)(2, span, modes, samples)
         assert asked or cubic.min() > 0.8 * min(before, value)
         below += cubic.min() < 0.0
         passed += not asked
-        assert not uncompiled(may_cross)(0, span, phase)
-        assert not uncompiled(may_cross)(1, span, phase)
+        assert not uncompiled(may_cross)(0, span, modes, samples)
+        assert not uncompiled(may_cross)(1, span, modes, samples)
     assert below > 30
     assert passed > 30
 
 
 def test_what_is_not_above_zero_at_both_samples_is_looked_at() -> None:
-    phase = SimpleNamespace(watched=1, closed=[1], slide=[0])
-    phase.before_rate = phase.sample_rate = [0.0, 0.0]
+    modes = SimpleNamespace(watched=1, closed=[1], slide=[0])
+    samples = SimpleNamespace(before_rate=[0.0, 0.0], sample_rate=[0.0, 0.0])
     for before, value in [(-1e-12, 1.0), (0.0, 1.0), (1.0, 0.0), (1.0, -1e-12), (1.0, np.nan)]:
-        phase.before, phase.sample = [before, before], [value, value]
-        assert uncompiled(may_cross)(0, 1.0, phase)
-        assert uncompiled(may_cross)(1, 1.0, phase)
+        samples.before, samples.sample = [before, before], [value, value]
+        assert uncompiled(may_cross)(0, 1.0, modes, samples)
+        assert uncompiled(may_cross)(1, 1.0, modes, samples)
 
 
 def test_a_stop_touched_and_left_between_two_samples_is_seen() -> None:

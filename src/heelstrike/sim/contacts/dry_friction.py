@@ -44,12 +44,12 @@ def select_dry_joints(
 
 
 @kernel
-def dry_force(dry_joint: Integers, slide: Integers, limit: Floats, force: Floats) -> None:
+def add_dry_force(slide: Integers, limit: Floats, rows: Rows, force: Floats) -> None:
     """Add the friction of the joints that slide, which is known, to the generalised force.
 
-    `slide` tells the direction of every joint in `dry_joint`, zero where it sticks; `limit` is
-    the breakaway torque of every joint of the robot.
+    `slide` tells the direction of every entry of the table, zero where it sticks; `limit` is the
+    breakaway torque of every joint of the robot.
     """
-    for place in range(dry_joint.shape[0]):
-        joint = dry_joint[place]
-        force[joint] -= slide[place] * limit[joint]
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        joint = rows.owner[dry]
+        force[joint] -= slide[dry] * limit[joint]

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array
+from heelstrike.compiler.compilation import dissolved_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
 from heelstrike.robot.model import Model
 
@@ -106,6 +107,18 @@ def dry_joints(model: Model) -> Integers:
     """Return the joints that may have dry friction, of their own or of a brake that slips."""
     slipping = model.brake_joint[np.isfinite(model.brake_limit)]
     return np.union1d(np.flatnonzero(model.dry_friction > 0.0), slipping).astype(np.int64)
+
+
+def contact_count(model: Model) -> int:
+    """Return how many entries there are but for loops, couplings and brakes, which come last."""
+    stops = np.isfinite(model.lower).sum() + np.isfinite(model.upper).sum()
+    return 2 * model.nc + int(stops) + len(dry_joints(model))
+
+
+@dissolved_kernel
+def second_of(point: int, rows: Rows) -> int:
+    """Entry of the second face of a contact point."""
+    return int(rows.first[SECOND_FACE] + point)
 
 
 def lay_out_rows(model: Model) -> Rows:

@@ -6,21 +6,24 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, INTERVAL
+from heelstrike.contact.workspace import ContactWorkspace
 from heelstrike.dynamics.kernels import passive_force
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contacts.dry_friction import dry_force
+from heelstrike.sim.contacts.dry_friction import add_dry_force
 from heelstrike.sim.contacts.geometry import solve_mass_matrix
 from heelstrike.sim.contacts.latches import hold
 from heelstrike.sim.contacts.loops import rows_of
-from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.contacts.rows import DRY_JOINT, Rows
+from heelstrike.sim.event_driven.phase import Modes, Phase
 from heelstrike.sim.memory import Assembly, Equations, Loops
 from heelstrike.sim.push import Pushes, add_pushes
 
 
 @dissolved_kernel
 def known_force(
-    model: Model, state: Floats, torque: Floats, phase: Phase, pushes: Pushes, equations: Equations
-) -> None:
+    model: Model, state: Floats, torque: Floats, rows: Rows, modes: Modes, pushes: Pushes,
+    equations: Equations,
+) -> None:  # fmt: skip
     """Generalised force without contact, B Γ + passive + pushes − H, into ``equations.rate``.
 
     The equations of the state have been evaluated. Dry friction of the joints that move is one of
@@ -31,27 +34,28 @@ def known_force(
     add_pushes(model, equations.tree, pushes, force)
     for i in range(model.nu):
         force[model.actuator_joint[i]] += torque[i]
-    dry_force(phase.dry_joint, phase.slide[phase.first_dry :], phase.breakaway, force)
+    add_dry_force(modes.slide, modes.breakaway, rows, force)
     for i in range(model.nv):
         rate[i] = force[i] - equations.bias[i]
 
 
 @dissolved_kernel
 def free_acceleration(
-    model: Model, state: Floats, torque: Floats, phase: Phase, pushes: Pushes, equations: Equations
-) -> None:
+    model: Model, state: Floats, torque: Floats, rows: Rows, modes: Modes, pushes: Pushes,
+    equations: Equations,
+) -> None:  # fmt: skip
     """Acceleration without contact, A⁻¹ (B Γ + passive + pushes − H), into ``equations.rate``.
 
     The equations of the state have been evaluated.
     """
-    known_force(model, state, torque, phase, pushes, equations)
+    known_force(model, state, torque, rows, modes, pushes, equations)
     solve_mass_matrix(model, equations, equations.rate)
 
 
 @kernel
 def pose_problem(
-    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers, phase: Phase,
-    assembly: Assembly,
+    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers, rows: Rows,
+    slide: Integers, assembly: Assembly,
 ) -> None:  # fmt: skip
     """Pose the contact problem of the candidates at the level of accelerations or velocities.
 
@@ -62,18 +66,18 @@ def pose_problem(
     problem, mode = assembly.problem, assembly.answer.mode
     for place in range(count):
         contact = assembly.candidate[place]
-        is_dry = phase.first_dry <= contact < phase.first_second
+        is_dry = rows.kind[contact] == DRY_JOINT
         problem.set[place] = INTERVAL if is_dry else CONE
         problem.friction[place] = friction[contact]
         mode[place] = STICK
         if accelerations:
-            if phase.slide[contact] > 0:
+            if slide[contact] > 0:
                 mode[place] = SLIDING_FORWARD
-            elif phase.slide[contact] < 0:
+            elif slide[contact] < 0:
                 mode[place] = SLIDING_BACKWARD
             elif guess[contact] < SLIDING_FORWARD:
                 mode[place] = guess[contact]
-    hold(count, phase.latch_stop, loops.held, assembly)
+    hold(count, rows.latch_stop, loops.held, assembly)
     problem.count = count + rows_of(loops)
     for place in range(count, problem.count):
         mode[place] = STICK
@@ -81,22 +85,22 @@ def pose_problem(
 
 @kernel
 def solve_candidates(
-    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers, phase: Phase,
-    assembly: Assembly,
+    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers, rows: Rows,
+    slide: Integers, solvers: Integers, assembly: Assembly, solver: ContactWorkspace,
 ) -> int:  # fmt: skip
     """Pose the contact problem of the candidates and solve it; return the solver's status.
 
     Forces or impulses and modes go to ``assembly.answer``.
     """
-    pose_problem(count, loops, accelerations, friction, guess, phase, assembly)
-    problem, work = assembly.problem, assembly.solver
-    return int(solve_contact_kernel(phase.order, problem, work, assembly.answer))
+    pose_problem(count, loops, accelerations, friction, guess, rows, slide, assembly)
+    return int(solve_contact_kernel(solvers, assembly.problem, solver, assembly.answer))
 
 
 @kernel
 def share_redundant(
-    count: int, loops: Loops, friction: Floats, guess: Integers, phase: Phase, assembly: Assembly
-) -> None:
+    count: int, loops: Loops, friction: Floats, guess: Integers, rows: Rows, phase: Phase,
+    assembly: Assembly, solver: ContactWorkspace,
+) -> None:  # fmt: skip
     """Find forces within their limits where the equations leave open who carries what.
 
     A biped that stands on stuck joints, or a table on four legs: the equations of motion have many
@@ -104,37 +108,42 @@ def share_redundant(
     relieve. While the contact problem says that everything stays as it is, its forces stand, and no
     limit is reached.
     """
+    modes, watch = phase.modes, phase.watch
     short = False
     for place in range(count):
         contact = assembly.candidate[place]
-        short = short or phase.value[2 * contact] < 0.0
-        short = short or (phase.holder[contact] == 1 and phase.value[2 * contact + 1] < 0.0)
+        short = short or watch.value[2 * contact] < 0.0
+        short = short or (modes.holder[contact] == 1 and watch.value[2 * contact + 1] < 0.0)
     if not short:
         return
-    if solve_candidates(count, loops, True, friction, guess, phase, assembly) != SOLVED:
+    status = solve_candidates(
+        count, loops, True, friction, guess, rows, modes.slide, phase.forces.solvers, assembly,
+        solver,
+    )  # fmt: skip
+    if status != SOLVED:
         return
     for place in range(count):
         contact = assembly.candidate[place]
         found = assembly.answer.mode[place]
         if found == OPEN:
             return
-        if found != STICK and phase.slide[contact] == 0 and friction[contact] > 0.0:
+        if found != STICK and modes.slide[contact] == 0 and friction[contact] > 0.0:
             return
     for place in range(count):
         contact = assembly.candidate[place]
         for k in range(2):
-            phase.force[contact, k] = assembly.answer.impulse[2 * place + k]
-        if phase.value[2 * contact] < 0.0:
-            phase.value[2 * contact] = 1.0
-        if phase.holder[contact] == 1 and phase.value[2 * contact + 1] < 0.0:
-            phase.value[2 * contact + 1] = 1.0
+            phase.forces.force[contact, k] = assembly.answer.impulse[2 * place + k]
+        if watch.value[2 * contact] < 0.0:
+            watch.value[2 * contact] = 1.0
+        if modes.holder[contact] == 1 and watch.value[2 * contact + 1] < 0.0:
+            watch.value[2 * contact + 1] = 1.0
 
 
 @kernel
-def slides(count: int, friction: Floats, phase: Phase, assembly: Assembly) -> bool:
+def slides(count: int, friction: Floats, slide: Integers, candidate: Integers) -> bool:
     """Whether any of the candidates slides with friction."""
     for place in range(count):
-        contact = assembly.candidate[place]
-        if phase.slide[contact] != 0 and friction[contact] > 0.0:
+        contact = candidate[place]
+        if slide[contact] != 0 and friction[contact] > 0.0:
             return True
     return False

@@ -1,8 +1,8 @@
 """Gaps that may not become negative: those of the contact points, and those of the joint stops.
 
 A joint stop is a contact without friction or restitution: its gap is the way left to the end of the
-joint's range, its force a torque of the joint. The event-driven method numbers stops on from the
-contact points, dry joints from the stops, and these kernels tell them apart.
+joint's range, its force a torque of the joint. What a contact is, and of what, the table of rows
+tells (:mod:`heelstrike.sim.contacts.rows`).
 """
 
 from __future__ import annotations
@@ -14,59 +14,59 @@ from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.geometry import contact_rows, contact_velocity, write_unit_row
+from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.faces import face_curvature
-from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.event_driven.phase import Faces
 from heelstrike.sim.memory import Assembly, Equations
 
 
 @kernel
-def gap_now(contact: int, contacts: Contacts, phase: Phase, state: Floats) -> float:
+def gap_now(contact: int, rows: Rows, state: Floats) -> float:
     """Gap of a contact point, on either face, or of a joint stop."""
-    stop = contact - contacts.gap.shape[0]
-    if stop < 0:
-        return contacts.gap[contact]
-    if contact >= phase.first_second:
-        return phase.seconds.gap[contact - phase.first_second]
-    return phase.stop_side[stop] * (state[phase.stop_joint[stop]] - phase.stop_limit[stop])
+    table = rows
+    if table.kind[contact] == STOP:
+        return table.side[contact] * (state[table.owner[contact]] - table.limit[contact])
+    return table.gap[contact]
 
 
 @kernel
 def gap_velocity(
-    contact: int, model: Model, contacts: Contacts, tree: Workspace, phase: Phase, state: Floats
-) -> tuple[float, float]:
+    contact: int, model: Model, contacts: Contacts, tree: Workspace, rows: Rows, seconds: Contacts,
+    state: Floats,
+) -> tuple[float, float]:  # fmt: skip
     """Normal and tangential velocity of a contact point, on either face, or of a joint stop."""
-    stop = contact - model.nc
-    if stop < 0:
-        return contact_velocity(model, tree, contacts, contact)
-    if contact >= phase.first_second:
-        return contact_velocity(model, tree, phase.seconds, contact - phase.first_second)
-    return phase.stop_side[stop] * state[model.nq + phase.stop_joint[stop]], 0.0
+    table = rows
+    kind, owner = table.kind[contact], table.owner[contact]
+    if kind == POINT:
+        return contact_velocity(model, tree, contacts, owner)
+    if kind == SECOND_FACE:
+        return contact_velocity(model, tree, seconds, owner)
+    return table.side[contact] * state[model.nq + owner], 0.0
 
 
 @kernel
 def gap_rows(
-    model: Model, tree: Workspace, contacts: Contacts, phase: Phase, contact: int, place: int,
-    assembly: Assembly,
+    model: Model, tree: Workspace, contacts: Contacts, rows: Rows, seconds: Contacts, contact: int,
+    place: int, assembly: Assembly,
 ) -> None:  # fmt: skip
     """Write the Jacobian rows (normal, tangent) of a contact, stop or dry joint as a candidate."""
-    stop = contact - model.nc
-    if stop < 0:
-        contact_rows(model, tree, contacts, contact, place, assembly)
-    elif contact < phase.first_dry:
-        write_unit_row(phase.stop_joint[stop], 2 * place, phase.stop_side[stop], assembly)
-    elif contact >= phase.first_second:
-        second = contact - phase.first_second
-        contact_rows(model, tree, phase.seconds, second, place, assembly)
+    table = rows
+    kind, owner = table.kind[contact], table.owner[contact]
+    if kind == POINT:
+        contact_rows(model, tree, contacts, owner, place, assembly)
+    elif kind == SECOND_FACE:
+        contact_rows(model, tree, seconds, owner, place, assembly)
+    elif kind == STOP:
+        write_unit_row(owner, 2 * place, table.side[contact], assembly)
     else:
-        dry = contact - phase.first_dry
-        write_unit_row(phase.dry_joint[dry], 2 * place + 1, 1.0, assembly)
+        write_unit_row(owner, 2 * place + 1, 1.0, assembly)
 
 
 @dissolved_kernel
 def free_gap_acceleration(
-    model: Model, contacts: Contacts, equations: Equations, contact: int, place: int, phase: Phase,
-    assembly: Assembly,
+    model: Model, contacts: Contacts, equations: Equations, contact: int, place: int, rows: Rows,
+    seconds: Contacts, breakaway: Floats, faces: Faces, assembly: Assembly,
 ) -> None:  # fmt: skip
     """Acceleration b = J v̇ + J̇ v of a contact, stop or dry joint, under ``equations.rate``.
 
@@ -77,21 +77,20 @@ def free_gap_acceleration(
     """
     along_normal = 0.0
     along_tangent = 0.0
-    is_second = contact >= phase.first_second
-    if contact < model.nc or is_second:
-        its, point = contacts, contact
-        if is_second:
-            its, point = phase.seconds, contact - phase.first_second
+    kind = rows.kind[contact]
+    if kind in (POINT, SECOND_FACE):
+        point = rows.owner[contact]
+        its = seconds if kind == SECOND_FACE else contacts
         position, normal = its.position[point], its.normal[point]
         radius = model.contact_radius[point]
-        center, acceleration = phase.scratch[0], phase.scratch[1]
+        center, acceleration = faces.center, faces.acceleration
         center[0] = position[0] + radius * normal[0]
         center[1] = position[1] + radius * normal[1]
         link = model.contact_link[point]
         point_bias_acceleration(equations.tree, link, center, acceleration)
         along_normal, along_tangent = into_frame(normal, (acceleration[0], acceleration[1]))
         along_tangent -= radius * acceleration[2]
-        curvature = face_curvature(contact, radius, phase)
+        curvature = face_curvature(contact, radius, faces)
         if curvature != 0.0:
             velocity = velocity_at(equations.tree.velocity, link, place_of(equations.tree, center))
             _, along = into_frame(normal, velocity)
@@ -102,6 +101,5 @@ def free_gap_acceleration(
         along_tangent += jacobian[2 * place + 1, j] * rate[j]
     assembly.problem.free[2 * place] = along_normal
     assembly.problem.free[2 * place + 1] = along_tangent
-    if phase.first_dry <= contact and not is_second:
-        joint = phase.dry_joint[contact - phase.first_dry]
-        assembly.problem.bound[place] = phase.breakaway[joint]
+    if kind == DRY_JOINT:
+        assembly.problem.bound[place] = breakaway[rows.owner[contact]]

@@ -7,7 +7,7 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
@@ -16,13 +16,14 @@ from heelstrike.sim.contacts.geometry import (
     row_product,
 )
 from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
+from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, STOP, Rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import free_acceleration
 from heelstrike.sim.event_driven.corners import is_struck, log_impulse
 from heelstrike.sim.event_driven.dynamics import gather_closed
 from heelstrike.sim.event_driven.faces import locate
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
-from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.event_driven.phase import Bounces, Impact, Modes, Phase, Step
 from heelstrike.sim.event_driven.saddle_point import (
     add_impulses,
     solve_accelerations,
@@ -71,8 +72,9 @@ def clear_rounding(first: int, end: int, free: Floats) -> None:
 
 @kernel
 def collide(
-    model: Model, nudge: float, memory: Memory, phase: Phase, state: Floats
-) -> tuple[bool, float, float]:
+    model: Model, nudge: float, plastic: Integers, memory: Memory, phase: Phase, impact: Impact,
+    state: Floats,
+) -> tuple[bool, float, float]:  # fmt: skip
     """Let the points on the ground, and those that reach it now, change the velocities of `state`.
 
     The equations of `state` have been evaluated. Normal velocities w and impulses p obey
@@ -81,23 +83,27 @@ def collide(
     another. Dry friction of the joints is a finite force, and takes no part.
 
     Returns whether it was solved, the energy it made (J), and what went through the contacts. The
-    impulses go to ``phase.impulse``; ``phase.closed`` and ``phase.slide`` become
+    impulses go to ``impact.impulse``; ``modes.closed`` and ``modes.slide`` become
     those after the impact.
     """
+    modes = phase.modes
     v = state[model.nq :]
     equations, assembly = memory.equations, memory.assembly
     jacobian, free, impulse = assembly.jacobian, assembly.problem.free, assembly.answer.impulse
     count = 0
-    for contact in range(phase.watched):
-        phase.impulse[contact, 0] = 0.0
-        phase.impulse[contact, 1] = 0.0
-        if phase.first_dry <= contact < phase.first_second:
+    for contact in range(modes.watched):
+        impact.impulse[contact, 0] = 0.0
+        impact.impulse[contact, 1] = 0.0
+        if memory.rows.kind[contact] == DRY_JOINT:
             continue
-        if phase.closed[contact] == 0 and phase.hit[contact] == 0:
+        if modes.closed[contact] == 0 and impact.hit[contact] == 0:
             continue
-        gap_rows(model, equations.tree, memory.contacts, phase, contact, count, assembly)
+        gap_rows(
+            model, equations.tree, memory.contacts, memory.rows, memory.seconds, contact, count,
+            assembly,
+        )  # fmt: skip
         normal = row_product(jacobian, 2 * count, v)
-        if normal < 0.0 and phase.plastic[contact] == 0:
+        if normal < 0.0 and plastic[contact] == 0:
             normal += memory.surface.restitution[contact] * normal
         free[2 * count] = normal - nudge
         free[2 * count + 1] = row_product(jacobian, 2 * count + 1, v)
@@ -119,7 +125,7 @@ def collide(
         made += work
         through += abs(work)
     note_loops(memory.rows, total, 1.0, impulse, memory.loops)
-    add_impulses(model, assembly, phase, equations, v)
+    add_impulses(model, assembly, phase.saddle, equations, v)
     for place in range(count):
         contact = assembly.candidate[place]
         normal = row_product(jacobian, 2 * place, v)
@@ -127,18 +133,17 @@ def collide(
         pressing, rubbing = impulse[2 * place] * normal, impulse[2 * place + 1] * tangent
         made += pressing + rubbing
         through += abs(pressing) + abs(rubbing)
-        phase.impulse[contact, 0] = impulse[2 * place]
-        phase.impulse[contact, 1] = impulse[2 * place + 1]
-        rests = normal <= max(REST, 2.0 * nudge) or phase.plastic[contact] == AT_REST
-        phase.closed[contact] = 1 if rests else 0
-        phase.slide[contact] = heading(tangent) if rests else 0
+        impact.impulse[contact, 0] = impulse[2 * place]
+        impact.impulse[contact, 1] = impulse[2 * place + 1]
+        rests = normal <= max(REST, 2.0 * nudge) or plastic[contact] == AT_REST
+        modes.closed[contact] = 1 if rests else 0
+        modes.slide[contact] = heading(tangent) if rests else 0
     for row in range(2 * count, 2 * total):  # what brakes take is not made by contacts at rest
         work = impulse[row] * row_product(jacobian, row, v)
         made += work
         through += abs(work)
-    for dry in range(phase.dry_joint.shape[0]):
-        contact = phase.first_dry + dry
-        phase.slide[contact] = phase.closed[contact] * heading(v[phase.dry_joint[dry]])
+    for contact in range(memory.rows.first[DRY_JOINT], memory.rows.end[DRY_JOINT]):
+        modes.slide[contact] = modes.closed[contact] * heading(v[memory.rows.owner[contact]])
     return status == SOLVED, 0.5 * made, 0.5 * through
 
 
@@ -147,129 +152,167 @@ def adopt_accelerations(
     count: int, model: Model, state: Floats, memory: Memory, phase: Phase
 ) -> None:
     """Let the forces of the closed contacts act on the accelerations, which are free ones."""
+    saddle = phase.saddle
     assembly, equations, rate = memory.assembly, memory.equations, memory.equations.rate
     solve_accelerations(count, model, state, memory, phase)
-    if phase.saddle.used == 0:
+    if saddle.used == 0:
         add_impulse(model, assembly, assembly.problem.count, equations, rate)
         return
     for i in range(model.nv):
-        rate[i] = phase.saddle.unknown[i]
+        rate[i] = saddle.unknown[i]
 
 
 @kernel
 def short_bounces(
-    model: Model, ground: GroundModel, state: Floats, memory: Memory, phase: Phase
-) -> bool:
+    model: Model, ground: GroundModel, state: Floats, time: float, hit: Integers, memory: Memory,
+    phase: Phase, bounces: Bounces,
+) -> bool:  # fmt: skip
     """Mark the points that would come down again too soon to follow; return whether there are any.
 
     Their bounces are taken to go on shrinking in the ratio of the next to the last; the geometric
     series gives the time at which they end.
     """
-    time, was_closed = phase.time, memory.reported.closed
+    modes = phase.modes
+    was_closed = memory.reported.closed
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
     evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
-    locate(model, ground, equations.tree, phase, contacts, memory.surface)
-    free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
-    loops = rows_of(memory.loops)
+    locate(
+        model, ground, equations.tree, memory.rows, modes, memory.seconds, phase.faces, contacts,
+        memory.surface,
+    )  # fmt: skip
+    free_acceleration(model, state, memory.torque, memory.rows, modes, memory.pushes, equations)
+    loop_rows = rows_of(memory.loops)
     find_loops(model, state[: model.nq], state[model.nq :], equations.tree, memory.loops)
-    count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
+    count = gather_closed(
+        model, contacts, memory.rows, memory.seconds, modes, memory.loops, equations, assembly
+    )
     for place in range(count):
         contact = assembly.candidate[place]
-        free_gap_acceleration(model, contacts, equations, contact, place, phase, assembly)
-    total = count + loops
+        free_gap_acceleration(
+            model, contacts, equations, contact, place, memory.rows, memory.seconds,
+            modes.breakaway, phase.faces, assembly,
+        )  # fmt: skip
+    total = count + loop_rows
     free_loops(total, memory.loops, equations.rate, 1.0, assembly)
     if total > 0:
         adopt_accelerations(count, model, state, memory, phase)
     found = False
-    for contact in range(phase.watched):
-        touched = phase.hit[contact] == 1 or was_closed[contact] == 1
-        if phase.closed[contact] == 1 or not touched:
+    for contact in range(modes.watched):
+        touched = hit[contact] == 1 or was_closed[contact] == 1
+        if modes.closed[contact] == 1 or not touched:
             continue
-        gap_rows(model, equations.tree, contacts, phase, contact, total, assembly)
-        free_gap_acceleration(model, contacts, equations, contact, total, phase, assembly)
-        normal, _ = gap_velocity(contact, model, contacts, equations.tree, phase, state)
+        gap_rows(
+            model, equations.tree, contacts, memory.rows, memory.seconds, contact, total, assembly
+        )
+        free_gap_acceleration(
+            model, contacts, equations, contact, total, memory.rows, memory.seconds,
+            modes.breakaway, phase.faces, assembly,
+        )  # fmt: skip
+        normal, _ = gap_velocity(
+            contact, model, contacts, equations.tree, memory.rows, memory.seconds, state
+        )
         pull = -assembly.problem.free[2 * total]
         if not (pull > 0.0 and 0.0 < 2.0 * normal <= SHORTEST_BOUNCE * pull):
             continue
         bounce = 2.0 * normal / pull
-        last = time - phase.last_blow
+        last = time - bounces.last_blow
         if was_closed[contact] == 0:
-            last = time - phase.last_impact[contact]
+            last = time - bounces.last_impact[contact]
         ratio = bounce / last
         if not ratio < PERPETUAL:
             ratio = min(memory.surface.restitution[contact], PERPETUAL)
-        phase.plastic[contact] = AT_REST if bounce <= NO_BOUNCE else PLASTIC
-        phase.accumulation[contact] = time + bounce / (1.0 - ratio)
+        bounces.plastic[contact] = AT_REST if bounce <= NO_BOUNCE else PLASTIC
+        bounces.accumulation[contact] = time + bounce / (1.0 - ratio)
         found = True
     return found
 
 
 @kernel
-def restore(before: Floats, reported: Reported, phase: Phase) -> None:
+def restore(before: Floats, reported: Reported, rows: Rows, modes: Modes, begin: Floats) -> None:
     """Go back to the state and the modes before an impact."""
     for i in range(before.shape[0]):
-        phase.begin[i] = before[i]
-    for contact in range(phase.watched):
-        if not phase.first_dry <= contact < phase.first_second:
-            phase.closed[contact] = reported.closed[contact]
-            phase.slide[contact] = reported.slipping[contact]
+        begin[i] = before[i]
+    for contact in range(modes.watched):
+        if rows.kind[contact] != DRY_JOINT:
+            modes.closed[contact] = reported.closed[contact]
+            modes.slide[contact] = reported.slipping[contact]
 
 
 @kernel
-def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, record: Record) -> bool:
-    """Let the points in ``phase.hit`` meet the ground now, and report it; return success.
+def strike(
+    model: Model, ground: GroundModel, memory: Memory, phase: Phase, step: Step, impact: Impact,
+    bounces: Bounces, record: Record,
+) -> bool:  # fmt: skip
+    """Let the points in ``impact.hit`` meet the ground now, and report it; return success.
 
     The equations of now have been evaluated. ``memory.reported`` still holds the modes from before.
     """
-    state, before, reported = phase.begin, phase.end, memory.reported
-    time, contacts = phase.time, memory.contacts
+    modes = phase.modes
+    state, before, reported = step.begin, impact.before, memory.reported
+    time, contacts = step.time, memory.contacts
     for i in range(state.shape[0]):
         before[i] = state[i]
     made = through = 0.0
     for attempt in range(2):
-        solved, made, through = collide(model, 0.0, memory, phase, state)
+        solved, made, through = collide(model, 0.0, bounces.plastic, memory, phase, impact, state)
         if not solved:
-            restore(before, reported, phase)
+            restore(before, reported, memory.rows, modes, step.begin)
             return False
-        if attempt == 1 or not short_bounces(model, ground, state, memory, phase):
+        if attempt == 1 or not short_bounces(
+            model, ground, state, step.time, impact.hit, memory, phase, bounces
+        ):
             break
-        restore(before, reported, phase)
-    phase.last_blow = time
-    for contact in range(phase.watched):
-        if phase.plastic[contact] != 0 and phase.closed[contact] == 0:
+        restore(before, reported, memory.rows, modes, step.begin)
+    bounces.last_blow = time
+    for contact in range(modes.watched):
+        if bounces.plastic[contact] != 0 and modes.closed[contact] == 0:
             # Others throw it up again, and it is followed.
-            phase.accumulation[contact] = np.inf
-        phase.plastic[contact] = 0
-        if phase.hit[contact] == 1:
-            phase.last_impact[contact] = time
-    made_at = report_impacts(model, time, contacts, phase, reported, record)
+            bounces.accumulation[contact] = np.inf
+        bounces.plastic[contact] = 0
+        if impact.hit[contact] == 1:
+            bounces.last_impact[contact] = time
+    made_at = report_impacts(
+        time, contacts, memory.rows, memory.seconds, phase.faces.paired, step, impact, reported,
+        record,
+    )  # fmt: skip
     if made > NOTICEABLE * through:
         memory.tally.energy_gain += made
-        log_impulse(ENERGY_GAIN, made_at, contacts, phase, record)
+        log_impulse(
+            ENERGY_GAIN, made_at, contacts, memory.rows, memory.seconds, phase.faces.paired,
+            step.time, impact, record,
+        )  # fmt: skip
     return True
 
 
 @kernel
 def report_impacts(
-    model: Model, time: float, contacts: Contacts, phase: Phase, reported: Reported, record: Record
-) -> int:
+    time: float, contacts: Contacts, rows: Rows, seconds: Contacts, paired: int, step: Step,
+    impact: Impact, reported: Reported, record: Record,
+) -> int:  # fmt: skip
     """Append the impulses of an impact to the events; return the point with the largest."""
-    impulse = phase.impulse
+    impulse = impact.impulse
     largest = 0
-    for contact in range(phase.first_dry):
+    for contact in range(rows.end[STOP]):
         normal = impulse[contact, 0]
-        struck = is_struck(contact, phase) if contact < model.nc else normal != 0.0
-        if contact < model.nc and normal > impulse[largest, 0]:
+        struck = (
+            is_struck(contact, rows, paired, impact.impulse)
+            if rows.kind[contact] == POINT
+            else normal != 0.0
+        )
+        if rows.kind[contact] == POINT and normal > impulse[largest, 0]:
             largest = contact
         if not struck:  # a stop may pull, as a latch does
             continue
         landed = reported.closed[contact] == 0
         reported.closed[contact] = 1
-        if contact >= model.nc:
-            joint = phase.stop_joint[contact - model.nc]
+        if rows.kind[contact] == STOP:
+            joint = rows.owner[contact]
             log_event(time, JOINT_STOP, joint, normal, 0.0, record)
             continue
         if landed:
             reported.slipping[contact] = 0
-        log_impulse(TOUCHDOWN if landed else IMPACT, contact, contacts, phase, record)
+        log_impulse(
+            TOUCHDOWN if landed else IMPACT, contact, contacts, rows, seconds, paired, step.time,
+            impact, record,
+        )  # fmt: skip
     return largest

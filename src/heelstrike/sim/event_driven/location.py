@@ -12,9 +12,11 @@ import math
 import numpy as np
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.faces import center_of, nearest_face
+from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.controller.control import Control
+from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.dormand_prince import (
     NODES,
     SLOPES,
@@ -32,9 +34,9 @@ from heelstrike.sim.event_driven.dynamics import (
     project,
 )
 from heelstrike.sim.event_driven.faces import has_corners, rate_corners
-from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.event_driven.phase import Modes, Phase, Samples, Step, Watch
 from heelstrike.sim.frame import Scene
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Surface
 
 NO_EVENT = 2.0
 """A fraction of a step beyond its end."""
@@ -94,74 +96,83 @@ def copy_events(value: Floats, rate: Floats, kept_value: Floats, kept_rate: Floa
 
 @kernel
 def evaluate_within(
-    scene: Scene, part: float, length: float, forces: bool, control: Control, memory: Memory,
-    phase: Phase,
+    scene: Scene, part: float, length: float, with_forces: bool, control: Control, memory: Memory,
+    phase: Phase, step: Step,
 ) -> None:  # fmt: skip
     """Event functions at a fraction of the step, with forces or only those that need none."""
-    interpolate(part, phase.begin, phase.dense, phase.trial)
-    if forces:
-        time, slope = phase.time + part * length, phase.slopes[SLOPES - 1]
-        evaluate(scene, time, phase.trial, control, memory, phase, slope)
+    samples = step.samples
+    interpolate(part, step.begin, step.dense, samples.state)
+    if with_forces:
+        time, slope = step.time + part * length, samples.slope
+        evaluate(scene, time, samples.state, control, memory, phase, slope)
     else:
-        look(scene.model, scene.ground, phase.trial, memory, phase)
+        look(
+            scene.model, scene.ground, samples.state, memory.rows, phase.modes,
+            memory.equations.tree, memory.contacts, memory.surface, memory.seconds, phase.faces,
+            phase.watch,
+        )  # fmt: skip
 
 
 @kernel
-def take_step(scene: Scene, length: float, control: Control, memory: Memory, phase: Phase) -> float:
-    """Try a step of the given length from ``phase.begin``; return its error over the tolerance.
+def take_step(
+    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase, step: Step
+) -> float:
+    """Try a step of the given length from ``step.begin``; return its error over the tolerance.
 
-    ``phase.slopes[0]`` must be the slope at the start. A step that is good enough gets its dense
+    ``step.slopes[0]`` must be the slope at the start. A step that is good enough gets its dense
     output; event functions and forces are left as they are at its end.
     """
+    watch, forces = phase.watch, phase.forces
+    samples = step.samples
     error = 0.0
     for stage in range(1, SLOPES):
         at_end = stage == STAGES
-        state = phase.end if at_end else phase.trial
-        stage_point(stage, length, phase.begin, phase.slopes, state)
-        time = phase.time + NODES[stage] * length
-        evaluate(scene, time, state, control, memory, phase, phase.slopes[stage])
+        state = step.end if at_end else step.point
+        stage_point(stage, length, step.begin, step.slopes, state)
+        time = step.time + NODES[stage] * length
+        evaluate(scene, time, state, control, memory, phase, step.slopes[stage])
         if at_end:
             error = error_norm(
-                length, phase.begin, phase.end, phase.slopes, phase.relative, phase.absolute
+                length, step.begin, step.end, step.slopes, step.relative, step.absolute
             )
             if not error <= 1.0:
                 return error
-            copy_events(phase.value, phase.rate, phase.end_value, phase.end_rate)
-            for contact in range(phase.watched):
-                phase.end_force[contact, 0] = phase.force[contact, 0]
-                phase.end_force[contact, 1] = phase.force[contact, 1]
+            copy_events(watch.value, watch.rate, samples.end_value, samples.end_rate)
+            for contact in range(phase.modes.watched):
+                step.end_force[contact, 0] = forces.force[contact, 0]
+                step.end_force[contact, 1] = forces.force[contact, 1]
             for i in range(memory.torque.shape[0]):
-                phase.torque[i] = memory.torque[i]
-    fit_dense(length, phase.begin, phase.end, phase.slopes, phase.dense)
+                step.torque[i] = memory.torque[i]
+    fit_dense(length, step.begin, step.end, step.slopes, step.dense)
     return error
 
 
 @kernel
-def is_geometric(function: int, phase: Phase) -> bool:
+def is_geometric(function: int, modes: Modes) -> bool:
     """Whether an event function needs no forces: a gap, or the speed of what slides."""
     contact = function // 2
-    if contact >= phase.watched:
+    if contact >= modes.watched:
         return True
-    slides = function % 2 == 1 and phase.slide[contact] != 0
-    return bool(phase.closed[contact] == 0 or slides)
+    slides = function % 2 == 1 and modes.slide[contact] != 0
+    return bool(modes.closed[contact] == 0 or slides)
 
 
 @kernel
-def noise(function: int, phase: Phase) -> float:
+def noise(function: int, modes: Modes, weight: float, samples: Samples) -> float:
     """How far an event function may be below zero without meaning it."""
-    if function >= 2 * phase.watched:
+    if function >= 2 * modes.watched:
         return CORNER_NOISE
-    if phase.closed[function // 2] == 0:
+    if modes.closed[function // 2] == 0:
         # An event is found to a time, and so a gap to what it closes in that time.
-        speed = max(abs(phase.before_rate[function]), abs(phase.sample_rate[function]))
+        speed = max(abs(samples.before_rate[function]), abs(samples.sample_rate[function]))
         return max(GAP_NOISE, EVENT_TIME * speed)
-    return SPEED_NOISE if is_geometric(function, phase) else FORCE_NOISE * phase.weight
+    return SPEED_NOISE if is_geometric(function, modes) else FORCE_NOISE * weight
 
 
 @kernel
 def find_root(
     scene: Scene, function: int, turn: float, bracket: tuple[float, float, float, float],
-    length: float, control: Control, memory: Memory, phase: Phase,
+    length: float, control: Control, memory: Memory, phase: Phase, step: Step,
 ) -> float:  # fmt: skip
     """Fraction of the step at which an event function first changes sign, or turns round.
 
@@ -170,8 +181,9 @@ def find_root(
     speed. Regula falsi that halves the interval every third time. An event function that is zero at
     `low`, where its phase begins, is first followed back from `high` to where it is positive.
     """
+    watch = phase.watch
     low, low_value, high, high_value = bracket
-    forces = (function % 2 == 1 and turn != 0.0) or not is_geometric(function, phase)
+    with_forces = (function % 2 == 1 and turn != 0.0) or not is_geometric(function, phase.modes)
     width = EVENT_TIME / length
     going_back = low_value <= 0.0
     for attempt in range(200):
@@ -181,8 +193,8 @@ def find_root(
         if attempt % 3 != 2 and not going_back:
             part = high - high_value * (high - low) / (high_value - low_value)
             part = min(max(part, low + 0.4 * width), high - 0.4 * width)
-        evaluate_within(scene, part, length, forces, control, memory, phase)
-        value = turn * phase.rate[function] if turn != 0.0 else phase.value[function]
+        evaluate_within(scene, part, length, with_forces, control, memory, phase, step)
+        value = turn * watch.rate[function] if turn != 0.0 else watch.value[function]
         if value > 0.0:
             low = part
             low_value = value
@@ -194,32 +206,32 @@ def find_root(
 
 
 @kernel
-def just_left(function: int, phase: Phase) -> bool:
+def just_left(function: int, modes: Modes, samples: Samples) -> bool:
     """Whether it is the gap of an open contact still on the ground, or rising close above it."""
     contact = function // 2
-    if contact >= phase.watched or function % 2 == 1 or phase.closed[contact] == 1:
+    if contact >= modes.watched or function % 2 == 1 or modes.closed[contact] == 1:
         return False
-    rises = phase.before_rate[function] >= 0.0
-    return bool(phase.before[function] <= (LOW if rises else TOGETHER))
+    rises = samples.before_rate[function] >= 0.0
+    return bool(samples.before[function] <= (LOW if rises else TOGETHER))
 
 
 @kernel
-def is_sliding_speed(function: int, phase: Phase) -> bool:
+def is_sliding_speed(function: int, modes: Modes) -> bool:
     """Whether it is the speed of what slides, whose rate is known."""
     contact = function // 2
-    if contact >= phase.watched or function % 2 == 0 or phase.slide[contact] == 0:
+    if contact >= modes.watched or function % 2 == 0 or modes.slide[contact] == 0:
         return False
-    return bool(phase.group[contact] == contact)
+    return bool(modes.group[contact] == contact)
 
 
 @kernel
-def may_dip(function: int, span: float, phase: Phase) -> bool:
+def may_dip(function: int, span: float, samples: Samples) -> bool:
     """Whether a function that falls at one sample and rises at the next may vanish between them.
 
     A convex one is nowhere below both tangents; it is given twice that depth.
     """
-    before, rate = phase.before[function], phase.before_rate[function]
-    value, later_rate = phase.sample[function], phase.sample_rate[function]
+    before, rate = samples.before[function], samples.before_rate[function]
+    value, later_rate = samples.sample[function], samples.sample_rate[function]
     where = (before - value + later_rate * span) / (later_rate - rate)
     if not 0.0 <= where <= span:
         return True
@@ -227,23 +239,23 @@ def may_dip(function: int, span: float, phase: Phase) -> bool:
 
 
 @dissolved_kernel
-def may_cross(function: int, span: float, phase: Phase) -> bool:
+def may_cross(function: int, span: float, modes: Modes, samples: Samples) -> bool:
     """Whether a function that is positive at two samples may pass zero between them.
 
     A gap has to fall by all that it is at the lower of its ends. A cubic falls by less than a sixth
     of what its rates at both ends would make of it in the whole time between them: one that has
     more left than all of that is not asked where it is lowest.
     """
-    before, value = phase.before[function], phase.sample[function]
+    before, value = samples.before[function], samples.sample[function]
     if not (before > 0.0 and value > 0.0):
         return True
     contact = function // 2
-    if contact >= phase.watched:
+    if contact >= modes.watched:
         return False
-    rate, later_rate = phase.before_rate[function], phase.sample_rate[function]
+    rate, later_rate = samples.before_rate[function], samples.sample_rate[function]
     if function % 2 == 1:
-        return bool(phase.slide[contact] != 0 and rate < 0.0 and later_rate > 0.0)
-    if phase.closed[contact] == 1:
+        return bool(modes.slide[contact] != 0 and rate < 0.0 and later_rate > 0.0)
+    if modes.closed[contact] == 1:
         return False
     return not min(before, value) > span * (max(-rate, 0.0) + max(later_rate, 0.0))
 
@@ -273,74 +285,78 @@ def lowest_place(before: float, rate: float, value: float, later_rate: float) ->
 @kernel
 def crossing(
     scene: Scene, function: int, low: float, high: float, length: float, control: Control,
-    memory: Memory, phase: Phase,
+    memory: Memory, phase: Phase, step: Step,
 ) -> float:  # fmt: skip
     """Fraction of the step at which an event function passes zero, between two samples of it.
 
     Of a point that has just left the ground the gap is zero but for rounding: it cannot come back
     before it turned round. If it got no higher than noise until then, it ends there, at rest.
     """
-    before, begin = phase.before[function], low
-    value, end = phase.sample[function], high
-    rate, later_rate = phase.before_rate[function], phase.sample_rate[function]
-    is_gap = function < 2 * phase.watched
-    is_gap = is_gap and function % 2 == 0 and phase.closed[function // 2] == 0
+    modes, watch = phase.modes, phase.watch
+    samples = step.samples
+    before, begin = samples.before[function], low
+    value, end = samples.sample[function], high
+    rate, later_rate = samples.before_rate[function], samples.sample_rate[function]
+    is_gap = function < 2 * modes.watched
+    is_gap = is_gap and function % 2 == 0 and modes.closed[function // 2] == 0
     dips = rate < 0.0 and later_rate > 0.0 and value >= 0.0
     if dips and not is_gap:
         span = length * (high - low)
-        dips = is_sliding_speed(function, phase) and may_dip(function, span, phase)
+        dips = is_sliding_speed(function, modes) and may_dip(function, span, samples)
     if dips:
         # An open point came down and went up again, or what slides was slower: how near to zero?
         bracket = low, -rate, high, -later_rate
-        end = find_root(scene, function, -1.0, bracket, length, control, memory, phase)
-        value = phase.value[function]
-    least = noise(function, phase)
+        end = find_root(scene, function, -1.0, bracket, length, control, memory, phase, step)
+        value = watch.value[function]
+    least = noise(function, modes, watch.weight, samples)
     if is_gap and rate >= 0.0 and later_rate >= 0.0 and before <= least:
         # It rises: it is no nearer than before, but for the error of the dense output.
-        least = phase.absolute + phase.relative
+        least = step.absolute + step.relative
     if is_gap and not dips and value >= -least:
         # It may have been lower in between, and be on its way up at both ends.
         span = (high - low) * length
         dip = lowest_place(before, span * rate, value, span * later_rate)
         if dip < NO_EVENT:
             end = low + dip * (high - low)
-            evaluate_within(scene, end, length, False, control, memory, phase)
-            value = phase.value[function]
+            evaluate_within(scene, end, length, False, control, memory, phase, step)
+            value = watch.value[function]
     # What is below zero from the beginning tells nothing new until it falls further.
     if not value < -least - max(-before, 0.0):
         return NO_EVENT
     if is_gap and rate > 0.0 and later_rate < 0.0 and before <= least:
         bracket = low, rate, high, later_rate
-        begin = find_root(scene, function, 1.0, bracket, length, control, memory, phase)
-        before = phase.value[function]
+        begin = find_root(scene, function, 1.0, bracket, length, control, memory, phase, step)
+        before = watch.value[function]
         if before <= least:
             return begin
     bracket = begin, before, end, value
-    return find_root(scene, function, 0.0, bracket, length, control, memory, phase)
+    return find_root(scene, function, 0.0, bracket, length, control, memory, phase, step)
 
 
 @kernel
-def may_turn(function: int, span: float, radius: Floats, phase: Phase) -> bool:
+def may_turn(
+    function: int, span: float, radius: Floats, closed: Integers, samples: Samples
+) -> bool:
     """Whether a point might have been in the ground between two samples, over another face.
 
     No gap changes faster than the point moves, or the centre of a disc; and a disc goes through
     nothing while it moves by less than a quarter of its radius.
     """
     contact = function // 2
-    if function % 2 == 1 or contact >= radius.shape[0] or phase.closed[contact] == 1:
+    if function % 2 == 1 or contact >= radius.shape[0] or closed[contact] == 1:
         return False
-    speed = phase.before_rate[function + 1] + phase.sample_rate[function + 1]
-    way = phase.before[function] + phase.sample[function]
+    speed = samples.before_rate[function + 1] + samples.sample_rate[function + 1]
+    way = samples.before[function] + samples.sample[function]
     return bool(way <= span * speed and span * speed > 0.5 * radius[contact])
 
 
 @kernel
 def face_within(
     scene: Scene, part: float, length: float, contact: int, control: Control, memory: Memory,
-    phase: Phase,
+    phase: Phase, step: Step,
 ) -> int:  # fmt: skip
     """Face, or corner, of the ground that an open point is nearest to at a fraction of the step."""
-    evaluate_within(scene, part, length, False, control, memory, phase)
+    evaluate_within(scene, part, length, False, control, memory, phase, step)
     x, z = center_of(scene.model, memory.contacts, contact)
     return int(nearest_face(scene.ground, x, z, A_DISC))
 
@@ -348,15 +364,15 @@ def face_within(
 @kernel
 def next_kink(
     scene: Scene, contact: int, low: float, high: float, length: float, control: Control,
-    memory: Memory, phase: Phase,
+    memory: Memory, phase: Phase, step: Step,
 ) -> tuple[float, float]:  # fmt: skip
     """Fractions of the step between which another face is the nearest, or twice the last of it."""
-    face = face_within(scene, low, length, contact, control, memory, phase)
-    if face_within(scene, high, length, contact, control, memory, phase) == face:
+    face = face_within(scene, low, length, contact, control, memory, phase, step)
+    if face_within(scene, high, length, contact, control, memory, phase, step) == face:
         return high, high
     while high - low > EVENT_TIME / length:
         part = low + 0.5 * (high - low)
-        if face_within(scene, part, length, contact, control, memory, phase) == face:
+        if face_within(scene, part, length, contact, control, memory, phase, step) == face:
             low = part
         else:
             high = part
@@ -366,7 +382,7 @@ def next_kink(
 @kernel
 def crossing_by_faces(
     scene: Scene, function: int, low: float, high: float, length: float, control: Control,
-    memory: Memory, phase: Phase,
+    memory: Memory, phase: Phase, step: Step,
 ) -> float:  # fmt: skip
     """Fraction of the step at which an open point reaches ground whose nearest face changes.
 
@@ -374,71 +390,77 @@ def crossing_by_faces(
     at one, as in a thin wall that it would go through. Where it begins on the ground, as on a
     corner, a moment later tells over which face.
     """
-    before, before_rate = phase.before[function], phase.before_rate[function]
-    value, rate = phase.sample[function], phase.sample_rate[function]
+    watch = phase.watch
+    samples = step.samples
+    before, before_rate = samples.before[function], samples.before_rate[function]
+    value, rate = samples.sample[function], samples.sample_rate[function]
     root, begin = NO_EVENT, low
     for _ in range(MOST_FACES):
         if begin == 0.0 and before <= TOGETHER:
             end = beyond = AT_ONCE * high
         else:
             end, beyond = next_kink(
-                scene, function // 2, begin, high, length, control, memory, phase
+                scene, function // 2, begin, high, length, control, memory, phase, step
             )  # fmt: skip
         if end == high:
             break
-        evaluate_within(scene, end, length, False, control, memory, phase)
-        phase.sample[function] = phase.value[function]
-        phase.sample_rate[function] = phase.rate[function]
-        root = crossing(scene, function, begin, end, length, control, memory, phase)
+        evaluate_within(scene, end, length, False, control, memory, phase, step)
+        samples.sample[function] = watch.value[function]
+        samples.sample_rate[function] = watch.rate[function]
+        root = crossing(scene, function, begin, end, length, control, memory, phase, step)
         if root != NO_EVENT:
             break
-        evaluate_within(scene, beyond, length, False, control, memory, phase)
-        phase.before[function] = phase.value[function]
-        phase.before_rate[function] = phase.rate[function]
+        evaluate_within(scene, beyond, length, False, control, memory, phase, step)
+        samples.before[function] = watch.value[function]
+        samples.before_rate[function] = watch.rate[function]
         begin = beyond
-    phase.sample[function], phase.sample_rate[function] = value, rate
+    samples.sample[function], samples.sample_rate[function] = value, rate
     if root == NO_EVENT:
-        root = crossing(scene, function, begin, high, length, control, memory, phase)
-    phase.before[function], phase.before_rate[function] = before, before_rate
+        root = crossing(scene, function, begin, high, length, control, memory, phase, step)
+    samples.before[function], samples.before_rate[function] = before, before_rate
     return root
 
 
 @kernel
 def early_crossing(
     scene: Scene, function: int, high: float, length: float, control: Control, memory: Memory,
-    phase: Phase,
+    phase: Phase, step: Step,
 ) -> float:  # fmt: skip
     """Fraction of the step at which a point that has just left the ground is back there at once.
 
     It may have come back, and risen again, long before the first sample. Nothing happens so soon
     but on a scale of its own: it is looked for at ever smaller parts of the way there.
     """
-    value, rate = phase.sample[function], phase.sample_rate[function]
-    soonest = SOONEST if phase.before[function] <= TOGETHER else SOON
+    watch = phase.watch
+    samples = step.samples
+    value, rate = samples.sample[function], samples.sample_rate[function]
+    soonest = SOONEST if samples.before[function] <= TOGETHER else SOON
     root = NO_EVENT
     part = high
     while root == NO_EVENT and part * length > soonest:
         part *= EARLIER
-        evaluate_within(scene, part, length, False, control, memory, phase)
-        phase.sample[function] = phase.value[function]
-        phase.sample_rate[function] = phase.rate[function]
-        root = crossing(scene, function, 0.0, part, length, control, memory, phase)
-    phase.sample[function] = value
-    phase.sample_rate[function] = rate
+        evaluate_within(scene, part, length, False, control, memory, phase, step)
+        samples.sample[function] = watch.value[function]
+        samples.sample_rate[function] = watch.rate[function]
+        root = crossing(scene, function, 0.0, part, length, control, memory, phase, step)
+    samples.sample[function] = value
+    samples.sample_rate[function] = rate
     return root
 
 
 @kernel
 def first_event(
-    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
+    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase, step: Step
 ) -> float:
     """Fraction of the step just taken at which the first event happens, or ``NO_EVENT``.
 
-    The event functions that vanish there are marked in ``phase.fired``. ``phase.before`` and
-    ``phase.before_rate`` must hold the event functions at the start of the step.
+    The event functions that vanish there are marked in ``watch.fired``. ``samples.before`` and
+    ``samples.before_rate`` must hold the event functions at the start of the step.
     """
-    sample, sample_rate = phase.sample, phase.sample_rate
-    functions, corners = 2 * phase.watched, has_corners(scene.ground)
+    watch = phase.watch
+    samples = step.samples
+    sample, sample_rate = samples.sample, samples.sample_rate
+    functions, corners = 2 * phase.modes.watched, has_corners(scene.ground)
     if corners:
         functions += scene.model.nc
     together = min(EVENT_TIME / length, 0.5)  # there are steps shorter than that near poles
@@ -446,37 +468,40 @@ def first_event(
     for k in range(1, SAMPLES + 1):
         high = k / SAMPLES
         if k < SAMPLES:
-            evaluate_within(scene, high, length, True, control, memory, phase)
-            copy_events(phase.value, phase.rate, sample, sample_rate)
+            evaluate_within(scene, high, length, True, control, memory, phase, step)
+            copy_events(watch.value, watch.rate, sample, sample_rate)
         else:
-            copy_events(phase.end_value, phase.end_rate, sample, sample_rate)
+            copy_events(samples.end_value, samples.end_rate, sample, sample_rate)
         first = NO_EVENT
         for i in range(functions):
-            phase.fired[i] = 0
+            watch.fired[i] = 0
             span, root = (high - low) * length, NO_EVENT
-            if corners and may_turn(i, span, scene.model.contact_radius, phase):
-                root = crossing_by_faces(scene, i, low, high, length, control, memory, phase)
-            elif may_cross(i, span, phase):
-                root = crossing(scene, i, low, high, length, control, memory, phase)
-            if k == 1 and root == NO_EVENT and just_left(i, phase):
-                root = early_crossing(scene, i, high, length, control, memory, phase)
+            if corners and may_turn(
+                i, span, scene.model.contact_radius, phase.modes.closed, samples
+            ):
+                root = crossing_by_faces(scene, i, low, high, length, control, memory, phase, step)
+            elif may_cross(i, span, phase.modes, samples):
+                root = crossing(scene, i, low, high, length, control, memory, phase, step)
+            if k == 1 and root == NO_EVENT and just_left(i, phase.modes, samples):
+                root = early_crossing(scene, i, high, length, control, memory, phase, step)
             if root < first - together:
                 for j in range(i):
-                    phase.fired[j] = 0
+                    watch.fired[j] = 0
                 first = root
             if root < NO_EVENT and root <= first + together:
-                phase.fired[i] = 1
+                watch.fired[i] = 1
         if first < NO_EVENT:
             return first
-        copy_events(sample, sample_rate, phase.before, phase.before_rate)
+        copy_events(sample, sample_rate, samples.before, samples.before_rate)
         low = high
     return NO_EVENT
 
 
 @kernel
 def longest_good_step(
-    scene: Scene, length: float, stop: float, control: Control, memory: Memory, phase: Phase
-) -> tuple[float, float, bool]:
+    scene: Scene, length: float, stop: float, control: Control, memory: Memory, phase: Phase,
+    step: Step,
+) -> tuple[float, float, bool]:  # fmt: skip
     """Take a step of some length or, if it is not good enough, a shorter one.
 
     Returns its length, zero if it would have to be too short; how much longer the next may be; and
@@ -484,11 +509,11 @@ def longest_good_step(
     """
     rejected = False
     while True:
-        if phase.time + 1.0001 * length >= stop:
-            length = stop - phase.time
-        if length < shortest_step(phase.time):
+        if step.time + 1.0001 * length >= stop:
+            length = stop - step.time
+        if length < shortest_step(step.time):
             return 0.0, 1.0, rejected
-        error = take_step(scene, length, control, memory, phase)
+        error = take_step(scene, length, control, memory, phase, step)
         factor = 10.0 if error == 0.0 else min(10.0, 0.9 * error**-0.125)
         if error <= 1.0:
             return length, factor, rejected
@@ -497,36 +522,54 @@ def longest_good_step(
 
 
 @kernel
-def settle(scene: Scene, memory: Memory, phase: Phase) -> bool:
+def settle(
+    scene: Scene, rows: Rows, equations: Equations, contacts: Contacts, surface: Surface,
+    assembly: Assembly, loops: Loops, seconds: Contacts, phase: Phase, step: Step,
+) -> bool:  # fmt: skip
     """Put the end of the step on its constraints; return whether its error explains how far."""
-    end, before = phase.end, phase.trial
+    end, before = step.end, step.unsettled
     for i in range(end.shape[0]):
         before[i] = end[i]
-    left, _, _ = project(scene.model, scene.ground, memory, phase, end)
-    return left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, EXPLAINED, phase)
+    left, _, _ = project(
+        scene.model, scene.ground, rows, equations, contacts, surface, assembly, loops, seconds,
+        phase, end,
+    )  # fmt: skip
+    return left <= max(TOGETHER, 2.0 * step.left) and explained(before, end, EXPLAINED, step)
 
 
 @kernel
 def end_at_event(
-    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
+    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase, step: Step
 ) -> tuple[float, bool, bool]:
     """Repeat the step to end at the event, and correct its length by what is left there.
 
     Returns the length, whether the step is good enough, and whether its end fits its constraints.
     """
+    watch = phase.watch
     for attempt in range(4):
-        if not take_step(scene, length, control, memory, phase) <= 1.0:
+        if not take_step(scene, length, control, memory, phase, step) <= 1.0:
             return length, False, True
-        if not settle(scene, memory, phase):
+        if not settle(
+            scene, memory.rows, memory.equations, memory.contacts, memory.surface, memory.assembly,
+            memory.loops, memory.seconds, phase, step,
+        ):  # fmt: skip
             return length, True, False
-        look(scene.model, scene.ground, phase.end, memory, phase)
+        look(
+            scene.model, scene.ground, step.end, memory.rows, phase.modes, memory.equations.tree,
+            memory.contacts, memory.surface, memory.seconds, phase.faces, watch,
+        )  # fmt: skip
         if has_corners(scene.ground):
-            rate_corners(scene.model, scene.ground, memory.equations.tree, memory.contacts, phase)
-        value, rate = phase.value, phase.rate
+            rate_corners(
+                scene.model, scene.ground, memory.equations.tree, memory.contacts, memory.rows,
+                phase.modes, phase.faces, watch,
+            )  # fmt: skip
+        value, rate = watch.value, watch.rate
         change = 0.0
-        for i in range(phase.fired.shape[0]):
-            passes = phase.fired[i] == 1 and is_geometric(i, phase) and rate[i] < 0.0
-            if passes and abs(value[i]) > NEAR_ENOUGH * noise(i, phase):
+        for i in range(watch.fired.shape[0]):
+            passes = watch.fired[i] == 1 and is_geometric(i, phase.modes) and rate[i] < 0.0
+            if passes and abs(value[i]) > NEAR_ENOUGH * noise(
+                i, phase.modes, watch.weight, step.samples
+            ):
                 change = -value[i] / rate[i]
         # Where it turns round rather than passes zero, its rate does not tell where zero is.
         if attempt == 3 or change == 0.0 or abs(change) > 0.5 * length:
@@ -536,23 +579,25 @@ def end_at_event(
 
 
 @kernel
-def missed(phase: Phase) -> bool:
+def missed(modes: Modes, watch: Watch) -> bool:
     """Whether a point is in the ground at the end of a step that ends with another's event.
 
     The step is not the one on whose dense output that was found first.
     """
-    for contact in range(phase.watched):
-        gap = phase.value[2 * contact]
-        if phase.closed[contact] == 0 and phase.fired[2 * contact] == 0 and gap < -TOGETHER:
+    for contact in range(modes.watched):
+        gap = watch.value[2 * contact]
+        if modes.closed[contact] == 0 and watch.fired[2 * contact] == 0 and gap < -TOGETHER:
             return True
     return False
 
 
 @kernel
-def look_back(scene: Scene, control: Control, memory: Memory, phase: Phase) -> None:
+def look_back(scene: Scene, control: Control, memory: Memory, phase: Phase, step: Step) -> None:
     """Evaluate the beginning of the step again."""
-    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
-    copy_events(phase.value, phase.rate, phase.before, phase.before_rate)
+    watch = phase.watch
+    samples = step.samples
+    evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
+    copy_events(watch.value, watch.rate, samples.before, samples.before_rate)
 
 
 @kernel
@@ -565,45 +610,54 @@ def longest_turn(model: Model, motion: Floats, state: Floats) -> float:
 
 
 @kernel
-def integrate(scene: Scene, stop: float, control: Control, memory: Memory, phase: Phase) -> bool:
+def integrate(
+    scene: Scene, stop: float, control: Control, memory: Memory, phase: Phase, step: Step
+) -> bool:
     """Take one good step that ends at its first event, or at `stop` at the latest.
 
-    ``phase.slopes[0]`` must be the slope now, and the event functions those of now. Returns false
+    ``step.slopes[0]`` must be the slope now, and the event functions those of now. Returns false
     if the step would have to be too short.
     """
-    copy_events(phase.value, phase.rate, phase.before, phase.before_rate)
-    wish = min(phase.next_length, phase.longest)
+    watch = phase.watch
+    samples = step.samples
+    copy_events(watch.value, watch.rate, samples.before, samples.before_rate)
+    wish = min(step.next_length, step.longest)
     length = wish
     rejected = False
     while True:
-        length, factor, shortened = longest_good_step(scene, length, stop, control, memory, phase)
+        length, factor, shortened = longest_good_step(
+            scene, length, stop, control, memory, phase, step
+        )
         if length == 0.0:
             return False
         rejected = rejected or shortened
         if rejected:
-            phase.next_length = length * min(factor, 1.0)
+            step.next_length = length * min(factor, 1.0)
         else:  # a step cut short by a stop says little about how long the next may be
-            phase.next_length = max(min(wish, 10.0 * length), length * factor)
-        part = first_event(scene, length, control, memory, phase)
-        phase.has_fired = 0 if part == NO_EVENT else 1
+            step.next_length = max(min(wish, 10.0 * length), length * factor)
+        part = first_event(scene, length, control, memory, phase, step)
+        step.has_fired = 0 if part == NO_EVENT else 1
         good, fits = True, True
         for _ in range(ATTEMPTS):
             if part == NO_EVENT:
                 break
-            length, good, fits = end_at_event(scene, length * part, control, memory, phase)
-            if not (good and fits and missed(phase)):
+            length, good, fits = end_at_event(scene, length * part, control, memory, phase, step)
+            if not (good and fits and missed(phase.modes, watch)):
                 break
-            look_back(scene, control, memory, phase)
-            part = first_event(scene, length, control, memory, phase)
-            phase.has_fired = 0 if part == NO_EVENT else 1
-        if phase.has_fired == 0:
-            fits = settle(scene, memory, phase)
+            look_back(scene, control, memory, phase, step)
+            part = first_event(scene, length, control, memory, phase, step)
+            step.has_fired = 0 if part == NO_EVENT else 1
+        if step.has_fired == 0:
+            fits = settle(
+                scene, memory.rows, memory.equations, memory.contacts, memory.surface,
+                memory.assembly, memory.loops, memory.seconds, phase, step,
+            )  # fmt: skip
         if good and fits:
             break
         # Where a torque saturates the shorter step can be the worse one: take less of it.
         length *= SHORTENED if good else 0.5
         rejected = True
-        look_back(scene, control, memory, phase)
-    phase.length = length
-    phase.finished = 1
+        look_back(scene, control, memory, phase, step)
+    step.length = length
+    step.finished = 1
     return True

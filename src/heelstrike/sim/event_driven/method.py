@@ -23,7 +23,7 @@ from heelstrike.contact.sets import LINE
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, momentum
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
@@ -32,7 +32,15 @@ from heelstrike.sim.contacts.faces import NO_FACE, locate_on_face, take_surface
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import close_loops, rows_of, steady_loops
-from heelstrike.sim.contacts.rows import SECOND_FACE, lay_out_rows
+from heelstrike.sim.contacts.rows import (
+    DRY_JOINT,
+    POINT,
+    SECOND_FACE,
+    STOP,
+    Rows,
+    contact_count,
+    second_of,
+)
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
@@ -62,7 +70,18 @@ from heelstrike.sim.event_driven.location import (
     shortest_step,
 )
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
-from heelstrike.sim.event_driven.phase import Phase, allocate_phase
+from heelstrike.sim.event_driven.phase import (
+    Bounces,
+    Decision,
+    Faces,
+    Impact,
+    Modes,
+    Motion,
+    Phase,
+    Step,
+    Watch,
+    allocate_motion,
+)
 from heelstrike.sim.event_driven.rows import (
     NO_ROOM,
     ROWS_OF_AN_INSTANT,
@@ -72,7 +91,7 @@ from heelstrike.sim.event_driven.rows import (
 )
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
-from heelstrike.sim.memory import Assembly, Memory, Reported, Surface
+from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, Tally
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
 from heelstrike.sim.record.record import Record
@@ -83,6 +102,8 @@ from heelstrike.sim.setting import Setting
 ZENO = int(EventKind.ZENO)
 PAINLEVE = int(EventKind.PAINLEVE)
 
+# Length (s) of the first step that is tried: error control shortens it tenfold, or lengthens it so.
+FIRST_STEP = 1e-3
 # At the start of a run, points nearer to the ground than this (m) and slower (m/s) are on it.
 ON_THE_GROUND = 1e-6
 # Feet nearer to each other than this (m) are beside each other.
@@ -200,20 +221,21 @@ class EventDriven(Method):
             return "max_step", self.max_step  # there are more rows if steps get shorter
         return "output_period", self.output_period
 
-    def new_work(self, robot: Robot) -> Phase:
+    def new_work(self, robot: Robot) -> Motion:
         """Allocate its memory."""
-        phase = allocate_phase(robot)
-        phase.order[:] = solver_order(self.solver)
-        phase.next_length = min(1e-3, self.max_step)
-        phase.output_period = self.output_period or 0.0
-        phase.longest = self.max_step
-        phase.relative, phase.absolute = self.rtol, self.atol
-        phase.next_push = np.inf
-        phase.allowance = EVENTS_AT_ONCE
-        phase.series = phase.bridge_end = -np.inf
-        phase.last_event = phase.last_blow = phase.last_row = -np.inf
-        phase.let_pass = int(self.swing_feet_pass)
-        return phase
+        work = allocate_motion(robot)
+        step, decision = work.step, work.decision
+        work.phase.forces.solvers[:] = solver_order(self.solver)
+        step.next_length = min(FIRST_STEP, self.max_step)
+        step.longest = self.max_step
+        step.relative, step.absolute = self.rtol, self.atol
+        work.output.period = self.output_period or 0.0
+        decision.next_push = np.inf
+        decision.allowance = EVENTS_AT_ONCE
+        work.series.begin = work.series.last_end = -np.inf
+        decision.last_event = work.bounces.last_blow = work.output.last_row = -np.inf
+        work.phase.modes.let_pass = int(self.swing_feet_pass)
+        return work
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events an instant may add to the record.
@@ -221,7 +243,7 @@ class EventDriven(Method):
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
         others = 2 * robot.model.latches + robot.model.brakes
-        contacts = int(lay_out_rows(robot.model).end[SECOND_FACE])
+        contacts = contact_count(robot.model)
         return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contacts + others + 8
 
     def check(self, setting: Setting) -> None:
@@ -262,32 +284,33 @@ class EventDriven(Method):
         check_room(setting, duration, *self.row_period)
 
     def forget_ground(
-        self, robot: Robot, work: Phase, clock: Clock, *, stops: bool = False
+        self, robot: Robot, work: Motion, clock: Clock, *, stops: bool = False
     ) -> None:
         """Look for what touches the ground as at the beginning."""
-        kept = slice(0, 0) if stops else slice(robot.nc, work.first_second)
+        modes = work.phase.modes
+        kept = slice(0, 0) if stops else slice(robot.nc, len(modes.closed) - robot.nc)
         for told, nothing in (
-            *((each, 0) for each in (work.closed, work.slide, work.stuck, work.passing)),
-            (work.accumulation, np.inf),
+            *((each, 0) for each in (modes.closed, modes.slide, modes.stuck, modes.passing)),
+            (work.bounces.accumulation, np.inf),
         ):
             before = told[kept].copy()
             told[:] = nothing
             told[kept] = before
-        work.face[:] = NO_FACE
-        work.fired[:] = 0
+        work.phase.faces.face[:] = NO_FACE
+        work.phase.watch.fired[:] = 0
         clock.begun = 0
 
-    def reconsider(self, work: Phase) -> None:
+    def reconsider(self, work: Motion) -> None:
         """Decide contact modes anew: what they hang on has been changed."""
-        work.undecided = 1
+        work.decision.undecided = 1
 
     def rows_in(self, duration: float, record_every: int) -> int:
         """Return about how many rows the record of a time has."""
         return 1024 if self.output_period is None else super().rows_in(duration, record_every) + 64
 
-    def reason(self, work: Phase) -> str:
+    def reason(self, work: Motion) -> str:
         """Say why a simulation could not go on."""
-        return _REASONS.get(work.reason, "")
+        return _REASONS.get(work.series.reason, "")
 
 
 @kernel
@@ -300,45 +323,54 @@ def extrapolate(model: Model, ahead: float, begin: Floats, slope: Floats, state:
 
 
 @kernel
-def insist(phase: Phase) -> None:
+def insist(fired: Integers, force: Floats, modes: Modes) -> None:
     """Switch what fired, without asking the acceleration-level problem first."""
-    for contact in range(phase.watched):
-        if phase.closed[contact] == 1 and phase.fired[2 * contact] == 1:
-            phase.closed[contact] = 0
-            phase.slide[contact] = 0
-        elif phase.holder[contact] == 1 and phase.fired[2 * contact + 1] == 1:
-            phase.slide[contact] = -1 if phase.force[contact, 1] > 0.0 else 1
+    for contact in range(modes.watched):
+        if modes.closed[contact] == 1 and fired[2 * contact] == 1:
+            modes.closed[contact] = 0
+            modes.slide[contact] = 0
+        elif modes.holder[contact] == 1 and fired[2 * contact + 1] == 1:
+            modes.slide[contact] = -1 if force[contact, 1] > 0.0 else 1
 
 
 @kernel
-def is_unclear(ahead: float, phase: Phase) -> bool:
+def is_unclear(ahead: float, watch: Watch) -> bool:
     """Whether a force that reached its limit is not clearly beyond it in a moment."""
-    for i in range(phase.fired.shape[0]):
-        if phase.fired[i] == 1 and phase.value[i] > -CLEARLY * phase.weight:
+    for i in range(watch.fired.shape[0]):
+        if watch.fired[i] == 1 and watch.value[i] > -CLEARLY * watch.weight:
             return ahead < LAST_LOOK
     return False
 
 
 @kernel
-def jump(model: Model, nudge: float, memory: Memory, phase: Phase, record: Record) -> bool:
+def jump(
+    model: Model, nudge: float, memory: Memory, phase: Phase, step: Step, impact: Impact,
+    plastic: Integers, record: Record,
+) -> bool:  # fmt: skip
     """Let velocities jump without a collision (Painlevé's paradox); return success."""
-    begin, before = phase.begin, phase.end
+    modes = phase.modes
+    begin, before = step.begin, impact.before
     for i in range(begin.shape[0]):
         before[i] = begin[i]
-    for contact in range(phase.watched):
-        phase.hit[contact] = 0
-        phase.plastic[contact] = phase.closed[contact]
-    solved, _, _ = collide(model, nudge, memory, phase, phase.begin)
-    for contact in range(phase.watched):
-        phase.plastic[contact] = 0
-    for contact in range(phase.first_dry):
+    for contact in range(modes.watched):
+        impact.hit[contact] = 0
+        plastic[contact] = modes.closed[contact]
+    solved, _, _ = collide(model, nudge, plastic, memory, phase, impact, step.begin)
+    for contact in range(modes.watched):
+        plastic[contact] = 0
+    for contact in range(memory.rows.end[STOP]):
         if not solved:
             continue
-        if contact >= model.nc and phase.impulse[contact, 0] > 0.0:
-            joint = phase.stop_joint[contact - model.nc]
-            log_event(phase.time, JOINT_STOP, joint, phase.impulse[contact, 0], 0.0, record)
-        elif contact < model.nc and is_struck(contact, phase):
-            log_impulse(PAINLEVE, contact, memory.contacts, phase, record)
+        if memory.rows.kind[contact] == STOP and impact.impulse[contact, 0] > 0.0:
+            joint = memory.rows.owner[contact]
+            log_event(step.time, JOINT_STOP, joint, impact.impulse[contact, 0], 0.0, record)
+        elif memory.rows.kind[contact] == POINT and is_struck(
+            contact, memory.rows, phase.faces.paired, impact.impulse
+        ):
+            log_impulse(
+                PAINLEVE, contact, memory.contacts, memory.rows, memory.seconds, phase.faces.paired,
+                step.time, impact, record,
+            )  # fmt: skip
     if not solved:
         for i in range(begin.shape[0]):
             begin[i] = before[i]
@@ -347,75 +379,94 @@ def jump(model: Model, nudge: float, memory: Memory, phase: Phase, record: Recor
 
 @kernel
 def leave_if_possible(
-    count: int, friction: Floats, phase: Phase, assembly: Assembly, record: Record
-) -> None:
+    count: int, friction: Floats, rows: Rows, slide: Integers, time: float, assembly: Assembly,
+    record: Record,
+) -> None:  # fmt: skip
     """Let all points leave the ground, if that is one of several solutions."""
     free, delassus = assembly.problem.free, assembly.problem.delassus
     several = False
     apart = True
     for place in range(count):
         contact, row = assembly.candidate[place], 2 * place
-        if phase.first_dry <= contact < phase.first_second:
+        if rows.kind[contact] == DRY_JOINT:
             continue
         apart = apart and free[row] >= 0.0
-        lean = -phase.slide[contact] * friction[contact]
+        lean = -slide[contact] * friction[contact]
         if delassus[row, row] + lean * delassus[row, row + 1] <= 0.0:
             # Pressing it harder would push it into the ground: there are other solutions.
             several = True
-            point = contact - phase.first_second if contact >= phase.first_second else contact
-            log_event(phase.time, PAINLEVE, point, 0.0, 0.0, record)
+            point = rows.owner[contact]
+            log_event(time, PAINLEVE, point, 0.0, 0.0, record)
     if several and apart:
         for place in range(count):
             contact = assembly.candidate[place]
-            is_dry = phase.first_dry <= contact < phase.first_second
+            is_dry = rows.kind[contact] == DRY_JOINT
             if not is_dry and assembly.problem.set[place] != LINE:
                 assembly.answer.mode[place] = OPEN
 
 
 @kernel
 def begin_phase(
-    model: Model, ground: GroundModel, count: int, memory: Memory, phase: Phase, record: Record
+    model: Model, ground: GroundModel, count: int, memory: Memory, work: Motion, record: Record
 ) -> bool:
     """Begin a phase with the modes that the acceleration-level problem has found.
 
     Returns false if the state is not one of such modes.
     """
+    phase = work.phase
+    step, series, decision = work.step, work.series, work.decision
     assembly, friction = memory.assembly, memory.surface.friction
     if rows_of(memory.loops) == 0:  # with loops neither matrix nor free term tell enough
-        leave_if_possible(count, friction, phase, assembly, record)
+        leave_if_possible(
+            count, friction, memory.rows, phase.modes.slide, step.time, assembly, record
+        )
     if count > 0:
         note_residual(assembly.answer.residual, memory.tally)
-    adopt_modes(model, count, assembly, phase, memory.reaction)
+    adopt_modes(count, assembly, memory.rows, phase.modes, memory.reaction.mode)
     tree, contacts = memory.equations.tree, memory.contacts
-    forward_kinematics(model, phase.begin[: model.nq], tree)
-    choose_faces(model, ground, tree, memory.reaction, phase)
-    locate(model, ground, tree, phase, contacts, memory.surface)
-    form_groups(model, tree, contacts, friction, phase)
-    begin, before = phase.begin, phase.end
+    forward_kinematics(model, step.begin[: model.nq], tree)
+    choose_faces(
+        model, ground, tree, memory.rows, memory.reaction.mode, phase.modes, phase.faces,
+        work.impact.hit, work.bounces,
+    )  # fmt: skip
+    locate(
+        model, ground, tree, memory.rows, phase.modes, memory.seconds, phase.faces, contacts,
+        memory.surface,
+    )  # fmt: skip
+    form_groups(
+        model, tree.angle, contacts, friction, memory.rows, memory.seconds, phase.faces.face,
+        step.begin, phase.modes,
+    )  # fmt: skip
+    begin, before = step.begin, decision.before
     for i in range(begin.shape[0]):
         before[i] = begin[i]
-    phase.left, strayed, fastest = project(model, ground, memory, phase, begin)
-    closest, slip = (ON_THE_GROUND, FITTING) if phase.started == BEGUN else (TOUCHING, UNSEEN)
-    if phase.bridge_end == phase.time:
-        slip += BRIDGED * min(phase.length, LONG_BRIDGE)
-    fits = phase.left <= closest
+    step.left, strayed, fastest = project(
+        model, ground, memory.rows, memory.equations, contacts, memory.surface, assembly,
+        memory.loops, memory.seconds, phase, begin,
+    )  # fmt: skip
+    closest, slip = (ON_THE_GROUND, FITTING) if decision.started == BEGUN else (TOUCHING, UNSEEN)
+    if series.last_end == step.time:
+        slip += BRIDGED * min(series.length, LONG_BRIDGE)
+    fits = step.left <= closest
     for i in range(begin.shape[0]):
         fits = fits and abs(begin[i] - before[i]) <= slip * (1.0 + abs(before[i]))
     if not fits:
         for i in range(begin.shape[0]):
             begin[i] = before[i]
         fits = is_in_place(strayed, fastest)
-        phase.left = strayed
+        step.left = strayed
     if fits:
         first = record.events
-        report_modes(model, phase.time, phase.started == BEGUN, phase, memory.reported, record)
+        report_modes(
+            step.time, decision.started == BEGUN, memory.rows, phase.modes, memory.reported, record,
+        )  # fmt: skip
         react(model, first, begin[: model.nq], record, memory.loops)
     return fits
 
 
 @kernel
 def decide_modes(
-    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record
+    scene: Scene, control: Control, memory: Memory, work: Motion, record: Record
 ) -> bool:
     """Decide the contact modes of the phase that begins now; return success.
 
@@ -426,44 +477,49 @@ def decide_modes(
     point (`jammed`), the velocities jump without a collision (Painlevé's paradox). Where it has
     several, the points leave the ground if that is one of them.
     """
+    phase = work.phase
+    step, decision = work.step, work.decision
     model = scene.model
-    forced, jammed = phase.forced == 1, phase.jammed == 1
+    forced, jammed = decision.forced == 1, decision.jammed == 1
     ahead = FIRST_LOOK if forced else 0.0
     nudge = NUDGE
     for _ in range(LOOKS):
-        extrapolate(model, ahead, phase.begin, phase.slopes[0], phase.trial)
-        time = phase.time + ahead
-        evaluate(scene, time, phase.trial, control, memory, phase, phase.slopes[1])
+        extrapolate(model, ahead, step.begin, step.slopes[0], decision.state)
+        time = step.time + ahead
+        evaluate(scene, time, decision.state, control, memory, phase, decision.slope)
         if forced:
-            forced = is_unclear(ahead, phase)
+            forced = is_unclear(ahead, phase.watch)
             if forced:
                 ahead *= 4.0
                 continue
-            if phase.burst >= INSISTENT:
-                insist(phase)
-                phase.burst += 1
+            if decision.burst >= INSISTENT:
+                insist(phase.watch.fired, phase.forces.force, phase.modes)
+                decision.burst += 1
                 continue
-        count = phase.closed_count
+        count = phase.forces.count
         if not jammed and count > 0:
-            status = solve_accelerations(count, model, phase.trial, memory, phase)
+            status = solve_accelerations(count, model, decision.state, memory, phase)
             jammed = status != SOLVED
             if jammed and ahead > 0.0:
                 ahead = 0.0
                 continue
         if not jammed:
-            return begin_phase(model, scene.ground, count, memory, phase, record)
+            return begin_phase(model, scene.ground, count, memory, work, record)
         jammed = False
-        if phase.last_row < phase.time:
-            write_row(scene, phase.time, phase.begin, False, control, memory, phase, record)
-        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[1])
-        if not jump(model, nudge, memory, phase, record):
+        if work.output.last_row < step.time:
+            write_row(
+                scene, step.time, step.begin, False, step, work.impact, control, memory, phase,
+                work.output, record,
+            )  # fmt: skip
+        evaluate(scene, step.time, step.begin, control, memory, phase, decision.slope)
+        if not jump(model, nudge, memory, phase, step, work.impact, work.bounces.plastic, record):
             return False
         nudge = min(HARDER * nudge, HARDEST)
     return False
 
 
 @kernel
-def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> bool:
+def behind(contact: int, direction: float, contacts: Contacts, modes: Modes) -> bool:
     """Whether a point is behind one on the ground and, by the rule, may pass below it.
 
     Feet of legs of one length reach the ground where they pass each other: a foot beside the other
@@ -472,67 +528,74 @@ def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> 
     forward = -1.0 if direction < 0.0 else 1.0
     for other in range(contacts.gap.shape[0]):
         ahead = contacts.position[other, 0] - contacts.position[contact, 0]
-        if phase.closed[other] == 1 and forward * ahead > -BESIDE:
-            return phase.let_pass == 1
+        if modes.closed[other] == 1 and forward * ahead > -BESIDE:
+            return modes.let_pass == 1
     return False
 
 
 @kernel
-def rubs_otherwise(breakaway: Floats, phase: Phase) -> bool:
+def rubs_otherwise(breakaway: Floats, rows: Rows, modes: Modes) -> bool:
     """Whether a joint has other dry friction from now on."""
     found = False
-    for joint in phase.dry_joint:
-        found = found or phase.breakaway[joint] != breakaway[joint]
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        joint = rows.owner[dry]
+        found = found or modes.breakaway[joint] != breakaway[joint]
     return found
 
 
 @kernel
-def begin_rubbing(v: Floats, breakaway: Floats, phase: Phase, reported: Reported) -> None:
+def begin_rubbing(
+    v: Floats, breakaway: Floats, rows: Rows, modes: Modes, reported: Reported
+) -> None:
     """Let joints with dry friction begin as they move, and those with none any more be free."""
-    for dry in range(phase.dry_joint.shape[0]):
-        contact, joint = phase.first_dry + dry, phase.dry_joint[dry]
-        phase.breakaway[joint] = breakaway[joint]
+    for contact in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        joint = rows.owner[contact]
+        modes.breakaway[joint] = breakaway[joint]
         rubs = 1 if breakaway[joint] > 0.0 else 0
-        if phase.closed[contact] != rubs:
-            phase.closed[contact] = rubs
-            phase.slide[contact] = rubs * heading(v[joint])
+        if modes.closed[contact] != rubs:
+            modes.closed[contact] = rubs
+            modes.slide[contact] = rubs * heading(v[joint])
             reported.closed[contact] = rubs
-            reported.slipping[contact] = phase.slide[contact]
+            reported.slipping[contact] = modes.slide[contact]
 
 
 @kernel
 def turns_over(
-    model: Model, ground: GroundModel, tree: Workspace, contact: int, contacts: Contacts,
-    surface: Surface, phase: Phase,
+    model: Model, ground: GroundModel, tree: Workspace, contact: int, rows: Rows,
+    contacts: Contacts, surface: Surface, seconds: Contacts, modes: Modes, faces: Faces,
+    fired: Integers,
 ) -> bool:  # fmt: skip
     """Let a point that has come to the end of its face go over to the next; tell whether it has."""
-    if contact >= model.nc or phase.fired[2 * phase.watched + contact] == 0:
+    if rows.kind[contact] != POINT or fired[2 * modes.watched + contact] == 0:
         return False
-    phase.fired[2 * phase.watched + contact] = 0
-    two_faces = phase.watched > phase.first_second and phase.closed[phase.first_second + contact]
-    if two_faces and leave_second_face(model, ground, tree, contact, contacts, surface, phase):
+    fired[2 * modes.watched + contact] = 0
+    two_faces = faces.paired == 1 and modes.closed[second_of(contact, rows)]
+    if two_faces and leave_second_face(
+        model, ground, tree, contact, contacts, rows, surface, seconds, modes, faces.face, fired
+    ):
         return False
-    if turn_corner(model, ground, contact, contacts, phase):
-        face = phase.face[contact]
+    if turn_corner(model, ground, contact, contacts, modes.stuck, faces):
+        face = faces.face[contact]
         locate_on_face(model, ground, tree, contact, face, contacts)
         take_surface(model, ground, contact, contact, face, surface)
-        phase.closed[contact] = 0
+        modes.closed[contact] = 0
     return True
 
 
 @kernel
-def touches_at_start(model: Model, contact: int, gap: float, phase: Phase) -> bool:
+def touches_at_start(contact: int, gap: float, rows: Rows, modes: Modes) -> bool:
     """Whether an open contact is on its limit when the run begins, and may not pass below it."""
-    phase.group[contact] = contact
-    if contact < model.nc and gap < -ON_THE_GROUND:
-        phase.passing[contact] = phase.let_pass
-    return bool(gap <= ON_THE_GROUND and phase.passing[contact] == 0)
+    modes.group[contact] = contact
+    if rows.kind[contact] == POINT and gap < -ON_THE_GROUND:
+        modes.passing[contact] = modes.let_pass
+    return bool(gap <= ON_THE_GROUND and modes.passing[contact] == 0)
 
 
 @kernel
 def find_what_happened(
     starting: bool, direction: float, model: Model, ground: GroundModel, tree: Workspace,
-    contacts: Contacts, surface: Surface, phase: Phase,
+    rows: Rows, step: Step, contacts: Contacts, surface: Surface, seconds: Contacts, phase: Phase,
+    hit: Integers, bounces: Bounces,
 ) -> tuple[bool, bool]:  # fmt: skip
     """Tell what ended the step: whether an impact, or contact forces at their limits.
 
@@ -540,384 +603,470 @@ def find_what_happened(
     that stop are at rest; an impact goes through those that touch without force. At the start of a
     run every point near the ground touches it.
     """
-    impact = False
+    modes, watch = phase.modes, phase.watch
+    strikes = False
     forced = False
     rest = ON_THE_GROUND if starting else REST
-    for contact in range(phase.watched):
-        phase.hit[contact] = 0
-        first = phase.fired[2 * contact] == 1
-        second = phase.fired[2 * contact + 1] == 1
-        turns = turns_over(model, ground, tree, contact, contacts, surface, phase)
-        if contact >= phase.first_second:
-            point = contact - phase.first_second
-            if phase.closed[point] == 0 and phase.hit[point] == 0:
+    for contact in range(modes.watched):
+        hit[contact] = 0
+        first = watch.fired[2 * contact] == 1
+        second = watch.fired[2 * contact + 1] == 1
+        turns = turns_over(
+            model, ground, tree, contact, rows, contacts, surface, seconds, modes, phase.faces,
+            watch.fired,
+        )  # fmt: skip
+        kind = rows.kind[contact]
+        if kind == SECOND_FACE:
+            point = rows.owner[contact]
+            if modes.closed[point] == 0 and hit[point] == 0:
                 continue  # it is met from the other face only
-            stand_on_face(model, ground, tree, point, contacts, surface, phase)
-            if phase.seconds.gap[point] == np.inf:
+            stand_on_face(
+                model, ground, tree, point, contacts, rows, modes.closed, surface, seconds,
+                phase.faces,
+            )  # fmt: skip
+            if seconds.gap[point] == np.inf:
                 continue
-            if starting and not is_at_second(model, ground, point, rest, contacts, phase):
+            if starting and not is_at_second(
+                model, ground, point, rest, contacts, rows, phase.faces
+            ):
                 continue
-        if phase.closed[contact] == 1:
-            if second and phase.slide[contact] != 0:
-                for other in range(phase.watched):
-                    if phase.group[other] == phase.group[contact]:
-                        phase.slide[other] = 0
+        if modes.closed[contact] == 1:
+            if second and modes.slide[contact] != 0:
+                for other in range(modes.watched):
+                    if modes.group[other] == modes.group[contact]:
+                        modes.slide[other] = 0
             elif first or second:
                 forced = True
             continue
-        if phase.first_dry <= contact < phase.first_second:
+        if kind == DRY_JOINT:
             continue
-        gap = gap_now(contact, contacts, phase, phase.begin)
-        normal, tangent = gap_velocity(contact, model, contacts, tree, phase, phase.begin)
+        gap = gap_now(contact, rows, step.begin)
+        normal, tangent = gap_velocity(contact, model, contacts, tree, rows, seconds, step.begin)
         if starting:
-            first = touches_at_start(model, contact, gap, phase) and normal <= rest
-        may_pass = first and not starting and contact < model.nc
+            first = touches_at_start(contact, gap, rows, modes) and normal <= rest
+        may_pass = first and not starting and kind == POINT
         if turns:
             first = normal <= rest
-        if phase.passing[contact] == 1:
-            phase.passing[contact] = 0 if first else 1
-        elif may_pass and behind(contact, direction, contacts, phase):
-            phase.passing[contact] = 1
+        if modes.passing[contact] == 1:
+            modes.passing[contact] = 0 if first else 1
+        elif may_pass and behind(contact, direction, contacts, modes):
+            modes.passing[contact] = 1
         elif normal < -rest and (first or gap <= TOGETHER):
-            phase.hit[contact] = 1
-            impact = True
+            hit[contact] = 1
+            strikes = True
         elif first and normal <= rest:
-            phase.closed[contact] = 1
-            phase.hit[contact] = UNPRESSED
-            phase.slide[contact] = 0
+            modes.closed[contact] = 1
+            hit[contact] = UNPRESSED
+            modes.slide[contact] = 0
             if abs(tangent) > rest:
-                phase.slide[contact] = 1 if tangent > 0.0 else -1
-            if phase.time - phase.last_blow < SHORTEST_BOUNCE:  # too low a bounce to be followed
-                phase.accumulation[contact] = phase.time
+                modes.slide[contact] = 1 if tangent > 0.0 else -1
+            if step.time - bounces.last_blow < SHORTEST_BOUNCE:  # too low a bounce to be followed
+                bounces.accumulation[contact] = step.time
         elif gap <= TOGETHER and normal <= rest:
-            phase.hit[contact] = UNPRESSED
-            if abs(gap) <= GAP_NOISE and contact < phase.first_second:
-                phase.hit[contact] = LYING
-                phase.slide[contact] = heading(tangent)
-    for contact in range(phase.watched):
-        if phase.hit[contact] == LYING and not impact:
-            phase.closed[contact] = 1
-        if phase.hit[contact] >= UNPRESSED:
-            phase.hit[contact] = 1 if impact else 0
-    return impact, forced and not impact
+            hit[contact] = UNPRESSED
+            if abs(gap) <= GAP_NOISE and rows.kind[contact] != SECOND_FACE:
+                hit[contact] = LYING
+                modes.slide[contact] = heading(tangent)
+    for contact in range(modes.watched):
+        if hit[contact] == LYING and not strikes:
+            modes.closed[contact] = 1
+        if hit[contact] >= UNPRESSED:
+            hit[contact] = 1 if strikes else 0
+    return strikes, forced and not strikes
 
 
 @kernel
-def next_due(phase: Phase, clock: Clock) -> float:
+def next_due(next_push: float, clock: Clock) -> float:
     """Time at which something from outside is due, or the end."""
-    stop = min(clock.until, phase.next_push)
+    stop = min(clock.until, next_push)
     if clock.control_period > 0.0:
         stop = min(stop, clock.calls * clock.control_period)
     return stop
 
 
 @kernel
-def next_stop(phase: Phase, clock: Clock) -> float:
+def next_stop(watched: int, accumulation: Floats, next_push: float, clock: Clock) -> float:
     """Time that the next step may not pass."""
-    stop = next_due(phase, clock)
-    for contact in range(phase.watched):
-        stop = min(stop, phase.accumulation[contact])
+    stop = next_due(next_push, clock)
+    for contact in range(watched):
+        stop = min(stop, accumulation[contact])
     return stop
 
 
 @kernel
-def end_bounces(model: Model, phase: Phase, record: Record) -> None:
+def end_bounces(
+    rows: Rows, watched: int, time: float, accumulation: Floats, record: Record
+) -> None:
     """Let the points rest whose accumulating impacts have come to an end by now."""
-    for contact in range(phase.watched):
-        if phase.accumulation[contact] <= phase.time:
-            point = contact - phase.first_second if contact >= phase.first_second else contact
-            if point < model.nc:
-                log_event(phase.accumulation[contact], ZENO, point, 0.0, 0.0, record)
-            phase.accumulation[contact] = np.inf
+    for contact in range(watched):
+        if accumulation[contact] <= time:
+            if rows.kind[contact] in (POINT, SECOND_FACE):
+                point = rows.owner[contact]
+                log_event(accumulation[contact], ZENO, point, 0.0, 0.0, record)
+            accumulation[contact] = np.inf
 
 
 @kernel
-def pass_time(length: float, stop: float, phase: Phase) -> None:
+def pass_time(length: float, stop: float, step: Step, decision: Decision) -> None:
     """Let time move on, to `stop` if that is the same but for rounding."""
-    phase.time += length
-    if abs(phase.time - stop) <= 4e-16 * max(abs(stop), 1e-3):
-        phase.time = stop
-    phase.allowance = min(phase.allowance + EVENTS_A_SECOND * length, EVENTS_AT_ONCE)
+    step.time += length
+    if abs(step.time - stop) <= 4e-16 * max(abs(stop), 1e-3):
+        step.time = stop
+    decision.allowance = min(decision.allowance + EVENTS_A_SECOND * length, EVENTS_AT_ONCE)
 
 
 @kernel
-def end_step(model: Model, clock: Clock, memory: Memory, phase: Phase, record: Record) -> None:
+def end_step(
+    clock: Clock, rows: Rows, seconds: Contacts, watched: int, meets: Integers, contacts: Contacts,
+    tally: Tally, step: Step, accumulation: Floats, decision: Decision, record: Record,
+) -> None:  # fmt: skip
     """Move time and state to the end of the finished step."""
-    pass_time(phase.length, next_stop(phase, clock), phase)
-    for i in range(phase.begin.shape[0]):
-        phase.begin[i] = phase.end[i]
-    show_forces(phase.end_force, phase, memory.contacts)
-    end_bounces(model, phase, record)
-    phase.finished = 0
-    memory.tally.steps += 1
-    if phase.has_fired == 1:
-        together = phase.time - phase.last_event < INSTANT
-        phase.burst = phase.burst + 1 if together else 0
-        phase.last_event = phase.time
-        phase.allowance -= 1.0
-    elif phase.length < min(SHORT_STEP, 0.01 * phase.longest):
-        phase.allowance -= SHARE_OF_A_STEP
+    pass_time(
+        step.length, next_stop(watched, accumulation, decision.next_push, clock), step, decision
+    )
+    for i in range(step.begin.shape[0]):
+        step.begin[i] = step.end[i]
+    show_forces(step.end_force, rows, seconds, watched, meets, contacts)
+    end_bounces(rows, watched, step.time, accumulation, record)
+    step.finished = 0
+    tally.steps += 1
+    if step.has_fired == 1:
+        together = step.time - decision.last_event < INSTANT
+        decision.burst = decision.burst + 1 if together else 0
+        decision.last_event = step.time
+        decision.allowance -= 1.0
+    elif step.length < min(SHORT_STEP, 0.01 * step.longest):
+        decision.allowance -= SHARE_OF_A_STEP
 
 
 @kernel
 def meet_event(
-    starting: bool, model: Model, ground: GroundModel, memory: Memory, phase: Phase, record: Record
-) -> int:
+    starting: bool, model: Model, ground: GroundModel, memory: Memory, phase: Phase, step: Step,
+    impact: Impact, bounces: Bounces, decision: Decision, record: Record,
+) -> int:  # fmt: skip
     """Deal with what ended the step: impacts change velocities, all else is left to be decided.
 
     The equations of now have been evaluated.
     """
-    contacts, tree, direction = memory.contacts, memory.equations.tree, phase.scratch[0]
+    contacts, tree, direction = memory.contacts, memory.equations.tree, impact.momentum
     momentum(model, tree, direction)
     first = record.events
-    impact, forced = find_what_happened(
-        starting, direction[0], model, ground, tree, contacts, memory.surface, phase
-    )
-    if impact and not strike(model, ground, memory, phase, record):
-        phase.bridging = 1
-    elif impact:
+    strikes, forced = find_what_happened(
+        starting, direction[0], model, ground, tree, memory.rows, step, contacts, memory.surface,
+        memory.seconds, phase, impact.hit, bounces,
+    )  # fmt: skip
+    if strikes and not strike(model, ground, memory, phase, step, impact, bounces, record):
+        decision.bridging = 1
+    elif strikes:
         # The controller shall know before the modes are decided under its torques.
         for contact in range(model.nc):
-            if phase.hit[contact] == 1 and phase.impulse[contact, 0] > 0.0:
-                force = impulse_of(contact, contacts, phase)
+            if impact.hit[contact] == 1 and impact.impulse[contact, 0] > 0.0:
+                force = impulse_of(
+                    contact, contacts, memory.rows, memory.seconds, phase.faces.paired, impact
+                )
                 contacts.force[contact, 0], contacts.force[contact, 1] = force
-        react(model, first, phase.begin[: model.nq], record, memory.loops)
-    for point in range(phase.watched - phase.first_second):
-        phase.meets[point] = 0
-    phase.started = BEGUN if starting else WALKING
-    phase.undecided = 1
-    phase.forced = 1 if forced else 0
+        react(model, first, step.begin[: model.nq], record, memory.loops)
+    for point in range(impact.meets.shape[0]):
+        impact.meets[point] = 0
+    decision.started = BEGUN if starting else WALKING
+    decision.undecided = 1
+    decision.forced = 1 if forced else 0
     return DONE
 
 
 @kernel
-def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, record: Record) -> int:
+def begin(model: Model, ground: GroundModel, memory: Memory, work: Motion, record: Record) -> int:
     """Find what the robot stands on when the simulation begins."""
+    phase = work.phase
+    modes = phase.modes
+    step = work.step
     q, v, equations = memory.q, memory.v, memory.equations
     # Modes that are guessed here are those of another instant: where forces or accelerations are
     # not unique, what comes of amending them need not be what the solvers would say.
-    memory.assembly.solver.settings.amendments = 0
-    memory.assembly.solver.settings.patient = 1
+    memory.solver.settings.amendments = 0
+    memory.solver.settings.patient = 1
     if rows_of(memory.loops) > 0:
         if not close_loops(model, equations, memory.loops, q):
             return DIVERGED
         steady_loops(model, q, equations, memory.loops, v)
-    phase.watched = phase.first_second
+    modes.watched, phase.faces.paired = memory.rows.first[SECOND_FACE], ground.concave
     for point in range(model.nc):
-        phase.seconds.gap[point] = np.inf
+        memory.seconds.gap[point] = np.inf
     if ground.concave == 1:
-        phase.watched += model.nc
+        modes.watched = memory.rows.end[SECOND_FACE]
     for i in range(model.nv):
-        phase.begin[i] = q[i]
-        phase.begin[model.nq + i] = v[i]
-    begin_rubbing(v, memory.breakaway, phase, memory.reported)
+        step.begin[i] = q[i]
+        step.begin[model.nq + i] = v[i]
+    begin_rubbing(v, memory.breakaway, memory.rows, modes, memory.reported)
     evaluate_equations(model, q, v, equations)
-    locate(model, ground, equations.tree, phase, memory.contacts, memory.surface)
-    code = meet_event(True, model, ground, memory, phase, record)
+    locate(
+        model, ground, equations.tree, memory.rows, modes, memory.seconds, phase.faces,
+        memory.contacts, memory.surface,
+    )  # fmt: skip
+    code = meet_event(
+        True, model, ground, memory, phase, step, work.impact, work.bounces, work.decision, record
+    )
     for i in range(model.nv):
-        v[i] = phase.begin[model.nq + i]
+        v[i] = step.begin[model.nq + i]
     return code
 
 
 @kernel
-def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> None:
+def prepare(model: Model, ground: GroundModel, memory: Memory, work: Motion) -> None:
     """Kinematics, velocities and contact points of the state now."""
+    phase = work.phase
     forward_kinematics(model, memory.q, memory.equations.tree)
     link_velocities(model, memory.v, memory.equations.tree)
-    locate(model, ground, memory.equations.tree, phase, memory.contacts, memory.surface)
+    locate(
+        model, ground, memory.equations.tree, memory.rows, phase.modes, memory.seconds, phase.faces,
+        memory.contacts, memory.surface,
+    )  # fmt: skip
 
 
 @kernel
-def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record) -> None:
+def brake(scene: Scene, control: Control, memory: Memory, work: Motion, record: Record) -> None:
     """Let the brakes that have been put on take hold, by an impact of all that touches.
 
     Those that slip begin to, and end.
     """
+    phase = work.phase
+    step = work.step
     model = scene.model
-    if phase.last_row < phase.time:
-        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
-    begin_rubbing(phase.begin[model.nq :], memory.breakaway, phase, memory.reported)
+    if work.output.last_row < step.time:
+        write_row(
+            scene, step.time, step.begin, True, step, work.impact, control, memory, phase,
+            work.output, record,
+        )  # fmt: skip
+    begin_rubbing(
+        step.begin[model.nq :], memory.breakaway, memory.rows, phase.modes, memory.reported
+    )
     stops = take_hold(model, memory.loops)
     # Of joints at rest there is no impact to solve: its data would be rounding.
-    if stops and stops_any(model, phase.begin[model.nq :], REST, memory.loops):
-        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
-        for contact in range(phase.closed.shape[0]):
-            phase.hit[contact] = 0
-        if not strike(model, scene.ground, memory, phase, record):
-            phase.bridging = 1
-    note_brakes(model, phase.time, 1.0, record, memory.loops)
+    if stops and stops_any(model, step.begin[model.nq :], REST, memory.loops):
+        evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
+        for contact in range(phase.modes.closed.shape[0]):
+            work.impact.hit[contact] = 0
+        if not strike(model, scene.ground, memory, phase, step, work.impact, work.bounces, record):
+            work.decision.bridging = 1
+    note_brakes(model, step.time, 1.0, record, memory.loops)
 
 
 @kernel
-def contradicts_itself(phase: Phase) -> bool:
+def contradicts_itself(modes: Modes, watch: Watch, deficient: int) -> bool:
     """Whether forces of the phase that begins are far beyond limits at once.
 
     At a pole of the forces, before which they grow without bound, the modes of a moment later may
     be none of now. An event function that is negative from the beginning would not end the phase.
     """
-    if phase.deficient == 1:
+    if deficient == 1:
         return False
-    least = -CONTRADICTION * phase.weight
-    for contact in range(phase.watched):
-        if phase.carrier[contact] == 1 and phase.value[2 * contact] < least:
+    least = -CONTRADICTION * watch.weight
+    for contact in range(modes.watched):
+        if modes.carrier[contact] == 1 and watch.value[2 * contact] < least:
             return True
-        if phase.holder[contact] == 1 and phase.value[2 * contact + 1] < least:
+        if modes.holder[contact] == 1 and watch.value[2 * contact + 1] < least:
             return True
     return False
 
 
 @kernel
 def decide(
-    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
+    scene: Scene, control: Control, memory: Memory, work: Motion, record: Record, clock: Clock
 ) -> int:
     """Decide the contact modes if an event or a jump of forces left them open."""
-    phase.row_every = clock.record_every
-    jumped, phase.next_push = switch_at(phase.time, memory.pushes)
+    phase = work.phase
+    step, decision = work.step, work.decision
+    work.output.every = clock.record_every
+    jumped, decision.next_push = switch_at(step.time, memory.pushes)
     for i in range(scene.model.nu):
-        change = abs(memory.torque[i] - phase.torque[i])
+        change = abs(memory.torque[i] - step.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
-        phase.torque[i] = memory.torque[i]
-    if awaits_hold(memory.loops) or rubs_otherwise(memory.breakaway, phase):
-        brake(scene, control, memory, phase, record)
-    phase.at_event = phase.undecided
-    open_modes = phase.at_event == 1 or jumped
-    if phase.bridging == 0 and open_modes:
-        phase.bridging = 0 if decide_modes(scene, control, memory, phase, record) else 1
-    if phase.bridging == 1:
-        phase.at_event = 0
-        phase.undecided = 1
+        step.torque[i] = memory.torque[i]
+    if awaits_hold(memory.loops) or rubs_otherwise(memory.breakaway, memory.rows, phase.modes):
+        brake(scene, control, memory, work, record)
+    decision.at_event = decision.undecided
+    open_modes = decision.at_event == 1 or jumped
+    if decision.bridging == 0 and open_modes:
+        decision.bridging = 0 if decide_modes(scene, control, memory, work, record) else 1
+    if decision.bridging == 1:
+        decision.at_event = 0
+        decision.undecided = 1
         return DONE
-    phase.undecided = 0
-    phase.forced = 0
-    phase.jammed = 0
-    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
-    if open_modes and contradicts_itself(phase):
-        phase.bridging = 1
-        phase.at_event = 0
-        phase.undecided = 1
+    decision.undecided = 0
+    decision.forced = 0
+    decision.jammed = 0
+    evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
+    if open_modes and contradicts_itself(phase.modes, phase.watch, phase.forces.deficient):
+        decision.bridging = 1
+        decision.at_event = 0
+        decision.undecided = 1
         return DONE
-    if phase.at_event == 1:
-        show_forces(phase.force, phase, memory.contacts)
+    if decision.at_event == 1:
+        show_forces(
+            phase.forces.force, memory.rows, memory.seconds, phase.modes.watched, work.impact.meets,
+            memory.contacts,
+        )  # fmt: skip
     return DONE
 
 
 @kernel
 def report(
-    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
+    scene: Scene, control: Control, memory: Memory, work: Motion, record: Record, clock: Clock
 ) -> None:
     """Append a row at events, at the end, and at every step if no period is asked for."""
-    every_step = phase.output_period == 0.0 and memory.tally.steps % phase.row_every == 0
-    last = (clock.finishing == 1 or every_step) and phase.last_row < phase.time
-    if phase.at_event == 1 or last:
-        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
+    phase = work.phase
+    step, output = work.step, work.output
+    every_step = output.period == 0.0 and memory.tally.steps % output.every == 0
+    last = (clock.finishing == 1 or every_step) and output.last_row < step.time
+    if work.decision.at_event == 1 or last:
+        write_row(
+            scene, step.time, step.begin, True, step, work.impact, control, memory, phase, output,
+            record,
+        )  # fmt: skip
 
 
 @kernel
-def show_state(model: Model, phase: Phase, memory: Memory) -> None:
+def show_state(model: Model, begin: Floats, q: Floats, v: Floats) -> None:
     """Let the frame see the state now."""
     for i in range(model.nv):
-        memory.q[i] = phase.begin[i]
-        memory.v[i] = phase.begin[model.nq + i]
+        q[i] = begin[i]
+        v[i] = begin[model.nq + i]
 
 
 @kernel
 def move_over(
-    scene: Scene, stop: float, control: Control, memory: Memory, phase: Phase, record: Record,
+    scene: Scene, stop: float, control: Control, memory: Memory, work: Motion, record: Record,
     clock: Clock,
 ) -> int:  # fmt: skip
     """Leave an instant by a bridge, behind which it is looked for what there is to be met."""
+    phase = work.phase
+    watch = phase.watch
+    step, bounces, series, output, decision = (
+        work.step,
+        work.bounces,
+        work.series,
+        work.output,
+        work.decision,
+    )
     end = stop
-    if phase.output_period > 0.0:  # a row is due no later than at its end
-        period = phase.output_period * phase.row_every
-        due = phase.next_row * period
-        end = min(stop, due if due > phase.time + 1e-12 else due + period)
+    if output.period > 0.0:  # a row is due no later than at its end
+        period = output.period * output.every
+        due = output.next_row * period
+        end = min(stop, due if due > step.time + 1e-12 else due + period)
     first = record.events
-    if not cross(scene, end, control, memory, phase, record):
-        phase.reason = NO_BRIDGE
+    if not cross(scene, end, control, memory, work, record):
+        series.reason = NO_BRIDGE
         return SOLVER_FAILED
-    react(scene.model, first, phase.begin[: scene.model.nq], record, memory.loops)
-    pass_time(phase.length, end, phase)
-    clock.time = phase.time
-    phase.bridge_end = phase.time
-    for contact in range(phase.watched):
-        if phase.accumulation[contact] <= phase.time:
-            phase.accumulation[contact] = np.inf
+    react(scene.model, first, step.begin[: scene.model.nq], record, memory.loops)
+    pass_time(series.length, end, step, decision)
+    clock.time = step.time
+    series.last_end = step.time
+    for contact in range(phase.modes.watched):
+        if bounces.accumulation[contact] <= step.time:
+            bounces.accumulation[contact] = np.inf
     memory.tally.steps += 1
-    for i in range(phase.fired.shape[0]):
-        phase.fired[i] = 0
-    phase.burst = 0
-    phase.allowance = EVENTS_A_BRIDGE
-    phase.next_length = 1e-6
-    write_row(scene, phase.time, phase.begin, False, control, memory, phase, record)
-    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
-    meet_event(False, scene.model, scene.ground, memory, phase, record)
-    show_state(scene.model, phase, memory)
+    for i in range(watch.fired.shape[0]):
+        watch.fired[i] = 0
+    decision.burst = 0
+    decision.allowance = EVENTS_A_BRIDGE
+    step.next_length = 1e-6
+    write_row(
+        scene, step.time, step.begin, False, step, work.impact, control, memory, phase, output,
+        record,
+    )  # fmt: skip
+    evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
+    meet_event(
+        False, scene.model, scene.ground, memory, phase, step, work.impact, bounces, decision,
+        record,
+    )  # fmt: skip
+    show_state(scene.model, step.begin, memory.q, memory.v)
     return DONE
 
 
 @kernel
-def jam(model: Model, phase: Phase) -> bool:
+def jam(model: Model, slide: Integers, decision: Decision) -> bool:
     """Leave it to a jump of the velocity to end forces that grow without bound before a pole.
 
     Only a sliding point has such; returns whether there is one. Where steps are as short for
     another reason, as under a torque that switches, no jump ends it however often it is tried.
     """
     for contact in range(model.nc):
-        if phase.slide[contact] != 0:
-            phase.jammed = 1
-            phase.undecided = 1
-    phase.burst += 1
-    return phase.jammed == 1 and phase.burst <= INSISTENT
+        if slide[contact] != 0:
+            decision.jammed = 1
+            decision.undecided = 1
+    decision.burst += 1
+    return decision.jammed == 1 and decision.burst <= INSISTENT
 
 
 @kernel
 def move(
-    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
+    scene: Scene, control: Control, memory: Memory, work: Motion, record: Record, clock: Clock
 ) -> int:
     """Take a step to the next event, at the longest to where something is due."""
+    phase = work.phase
+    step, decision = work.step, work.decision
     model, ground = scene.model, scene.ground
-    if phase.finished == 0:
-        stop = next_due(phase, clock) if phase.bridging == 1 else next_stop(phase, clock)
-        if stop - phase.time < shortest_step(phase.time):
+    if step.finished == 0:
+        stop = (
+            next_due(decision.next_push, clock)
+            if decision.bridging == 1
+            else next_stop(
+                phase.modes.watched, work.bounces.accumulation, decision.next_push, clock
+            )
+        )
+        if stop - step.time < shortest_step(step.time):
             # The same time but for rounding: 0.3 for one, 3 · 0.1 for the other.
-            phase.time = stop
+            step.time = stop
             clock.time = stop
-            end_bounces(model, phase, record)
+            end_bounces(
+                memory.rows, phase.modes.watched, step.time, work.bounces.accumulation, record,
+            )  # fmt: skip
             return DONE
-        turn = longest_turn(model, memory.equations.tree.motion, phase.begin)
-        phase.next_length = min(phase.next_length, turn)
-        wish = phase.longest if phase.bridging == 1 else min(phase.next_length, phase.longest)
-        if clock.forked == 0 and stop == clock.until and phase.time + 1.0001 * wish >= stop:
+        turn = longest_turn(model, memory.equations.tree.motion, step.begin)
+        step.next_length = min(step.next_length, turn)
+        wish = step.longest if decision.bridging == 1 else min(step.next_length, step.longest)
+        if clock.forked == 0 and stop == clock.until and step.time + 1.0001 * wish >= stop:
             clock.forked = 1
             return FORK
-        if phase.bridging == 1:
-            return move_over(scene, stop, control, memory, phase, record, clock)
-        if not integrate(scene, stop, control, memory, phase):
-            if not jam(model, phase):
-                phase.bridging = 1
-            phase.next_length = 1e-6
+        if decision.bridging == 1:
+            return move_over(scene, stop, control, memory, work, record, clock)
+        if not integrate(scene, stop, control, memory, phase, step):
+            if not jam(model, phase.modes.slide, decision):
+                decision.bridging = 1
+            step.next_length = 1e-6
             return DONE
-    written = write_rows_within(scene, control, memory, phase, record)
+    written = write_rows_within(
+        scene, control, memory, phase, step, work.impact, work.output, record
+    )
     if written == NO_ROOM:
         return RECORD_FULL
     if written == TOO_FAR:  # the step is taken again, to end there
-        phase.finished = 0
+        step.finished = 0
         return DONE
-    end_step(model, clock, memory, phase, record)
-    clock.time = phase.time
-    if phase.has_fired == 1:
-        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
-        meet_event(False, model, ground, memory, phase, record)
-    if phase.allowance < 0.0:
-        if phase.has_fired == 0 and phase.length < EVENT_TIME and jam(model, phase):
-            phase.allowance = EVENTS_A_BRIDGE
+    end_step(
+        clock, memory.rows, memory.seconds, phase.modes.watched, work.impact.meets, memory.contacts,
+        memory.tally, step, work.bounces.accumulation, decision, record,
+    )  # fmt: skip
+    clock.time = step.time
+    if step.has_fired == 1:
+        evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
+        meet_event(
+            False, model, ground, memory, phase, step, work.impact, work.bounces, decision, record
+        )
+    if decision.allowance < 0.0:
+        if (
+            step.has_fired == 0
+            and step.length < EVENT_TIME
+            and jam(model, phase.modes.slide, decision)
+        ):
+            decision.allowance = EVENTS_A_BRIDGE
         else:
-            phase.bridging = 1
-    show_state(model, phase, memory)
+            decision.bridging = 1
+    show_state(model, step.begin, memory.q, memory.v)
     return DONE
 
 
-EventDriven.work = Phase
+EventDriven.work = Motion
 EventDriven.kernels = Kernels(begin, prepare, decide, report, move)
 
 _REASONS = {

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD
-from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.dynamics import tangential_place
-from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import Assembly, Reaction, Reported
+from heelstrike.sim.event_driven.phase import Modes
+from heelstrike.sim.memory import Assembly, Reported
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import (
     JOINT_SLIP,
@@ -32,174 +32,183 @@ ALIGNED = 1e-8
 
 
 @kernel
-def adopt_modes(
-    model: Model, count: int, assembly: Assembly, phase: Phase, reaction: Reaction
-) -> None:
+def adopt_modes(count: int, assembly: Assembly, rows: Rows, modes: Modes, mode: Integers) -> None:
     """Let every closed contact point do what the acceleration-level problem says."""
     for place in range(count):
         contact, found = assembly.candidate[place], assembly.answer.mode[place]
-        reaction.mode[contact] = found
+        mode[contact] = found
         if found == OPEN:
-            phase.closed[contact] = 0
-            phase.slide[contact] = 0
-        elif model.nc <= contact < phase.first_dry:
+            modes.closed[contact] = 0
+            modes.slide[contact] = 0
+        elif rows.kind[contact] == STOP:
             continue
         elif found == SLIP_FORWARD:
-            phase.slide[contact] = 1
+            modes.slide[contact] = 1
         elif found == SLIP_BACKWARD:
-            phase.slide[contact] = -1
+            modes.slide[contact] = -1
 
 
 @kernel
 def form_groups(
-    model: Model, tree: Workspace, contacts: Contacts, friction: Floats, phase: Phase
-) -> None:
+    model: Model, angle: Floats, contacts: Contacts, friction: Floats, rows: Rows,
+    seconds: Contacts, face: Integers, begin: Floats, modes: Modes,
+) -> None:  # fmt: skip
     """Find which closed contacts hold the same constraints, and which of them carry the forces."""
-    for contact in range(phase.watched):
-        phase.group[contact] = contact
-        phase.carrier[contact] = 0
-        phase.holder[contact] = 0
-        if model.nc <= contact < phase.first_dry:
-            phase.carrier[contact] = phase.closed[contact]
-        elif phase.first_dry <= contact < phase.first_second:
-            sticks = 1 if phase.closed[contact] == 1 and phase.slide[contact] == 0 else 0
-            phase.holder[contact] = sticks
-            if sticks == 1 and phase.stuck[contact] == 0:
-                joint = phase.dry_joint[contact - phase.first_dry]
-                phase.anchor[contact] = phase.begin[joint]
-            phase.stuck[contact] = sticks
-        elif phase.closed[contact] == 1:
-            join_group(model, contacts, contact, phase)
-    for leader in range(phase.watched):
-        if model.nc <= leader < phase.first_second:
+    for contact in range(modes.watched):
+        modes.group[contact] = contact
+        modes.carrier[contact] = 0
+        modes.holder[contact] = 0
+        if rows.kind[contact] == STOP:
+            modes.carrier[contact] = modes.closed[contact]
+        elif rows.kind[contact] == DRY_JOINT:
+            sticks = 1 if modes.closed[contact] == 1 and modes.slide[contact] == 0 else 0
+            modes.holder[contact] = sticks
+            if sticks == 1 and modes.stuck[contact] == 0:
+                joint = rows.owner[contact]
+                modes.anchor[contact] = begin[joint]
+            modes.stuck[contact] = sticks
+        elif modes.closed[contact] == 1:
+            join_group(model, contacts, contact, rows, seconds, modes)
+    for leader in range(modes.watched):
+        if rows.kind[leader] in (STOP, DRY_JOINT):
             continue
-        if phase.closed[leader] == 1 and phase.group[leader] == leader:
-            find_carriers(model, contacts, leader, phase)
-            if agree(leader, friction, phase) and phase.slide[leader] == 0:
-                phase.holder[leader] = 1
-    for contact in range(phase.watched):
-        if model.nc <= contact < phase.first_second:
+        if modes.closed[leader] == 1 and modes.group[leader] == leader:
+            find_carriers(contacts, leader, rows, seconds, modes)
+            if agree(leader, friction, modes) and modes.slide[leader] == 0:
+                modes.holder[leader] = 1
+    for contact in range(modes.watched):
+        if rows.kind[contact] in (STOP, DRY_JOINT):
             continue
-        sticks = phase.closed[contact] == 1 and phase.slide[contact] == 0
-        if sticks and phase.stuck[contact] == 0:
-            phase.anchor[contact] = tangential_place(model, tree, contacts, contact, phase)
-        phase.stuck[contact] = 1 if sticks else 0
+        sticks = modes.closed[contact] == 1 and modes.slide[contact] == 0
+        if sticks and modes.stuck[contact] == 0:
+            modes.anchor[contact] = tangential_place(
+                model, angle, contacts, contact, rows, seconds, face
+            )
+        modes.stuck[contact] = 1 if sticks else 0
 
 
 @kernel
-def normal_of(contact: int, contacts: Contacts, phase: Phase) -> tuple[float, float]:
+def normal_of(
+    contact: int, contacts: Contacts, rows: Rows, seconds: Contacts
+) -> tuple[float, float]:
     """Normal of the face that a contact point is on."""
-    if contact >= phase.first_second:
-        normal = phase.seconds.normal[contact - phase.first_second]
+    if rows.kind[contact] == SECOND_FACE:
+        normal = seconds.normal[rows.owner[contact]]
         return normal[0], normal[1]
     return contacts.normal[contact, 0], contacts.normal[contact, 1]
 
 
 @kernel
-def link_of(contact: int, model: Model, phase: Phase) -> int:
+def link_of(contact: int, model: Model, rows: Rows) -> int:
     """Link of a contact point."""
-    point = contact - phase.first_second if contact >= phase.first_second else contact
-    return int(model.contact_link[point])
+    return int(model.contact_link[rows.owner[contact]])
 
 
 @kernel
-def join_group(model: Model, contacts: Contacts, contact: int, phase: Phase) -> None:
+def join_group(
+    model: Model, contacts: Contacts, contact: int, rows: Rows, seconds: Contacts, modes: Modes
+) -> None:
     """Let a closed point join the group of its link and line, if there is one before it.
 
     Points on two steps of a stair move alike too, but a tangential force acts on another line.
     """
-    x, z = normal_of(contact, contacts, phase)
-    height = place_along(contact, -z, x, contacts, phase)
-    link = link_of(contact, model, phase)
+    x, z = normal_of(contact, contacts, rows, seconds)
+    height = place_along(contact, -z, x, contacts, rows, seconds)
+    link = link_of(contact, model, rows)
     for other in range(contact):
-        if phase.closed[other] == 0 or phase.group[other] != other:
+        if modes.closed[other] == 0 or modes.group[other] != other:
             continue
-        if model.nc <= other < phase.first_second or link_of(other, model, phase) != link:
+        if rows.kind[other] in (STOP, DRY_JOINT) or link_of(other, model, rows) != link:
             continue
-        its_x, its_z = normal_of(other, contacts, phase)
+        its_x, its_z = normal_of(other, contacts, rows, seconds)
         if abs(its_x * z - its_z * x) > PARALLEL or its_x * x + its_z * z < 0.0:
             continue
-        if abs(place_along(other, -z, x, contacts, phase) - height) < ALIGNED:
-            phase.group[contact] = other
+        if abs(place_along(other, -z, x, contacts, rows, seconds) - height) < ALIGNED:
+            modes.group[contact] = other
             return
 
 
 @kernel
-def place_along(contact: int, x: float, z: float, contacts: Contacts, phase: Phase) -> float:
+def place_along(
+    contact: int, x: float, z: float, contacts: Contacts, rows: Rows, seconds: Contacts
+) -> float:
     """Where a contact point is along the face with a normal."""
-    if contact >= phase.first_second:
-        position = phase.seconds.position[contact - phase.first_second]
+    if rows.kind[contact] == SECOND_FACE:
+        position = seconds.position[rows.owner[contact]]
         return float(position[0] * z - position[1] * x)
     return float(contacts.position[contact, 0] * z - contacts.position[contact, 1] * x)
 
 
 @kernel
-def find_carriers(model: Model, contacts: Contacts, leader: int, phase: Phase) -> None:
+def find_carriers(
+    contacts: Contacts, leader: int, rows: Rows, seconds: Contacts, modes: Modes
+) -> None:
     """Let the outermost points of a group carry its normal forces."""
-    x, z = normal_of(leader, contacts, phase)
+    x, z = normal_of(leader, contacts, rows, seconds)
     first = leader
     last = leader
-    low = place_along(leader, x, z, contacts, phase)
+    low = place_along(leader, x, z, contacts, rows, seconds)
     high = low
-    for contact in range(leader + 1, phase.watched):
-        if model.nc <= contact < phase.first_second:
+    for contact in range(leader + 1, modes.watched):
+        if rows.kind[contact] in (STOP, DRY_JOINT):
             continue
-        if phase.closed[contact] == 1 and phase.group[contact] == leader:
-            along = place_along(contact, x, z, contacts, phase)
+        if modes.closed[contact] == 1 and modes.group[contact] == leader:
+            along = place_along(contact, x, z, contacts, rows, seconds)
             if along < low:
                 low = along
                 first = contact
             if along > high:
                 high = along
                 last = contact
-    phase.carrier[first] = 1
-    phase.carrier[last] = 1
+    modes.carrier[first] = 1
+    modes.carrier[last] = 1
 
 
 @kernel
-def agree(leader: int, friction: Floats, phase: Phase) -> bool:
+def agree(leader: int, friction: Floats, modes: Modes) -> bool:
     """Let a group slide as its first point does; return whether one that carries it has friction.
 
     What a point without friction does of itself says nothing of the others.
     """
-    slide = phase.slide[leader]
-    rubs = friction[leader] > 0.0 and phase.carrier[leader] == 1
+    slide = modes.slide[leader]
+    rubs = friction[leader] > 0.0 and modes.carrier[leader] == 1
     known = friction[leader] > 0.0
-    for contact in range(leader + 1, phase.watched):
-        carries = phase.group[contact] == leader and phase.carrier[contact] == 1
+    for contact in range(leader + 1, modes.watched):
+        carries = modes.group[contact] == leader and modes.carrier[contact] == 1
         if carries and friction[contact] > 0.0:
-            slide = slide if known else phase.slide[contact]
+            slide = slide if known else modes.slide[contact]
             rubs, known = True, True
-    for contact in range(leader + 1, phase.watched):
-        if phase.closed[contact] == 1 and phase.group[contact] == leader:
-            phase.slide[contact] = slide
-    phase.slide[leader] = slide
+    for contact in range(leader + 1, modes.watched):
+        if modes.closed[contact] == 1 and modes.group[contact] == leader:
+            modes.slide[contact] = slide
+    modes.slide[leader] = slide
     return rubs
 
 
 @kernel
 def report_modes(
-    model: Model, time: float, starting: bool, phase: Phase, reported: Reported, record: Record
+    time: float, starting: bool, rows: Rows, modes: Modes, reported: Reported, record: Record
 ) -> None:
     """Append an event for every contact point whose mode is not the one reported last.
 
     Points that stand on the ground when the run begins do not touch down.
     """
-    closed, was_closed = phase.closed, reported.closed
-    for contact in range(phase.watched):
-        now = phase.slide[contact]
+    closed, was_closed = modes.closed, reported.closed
+    for contact in range(modes.watched):
+        now = modes.slide[contact]
         before = reported.slipping[contact]
         landed = closed[contact] == 1 and was_closed[contact] == 0
-        if contact >= phase.first_second:
+        kind = rows.kind[contact]
+        if kind == SECOND_FACE:
             pass  # its point is on the ground with the first face
-        elif contact >= phase.first_dry:
+        elif kind == DRY_JOINT:
             if now != before and closed[contact] == 1:
-                kind = JOINT_STICK if now == 0 else JOINT_SLIP
-                joint = phase.dry_joint[contact - phase.first_dry]
-                log_event(time, kind, joint, 0.0, 0.0, record)
-        elif contact >= model.nc:
+                told = JOINT_STICK if now == 0 else JOINT_SLIP
+                joint = rows.owner[contact]
+                log_event(time, told, joint, 0.0, 0.0, record)
+        elif kind == STOP:
             if landed and not starting:
-                joint = phase.stop_joint[contact - model.nc]
+                joint = rows.owner[contact]
                 log_event(time, JOINT_STOP, joint, 0.0, 0.0, record)
         elif closed[contact] == 0 and was_closed[contact] == 1:
             log_event(time, LIFTOFF, contact, 0.0, 0.0, record)
@@ -209,7 +218,7 @@ def report_modes(
                 if not starting:
                     log_event(time, TOUCHDOWN, contact, 0.0, 0.0, record)
             if now != before:
-                kind = SLIP if before == 0 else STICK if now == 0 else REVERSAL
-                log_event(time, kind, contact, 0.0, 0.0, record)
+                told = SLIP if before == 0 else STICK if now == 0 else REVERSAL
+                log_event(time, told, contact, 0.0, 0.0, record)
         was_closed[contact] = closed[contact]
         reported.slipping[contact] = now if closed[contact] == 1 else 0

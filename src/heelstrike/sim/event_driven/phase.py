@@ -1,24 +1,194 @@
-"""What event-driven simulation remembers: contact modes, the step in progress, its clock."""
+"""What event-driven simulation remembers: contact modes, the step in progress, its clock.
+
+A bundle a purpose, each with the scratch of its own kernels. Contacts are numbered by the table of
+rows (:mod:`heelstrike.sim.contacts.rows`): points, joint stops, joints with dry friction, second
+faces. In the shapes below ``contacts`` counts all of these.
+
+A dry joint is always closed, on a contact of its own (:mod:`heelstrike.sim.contacts.dry_friction`),
+but for one that has friction of a brake alone (:mod:`heelstrike.sim.contacts.brakes`), which opens
+and closes with it. The second faces are contacts of their own on ground with concave corners, and
+none elsewhere.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, array, cell, number, part
+from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
-from heelstrike.sim.contacts.rows import SECOND_FACE, dry_joints, lay_out_rows
-from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.contacts.rows import contact_count
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
+class Modes(Bundle):
+    """What every contact does in this phase.
+
+    A contact point that is closed and does not slide sticks. Closed points of one link on the same
+    straight piece of ground form a group, told by its first point: only the outermost two of them
+    carry normal force, and one tangential force stands for all.
+
+    Attributes
+    ----------
+    watched : int
+        How many contacts there are on this ground: all, or those before the second faces.
+    closed : (contacts,) int
+        Whether each contact point is on the ground, each joint at its stop.
+    slide : (contacts,) int
+        Direction in which it slides along the tangent, or the joint turns: -1, 0 or 1.
+    group : (contacts,) int
+        First contact point of its group.
+    carrier, holder : (contacts,) int
+        Whether its normal force, and its tangential force, are unknowns.
+    stuck : (contacts,) int
+    anchor : (contacts,) float
+        Whether a point has a place where it began to stick, and that place along the tangent.
+    passing : (contacts,) int
+        Points of a swing leg below the ground that are let pass.
+    let_pass : int
+        Whether swing feet may scuff without effect.
+    breakaway : (nv,) float
+        The most that dry friction is of each joint in this phase.
+    """
+
+    watched: int = cell(int)
+    closed: Integers = array("contacts", of=int)
+    slide: Integers = array("contacts", of=int)
+    group: Integers = array("contacts", of=int)
+    carrier: Integers = array("contacts", of=int)
+    holder: Integers = array("contacts", of=int)
+    stuck: Integers = array("contacts", of=int)
+    anchor: Floats = array("contacts")
+    passing: Integers = array("contacts", of=int)
+    let_pass: int = cell(int)
+    breakaway: Floats = array("nv")
+
+
+class Faces(Bundle):
+    """On which faces of the ground contact points are.
+
+    Attributes
+    ----------
+    face : (contacts,) int
+        Face of the ground that each closed contact point is on, -1 for none; the second that it
+        is on, or could meet (:mod:`heelstrike.sim.event_driven.faces`).
+    paired : int
+        Whether the ground has concave corners, where points have second faces.
+    place : (3,) float
+        Scratch of :func:`~heelstrike.sim.event_driven.faces.choose_faces`.
+    center, acceleration : (3,) float
+        Scratch of :func:`~heelstrike.sim.event_driven.gaps.free_gap_acceleration`.
+    """
+
+    face: Integers = array("contacts", of=int)
+    paired: int = cell(int)
+    place: Floats = array(3)
+    center: Floats = array(3)
+    acceleration: Floats = array(3)
+
+
+class Watch(Bundle):
+    """Event functions, of which the first to vanish ends the phase.
+
+    There are two a contact. Of a joint stop the second is always 1, of a dry joint the first. On
+    ground with corners each contact point has a third, after these.
+
+    Attributes
+    ----------
+    value, rate : (functions,) float
+        Event functions and their rates at the last evaluation.
+    fired : (functions,) int
+        Event functions that ended the step.
+    weight : float
+        Of the robot, or its mass where there is no gravity: what forces are small or large beside.
+    center : (3,) float
+        Scratch of :func:`~heelstrike.sim.event_driven.faces.rate_corners`.
+    """
+
+    value: Floats = array("functions")
+    rate: Floats = array("functions")
+    fired: Integers = array("functions", of=int)
+    weight: float = cell(float)
+    center: Floats = array(3)
+
+
+class Samples(Bundle):
+    """Event functions and their rates at some places in a step, between which they may vanish.
+
+    Attributes
+    ----------
+    before, before_rate : (functions,) float
+        At the sample before.
+    sample, sample_rate : (functions,) float
+        At this one.
+    end_value, end_rate : (functions,) float
+        At the end of the step.
+    state, slope : (2 nv,) float
+        Scratch of :func:`~heelstrike.sim.event_driven.location.evaluate_within`.
+    """
+
+    end_value: Floats = array("functions")
+    end_rate: Floats = array("functions")
+    before: Floats = array("functions")
+    before_rate: Floats = array("functions")
+    sample: Floats = array("functions")
+    sample_rate: Floats = array("functions")
+    state: Floats = array("2 nv")
+    slope: Floats = array("2 nv")
+
+
+class Forces(Bundle):
+    """The forces that keep the modes.
+
+    Attributes
+    ----------
+    force : (contacts, 2) float
+        Contact forces of the last evaluation (N), normal and tangent, on the robot.
+    count, deficient : int
+        Closed contact points at the last evaluation; whether it found their forces ambiguous.
+    solvers : (3,) int
+        Contact solvers in the order in which they are tried.
+    """
+
+    force: Floats = array("contacts", "components")
+    count: int = cell(int)
+    deficient: int = cell(int)
+    solvers: Integers = array(3, of=int)
+
+
+class HeldRows(Bundle):
+    """Rows along which closed contacts and loops are held, and the equations of their forces.
+
+    Attributes
+    ----------
+    row : (rows,) int
+        Row of the Jacobian that each unknown force acts along.
+    lean, scale : (rows,) float
+        Tangential force that it brings along; its unit.
+    system : (rows, rows + 1) float
+    unknown : (rows,) float
+    column : (rows,) int
+        The equations, their solution, and its order.
+    presses : (rows,) int
+        Whether it can press only: scratch, where the forces are ambiguous.
+    """
+
+    row: Integers = array("rows", of=int)
+    lean: Floats = array("rows")
+    scale: Floats = array("rows")
+    system: Floats = array("rows", "rows + 1")
+    unknown: Floats = array("rows")
+    column: Integers = array("rows", of=int)
+    presses: Integers = array("rows", of=int)
+
+
 class SaddlePoint(Bundle):
-    """Equations of motion and of the contacts together.
+    """Equations of motion and of the contacts together, where those of the forces lose digits.
 
     They are solved in :mod:`heelstrike.sim.event_driven.saddle_point`.
 
@@ -32,6 +202,8 @@ class SaddlePoint(Bundle):
     force : (nv,) float
     bias : (2 capacity,) float
         Known force, and acceleration of the rows of the candidates without any of the coordinates.
+    rate : (nv,) float
+        Scratch of :func:`~heelstrike.sim.event_driven.saddle_point.state_accelerations`.
     mode : (capacity,) int
     impulse, velocity : (2 capacity,) float
     residual : (3,) float
@@ -47,6 +219,7 @@ class SaddlePoint(Bundle):
     order: Integers = array("unknowns", of=int)
     force: Floats = array("nv")
     bias: Floats = array("2 capacity")
+    rate: Floats = array("nv")
     mode: Integers = array("capacity", of=int)
     impulse: Floats = array("2 capacity")
     velocity: Floats = array("2 capacity")
@@ -55,258 +228,284 @@ class SaddlePoint(Bundle):
     used: int = cell(int)
 
 
-class Phase(Bundle):
-    """A smooth phase of the motion, in which every contact point keeps its mode.
-
-    A contact point that is closed and does not slide sticks. Closed points of one link on the same
-    straight piece of ground form a group, told by its first point: only the outermost two of them
-    carry normal force, and one tangential force stands for all. Joint stops are numbered on from
-    the contact points, joints with dry friction from these; in the shapes below nc counts all. A
-    dry joint is always closed, on a contact of its own
-    (:mod:`heelstrike.sim.contacts.dry_friction`), but for one that has friction of a brake alone
-    (:mod:`heelstrike.sim.contacts.brakes`), which opens and closes with it.
-
-    After all these come the second faces of the contact points, one each: contacts of their own
-    on ground with concave corners, and none elsewhere.
+class Step(Bundle):
+    """The step from now on, of the method of Dormand and Prince.
 
     Attributes
     ----------
-    first_dry, first_second : int
-        Number of the first dry joint, and of the first second face, among the contacts.
-    watched : int
-        How many contacts there are on this ground.
-    weight : float
-        Of the robot, or its mass where there is no gravity.
-    stop_joint : (ns,) int
-    stop_side, stop_limit : (ns,) float
-        Joint of each stop; 1 for a lower, -1 for an upper end of its range; that end.
-    dry_joint : (nd,) int
-        Joints that may have dry friction.
-    breakaway : (nv,) float
-        The most that it is of each joint in this phase.
-    latch_stop : (latches,) int
-        The stop that each latch is, as contacts are numbered here.
-    order : (3,) int
-        Contact solvers in the order in which they are tried.
-    closed : (nc,) int
-        Whether each contact point is on the ground, each joint at its stop.
-    slide : (nc,) int
-        Direction in which it slides along the tangent, or the joint turns: -1, 0 or 1.
-    group : (nc,) int
-        First contact point of its group.
-    carrier, holder : (nc,) int
-        Whether its normal force, and its tangential force, are unknowns.
-    stuck : (nc,) int
-    anchor : (nc,) float
-        Whether a point has a place where it began to stick, and that place along the tangent.
-    hit, plastic : (nc,) int
-        Points that reach the ground in this instant; those whose rebound is too short to follow.
-    passing : (nc,) int
-        Points of a swing leg below the ground that are let pass.
-    face : (nc,) int
-        Face of the ground that each closed contact point is on, -1 for none; the second that it
-        is on, or could meet (:mod:`heelstrike.sim.event_driven.faces`).
+    time, begin : float, (2 nv,) float
+        Now (s), and the state (q, v) now, at the start of the step.
+    slopes : (16, 2 nv) float
+        Rates of the state at its stages; the first is that of now.
+    point : (2 nv,) float
+        State at a stage; scratch.
+    end : (2 nv,) float
+        State at its end.
+    unsettled : (2 nv,) float
+        The same before it is put on its constraints; scratch.
+    dense : (7, 2 nv) float
+        Coefficients of its dense output.
+    end_force : (contacts, 2) float
+        Contact forces at its end (N).
+    torque : (nu,) float
+        Torques at its end, to see whether the controller jumps.
+    length, next_length, longest : float
+        Of the finished step; of the next as far as accuracy allows; at most (s).
+    relative, absolute : float
+        Tolerances.
+    left : float
+        How far from its constraints the phase began, because they cannot all be met (m).
+    finished, has_fired : int
+        Whether it is finished but its rows and events are not dealt with; whether it ends in an
+        event.
+    samples : Samples
+        Event functions within it.
+    """
+
+    time: float = cell(float)
+    begin: Floats = array("2 nv")
+    slopes: Floats = array("stages", "2 nv")
+    point: Floats = array("2 nv")
+    end: Floats = array("2 nv")
+    unsettled: Floats = array("2 nv")
+    dense: Floats = array("dense_rows", "2 nv")
+    end_force: Floats = array("contacts", "components")
+    torque: Floats = array("nu")
+    length: float = cell(float)
+    next_length: float = cell(float)
+    longest: float = cell(float)
+    relative: float = cell(float)
+    absolute: float = cell(float)
+    left: float = cell(float)
+    finished: int = cell(int)
+    has_fired: int = cell(int)
+    samples: Samples = part(Samples)
+
+
+class Impact(Bundle):
+    """Impulses of this instant.
+
+    Attributes
+    ----------
+    hit : (contacts,) int
+        Points that reach the ground in this instant.
+    impulse : (contacts, 2) float
+        Impulses in this instant (N s).
     meets : (nc,) int
         Whether each point meets a second face in this instant, and is recorded in its frame.
-    seconds : Contacts
-        The contact points on their second faces; the gap is infinite where there is none.
-    force : (nc, 2) float
-        Contact forces of the last evaluation (N), normal and tangent, on the robot.
-    end_force : (nc, 2) float
-        The same at the end of the step.
-    impulse : (nc, 2) float
-        Impulses of the impact in this instant (N s).
-    last_impact, accumulation : (nc,) float
-        When each point hit the ground last; when its accumulating impacts come to rest.
-    row : (forces,) int
-    lean, scale : (forces,) float
-    system : (forces, forces + 1) float
-    unknown : (forces,) float
-    column : (forces,) int
-        Equations of the forces of contacts and loops: row of the Jacobian, tangential per normal
-        force, unit of each, the equations themselves, their solution, and its order.
-    saddle : SaddlePoint
-        What they are solved with where these equations leave too few digits.
-    value, rate, end_value, end_rate : (2 nc + points,) float
-    before, before_rate, sample, sample_rate : (2 nc + points,) float
-        Event functions, two a contact point, and their rates: at the last evaluation, at the end of
-        the step, at the sample before, at this one. Of a joint stop the second is always 1, of a
-        dry joint the first. On ground with corners each contact point has a third, after these.
-    fired : (2 nc + points,) int
-        Event functions that ended the step.
-    scratch : (2, 3) float
-        A place and its acceleration.
-    begin, end, trial : (2 nv,) float
-        State (q, v) at the start of the step, which is now; at its end; somewhere between.
-    slopes : (16, 2 nv) float
-    dense : (7, 2 nv) float
-        Stages of the step and coefficients of its dense output.
-    torque : (nu,) float
-        Torques at the end of the step, to see whether the controller jumps.
-    time : float
-        Now, s.
-    next_length, length, longest : float
-        Length of the next step as far as accuracy allows, of the finished one, and at most, s.
-    relative, absolute : float
-        Tolerances of a step.
-    output_period : float
+    before : (2 nv,) float
+        State before velocities jump.
+    momentum : (3,) float
+        Scratch of :func:`~heelstrike.sim.event_driven.events.meet_event`.
+    """
+
+    hit: Integers = array("contacts", of=int)
+    impulse: Floats = array("contacts", "components")
+    meets: Integers = array("nc", of=int)
+    before: Floats = array("2 nv")
+    momentum: Floats = array(3)
+
+
+class Bounces(Bundle):
+    """How points have bounced, and when bounces that grow ever shorter will have ended.
+
+    Attributes
+    ----------
+    plastic : (contacts,) int
+        Points whose rebound in this instant is too short to follow.
+    last_impact, accumulation : (contacts,) float
+        When each point hit the ground last; when its accumulating impacts come to rest (s).
+    last_blow : float
+        When the robot was hit last (s).
+    """
+
+    plastic: Integers = array("contacts", of=int)
+    last_impact: Floats = array("contacts")
+    accumulation: Floats = array("contacts")
+    last_blow: float = cell(float)
+
+
+class BridgeSeries(Bundle):
+    """Bridges that follow each other.
+
+    Attributes
+    ----------
+    count, begin, last_end : int, float, float
+        How many there were in the series; when that began; when the last of them ended (s).
+    length : float
+        Of the last bridge (s).
+    reason : int
+        Why the simulation could not go on.
+    """
+
+    count: int = cell(int)
+    begin: float = cell(float)
+    last_end: float = cell(float)
+    length: float = cell(float)
+    reason: int = cell(int)
+
+
+class Bridge(Bundle):
+    """A bridge over an instant where time does not move on.
+
+    Attributes
+    ----------
+    end : (2 nv,) float
+        State at the end of the bridge at hand.
+    after : (2 nv,) float
+        State behind its impulses, at its beginning.
+    free_end : (2 nv,) float
+        Velocities at its end without impulses.
+    added : (capacity,) float
+        What is no velocity of the normal free term of each candidate.
+    kept : (2 capacity,) float
+        Scratch of :func:`~heelstrike.sim.event_driven.bridge.put_in_place`.
+    lent : (contacts,) int
+        Second faces that are kept until the bridge is found.
+    here, halved, quartered : (2 nv,) float
+        Where it begins, and where two bridges of half its length lead, and four of a quarter.
+    """
+
+    end: Floats = array("2 nv")
+    after: Floats = array("2 nv")
+    free_end: Floats = array("2 nv")
+    added: Floats = array("capacity")
+    kept: Floats = array("2 capacity")
+    lent: Integers = array("contacts", of=int)
+    here: Floats = array("2 nv")
+    halved: Floats = array("2 nv")
+    quartered: Floats = array("2 nv")
+
+
+class Output(Bundle):
+    """When rows of the record are due.
+
+    Attributes
+    ----------
+    period : float
         Time between two rows of the record, zero for a row a step.
-    row_every, next_row : int
+    every, next_row : int
         Periods, or steps, between two rows; next row, in periods.
-    last_row, next_push, last_event, last_blow : float
-        When the last row was, a push begins or ends next, the modes changed last, and the robot was
-        hit last, s.
-    burst : int
-        Events since time moved on.
+    last_row : float
+        When the last row was (s).
+    state, slope : (2 nv,) float
+        State that becomes a row, put on its constraints; its rate, which nobody asks for.
+    dense_state : (2 nv,) float
+        The same as dense output has it.
+    """
+
+    period: float = cell(float)
+    every: int = cell(int)
+    next_row: int = cell(int)
+    last_row: float = cell(float)
+    state: Floats = array("2 nv")
+    slope: Floats = array("2 nv")
+    dense_state: Floats = array("2 nv")
+
+
+class Decision(Bundle):
+    """What is open in this instant, and how often it has been decided.
+
+    Attributes
+    ----------
     started : int
         Whether the first contact modes are being, or have been, decided.
-    finished, has_fired : int
-        Whether a step is finished but its rows and events are not dealt with; whether it ends in an
-        event.
     at_event, undecided : int
         Whether this instant is one of an event; whether the contact modes are still to be decided.
     forced, jammed : int
         Whether contact forces at their limits made it so; whether those that grow without bound.
-    closed_count, deficient : int
-        Closed contact points at the last evaluation; whether it found their forces ambiguous.
-    left : float
-        How far from its constraints the phase began, because they cannot all be met (m).
-    bridging, bridges : int
-        Whether this instant is left by a bridge; how many there were in the series.
-    series, bridge_end : float
-        When the series of bridges began, and when the last of them ended, s.
+    bridging : int
+        Whether this instant is left by a bridge.
+    next_push, last_event : float
+        When a push begins or ends next; when the modes changed last (s).
+    burst : int
+        Events since time moved on.
     allowance : float
         Events that are allowed for until time has moved on.
-    reason : int
-        Why the simulation could not go on.
-    let_pass : int
-        Whether swing feet may scuff without effect.
+    state, slope : (2 nv,) float
+        State at which modes are tried, and its rate: scratch of
+        :func:`~heelstrike.sim.event_driven.deciding.decide_modes`.
+    before : (2 nv,) float
+        Scratch of :func:`~heelstrike.sim.event_driven.deciding.begin_phase`.
     """
 
-    first_dry: int = number(int)
-    first_second: int = number(int)
-    watched: int = cell(int)
-    weight: float = number(float)
-    stop_joint: Integers = array("ns", of=int)
-    stop_side: Floats = array("ns")
-    stop_limit: Floats = array("ns")
-    dry_joint: Integers = array("nd", of=int)
-    breakaway: Floats = array("nv")
-    latch_stop: Integers = array("latches", of=int)
-    order: Integers = array(3, of=int)
-    closed: Integers = array("contacts", of=int)
-    slide: Integers = array("contacts", of=int)
-    group: Integers = array("contacts", of=int)
-    carrier: Integers = array("contacts", of=int)
-    holder: Integers = array("contacts", of=int)
-    stuck: Integers = array("contacts", of=int)
-    anchor: Floats = array("contacts")
-    hit: Integers = array("contacts", of=int)
-    plastic: Integers = array("contacts", of=int)
-    passing: Integers = array("contacts", of=int)
-    face: Integers = array("contacts", of=int)
-    meets: Integers = array("nc", of=int)
-    seconds: Contacts = part(Contacts)
-    force: Floats = array("contacts", "components")
-    end_force: Floats = array("contacts", "components")
-    impulse: Floats = array("contacts", "components")
-    last_impact: Floats = array("contacts")
-    accumulation: Floats = array("contacts")
-    row: Integers = array("forces", of=int)
-    lean: Floats = array("forces")
-    scale: Floats = array("forces")
-    system: Floats = array("forces", "forces + 1")
-    unknown: Floats = array("forces")
-    column: Integers = array("forces", of=int)
-    saddle: SaddlePoint = part(SaddlePoint)
-    value: Floats = array("functions")
-    rate: Floats = array("functions")
-    end_value: Floats = array("functions")
-    end_rate: Floats = array("functions")
-    before: Floats = array("functions")
-    before_rate: Floats = array("functions")
-    sample: Floats = array("functions")
-    sample_rate: Floats = array("functions")
-    fired: Integers = array("functions", of=int)
-    scratch: Floats = array("axes", 3)
-    begin: Floats = array("2 nv")
-    end: Floats = array("2 nv")
-    trial: Floats = array("2 nv")
-    slopes: Floats = array("stages", "2 nv")
-    dense: Floats = array("dense_rows", "2 nv")
-    torque: Floats = array("nu")
-    time: float = cell(float)
-    next_length: float = cell(float)
-    length: float = cell(float)
-    longest: float = cell(float)
-    relative: float = cell(float)
-    absolute: float = cell(float)
-    output_period: float = cell(float)
-    row_every: int = cell(int)
-    next_row: int = cell(int)
-    last_row: float = cell(float)
-    next_push: float = cell(float)
-    last_event: float = cell(float)
-    last_blow: float = cell(float)
-    burst: int = cell(int)
     started: int = cell(int)
-    finished: int = cell(int)
-    has_fired: int = cell(int)
     at_event: int = cell(int)
     undecided: int = cell(int)
     forced: int = cell(int)
     jammed: int = cell(int)
-    closed_count: int = cell(int)
-    deficient: int = cell(int)
-    left: float = cell(float)
     bridging: int = cell(int)
-    bridges: int = cell(int)
-    series: float = cell(float)
-    bridge_end: float = cell(float)
+    next_push: float = cell(float)
+    last_event: float = cell(float)
+    burst: int = cell(int)
     allowance: float = cell(float)
-    reason: int = cell(int)
-    let_pass: int = cell(int)
+    state: Floats = array("2 nv")
+    slope: Floats = array("2 nv")
+    before: Floats = array("2 nv")
 
 
-def allocate_phase(robot: Robot) -> Phase:
+class Phase(Bundle):
+    """A smooth phase of the motion, in which every contact keeps its mode.
+
+    Attributes
+    ----------
+    modes : Modes
+    faces : Faces
+    watch : Watch
+    held : HeldRows
+    forces : Forces
+    saddle : SaddlePoint
+    """
+
+    modes: Modes = part(Modes)
+    faces: Faces = part(Faces)
+    watch: Watch = part(Watch)
+    held: HeldRows = part(HeldRows)
+    forces: Forces = part(Forces)
+    saddle: SaddlePoint = part(SaddlePoint)
+
+
+class Motion(Bundle):
+    """Phase after phase: what steps, impacts, bridges and rows remember.
+
+    Attributes
+    ----------
+    phase : Phase
+    step : Step
+    impact : Impact
+    bounces : Bounces
+    bridge : Bridge
+    series : BridgeSeries
+    output : Output
+    decision : Decision
+    """
+
+    phase: Phase = part(Phase)
+    step: Step = part(Step)
+    impact: Impact = part(Impact)
+    bounces: Bounces = part(Bounces)
+    bridge: Bridge = part(Bridge)
+    series: BridgeSeries = part(BridgeSeries)
+    output: Output = part(Output)
+    decision: Decision = part(Decision)
+
+
+def allocate_motion(robot: Robot) -> Motion:
     """Allocate the memory of an event-driven simulation of `robot`."""
     model = robot.model
+    contacts, loops = contact_count(model), most_rows(model)
+    rows = 2 * contacts + loops
+    extents = model.extents | {
+        "contacts": contacts, "components": 2, "rows": rows, "unknowns": model.nv + rows,
+        "capacity": contacts + loops, "functions": 2 * contacts + robot.nc,
+        "stages": SLOPES, "dense_rows": DENSE_ROWS,
+    }  # fmt: skip
+    phase = Phase.allocate(extents)
     mass, gravity = float(sum(model.mass)), np.sqrt(np.sum(model.gravity**2))
-    lower = np.flatnonzero(np.isfinite(model.lower))
-    upper = np.flatnonzero(np.isfinite(model.upper))
-    dry = dry_joints(model)
-    firsts, loops = int(lay_out_rows(model).first[SECOND_FACE]), most_rows(model)
-    contacts = firsts + robot.nc
-    forces = 2 * contacts + loops
-    saddle = SaddlePoint.allocate(
-        unknowns=model.nv + forces, nv=model.nv, capacity=contacts + loops
-    )
-    return Phase.allocate(
-        model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
-        forces=forces, saddle=saddle, functions=2 * contacts + robot.nc,
-        stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=firsts - len(dry),
-        first_second=firsts, watched=firsts,
-        weight=mass * gravity if gravity > 0.0 else mass,
-        stop_joint=np.concatenate((lower, upper)).astype(np.int64),
-        stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
-        stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
-        dry_joint=dry,
-        latch_stop=np.array(
-            [
-                robot.nc
-                + (
-                    len(lower) + int(np.searchsorted(upper, joint))
-                    if side > 0
-                    else int(np.searchsorted(lower, joint))
-                )
-                for joint, side in zip(model.latch_joint, model.latch_side, strict=True)
-            ],
-            dtype=np.int64,
-        ),
-        last_impact=np.full(contacts, -np.inf),
-        accumulation=np.full(contacts, np.inf),
-        value=np.ones(2 * contacts + robot.nc), face=np.full(contacts, NO_FACE),
-        seconds=Contacts.allocate(
-            {**model.extents, "components": 2}, gap=np.full(robot.nc, np.inf)
-        ),
-    )  # fmt: skip
+    phase.watch.weight = mass * gravity if gravity > 0.0 else mass
+    phase.watch.value[:] = 1.0
+    phase.faces.face[:] = NO_FACE
+    motion = Motion.allocate(extents, phase=phase)
+    motion.bounces.last_impact[:] = -np.inf
+    motion.bounces.accumulation[:] = np.inf
+    return motion

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.brakes import share_friction
-from heelstrike.sim.contacts.dry_friction import dry_force
+from heelstrike.sim.contacts.dry_friction import add_dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.loops import note_loops, rows_of
+from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.control import Control
+from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import slides
 from heelstrike.sim.event_driven.corners import record_corner
-from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
+from heelstrike.sim.event_driven.dormand_prince import interpolate
 from heelstrike.sim.event_driven.dynamics import (
     INTERPOLATED,
     evaluate,
@@ -20,10 +22,16 @@ from heelstrike.sim.event_driven.dynamics import (
     project,
 )
 from heelstrike.sim.event_driven.location import TOGETHER, shortest_step
-from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.event_driven.phase import (
+    Impact,
+    Output,
+    Phase,
+    Samples,
+    Step,
+)
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import Scene
-from heelstrike.sim.memory import Assembly, Memory
+from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Surface
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_residual, note_row
 
@@ -50,16 +58,23 @@ def note_state(model: Model, row: int, state: Floats, record: Record) -> None:
 
 
 @kernel
-def put_right(scene: Scene, state: Floats, memory: Memory, phase: Phase) -> bool:
-    """Write a state that is to become a row, put on its constraints, to ``phase.trial``.
+def put_right(
+    scene: Scene, state: Floats, rows: Rows, step: Step, equations: Equations, contacts: Contacts,
+    surface: Surface, assembly: Assembly, loops: Loops, seconds: Contacts, phase: Phase,
+    output: Output,
+) -> bool:  # fmt: skip
+    """Write a state that is to become a row, put on its constraints, to ``output.state``.
 
     Returns whether the error of the dense output explains how far it is moved. If not it stays.
     """
-    trial = phase.trial
+    trial = output.state
     for i in range(state.shape[0]):
         trial[i] = state[i]
-    _, strayed, fastest = project(scene.model, scene.ground, memory, phase, trial)
-    if explained(state, trial, INTERPOLATED, phase):
+    _, strayed, fastest = project(
+        scene.model, scene.ground, rows, equations, contacts, surface, assembly, loops, seconds,
+        phase, trial,
+    )  # fmt: skip
+    if explained(state, trial, INTERPOLATED, step):
         return True
     for i in range(state.shape[0]):
         trial[i] = state[i]
@@ -67,105 +82,116 @@ def put_right(scene: Scene, state: Floats, memory: Memory, phase: Phase) -> bool
 
 
 @kernel
-def show_who_carries(count: int, friction: Floats, phase: Phase, assembly: Assembly) -> None:
+def show_who_carries(
+    count: int, friction: Floats, slide: Integers, value: Floats, force: Floats, assembly: Assembly
+) -> None:
     """Let the answer be the forces that the motion follows, where others would lead to another.
 
     That is where equations leave open who carries what and something slides: friction hangs on it.
     """
-    if not slides(count, friction, phase, assembly):
+    if not slides(count, friction, slide, assembly.candidate):
         return
     for place in range(count):
         contact = assembly.candidate[place]
-        if phase.value[2 * contact] < 0.0 or phase.value[2 * contact + 1] < 0.0:
+        if value[2 * contact] < 0.0 or value[2 * contact + 1] < 0.0:
             return
     for place in range(count):
         contact = assembly.candidate[place]
         for k in range(2):
-            assembly.answer.impulse[2 * place + k] = phase.force[contact, k]
+            assembly.answer.impulse[2 * place + k] = force[contact, k]
 
 
 @kernel
 def write_row(
-    scene: Scene, time: float, state: Floats, lawful: bool, control: Control, memory: Memory,
-    phase: Phase, record: Record,
+    scene: Scene, time: float, state: Floats, lawful: bool, step: Step, impact: Impact,
+    control: Control, memory: Memory, phase: Phase, output: Output, record: Record,
 ) -> None:  # fmt: skip
     """Append a state, put on its constraints, with the certified contact forces in it.
 
     Where no contact forces obey the laws there are none in the row, and none of loops.
     """
-    put_right(scene, state, memory, phase)
-    write_right(scene, time, lawful, control, memory, phase, record)
+    put_right(
+        scene, state, memory.rows, step, memory.equations, memory.contacts, memory.surface,
+        memory.assembly, memory.loops, memory.seconds, phase, output,
+    )  # fmt: skip
+    write_right(scene, time, lawful, impact, control, memory, phase, output, record)
 
 
 @kernel
 def write_right(
-    scene: Scene, time: float, lawful: bool, control: Control, memory: Memory, phase: Phase,
-    record: Record,
+    scene: Scene, time: float, lawful: bool, impact: Impact, control: Control, memory: Memory,
+    phase: Phase, output: Output, record: Record,
 ) -> None:  # fmt: skip
-    """Append the state in ``phase.trial``, as :func:`write_row` does."""
+    """Append the state in ``output.state``, as :func:`write_row` does."""
+    modes, forces = phase.modes, phase.forces
     model, contacts, assembly = scene.model, memory.contacts, memory.assembly
-    trial, residual, impulse = phase.trial, assembly.answer.residual, assembly.answer.impulse
-    evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
+    trial, residual, impulse = output.state, assembly.answer.residual, assembly.answer.impulse
+    evaluate(scene, time, trial, control, memory, phase, output.slope)
     for k in range(3):
         residual[k] = 0.0
-    count, loops = phase.closed_count, rows_of(memory.loops)
+    count, loop_rows = forces.count, rows_of(memory.loops)
     if not lawful:
         count = 0
-        for place in range(loops):
+        for place in range(loop_rows):
             impulse[2 * place] = 0.0
-        note_loops(memory.rows, loops, 1.0, impulse, memory.loops)
-    elif count + loops > 0:
+        note_loops(memory.rows, loop_rows, 1.0, impulse, memory.loops)
+    elif count + loop_rows > 0:
         solve_accelerations(count, model, trial, memory, phase)
         note_residual(residual, memory.tally)
-        if loops == 0 and phase.deficient == 1:
-            show_who_carries(count, memory.surface.friction, phase, assembly)
-        note_loops(memory.rows, count + loops, 1.0, impulse, memory.loops)
+        if loop_rows == 0 and forces.deficient == 1:
+            show_who_carries(
+                count, memory.surface.friction, modes.slide, phase.watch.value, forces.force,
+                assembly,
+            )  # fmt: skip
+        note_loops(memory.rows, count + loop_rows, 1.0, impulse, memory.loops)
     row, friction_torque = record.rows, record.friction_torque[record.rows]
     note_row(time, memory, record)
     note_state(model, row, trial, record)
-    slide = phase.slide[phase.first_dry :]
-    dry_force(phase.dry_joint, slide, phase.breakaway, friction_torque)
+    add_dry_force(modes.slide, modes.breakaway, memory.rows, friction_torque)
     deepest = memory.tally.penetration
     for contact in range(model.nc):
-        if phase.passing[contact] == 0:
-            deepest = max(deepest, -contacts.gap[contact], -phase.seconds.gap[contact])
-        phase.seconds.force[contact, 0] = 0.0
-        phase.seconds.force[contact, 1] = 0.0
+        if modes.passing[contact] == 0:
+            deepest = max(deepest, -contacts.gap[contact], -memory.seconds.gap[contact])
+        memory.seconds.force[contact, 0] = 0.0
+        memory.seconds.force[contact, 1] = 0.0
     memory.tally.penetration = deepest
     for place in range(count):
         contact = assembly.candidate[place]
         normal, tangent = impulse[2 * place], impulse[2 * place + 1]
-        if contact >= phase.first_second:
-            phase.seconds.force[contact - phase.first_second, 0] = normal
-            phase.seconds.force[contact - phase.first_second, 1] = tangent
-        elif contact >= phase.first_dry:
-            friction_torque[phase.dry_joint[contact - phase.first_dry]] = tangent
-        elif contact >= model.nc:
-            stop = contact - model.nc
-            record.stop_torque[row, phase.stop_joint[stop]] += phase.stop_side[stop] * normal
+        kind, owner = memory.rows.kind[contact], memory.rows.owner[contact]
+        if kind == SECOND_FACE:
+            memory.seconds.force[owner, 0] = normal
+            memory.seconds.force[owner, 1] = tangent
+        elif kind == DRY_JOINT:
+            friction_torque[owner] = tangent
+        elif kind == STOP:
+            record.stop_torque[row, owner] += memory.rows.side[contact] * normal
         else:
             record.contact_force[row, contact, 0] = normal
             record.contact_force[row, contact, 1] = tangent
             _, record.slip_velocity[row, contact] = contact_velocity(
                 model, memory.equations.tree, contacts, contact
             )
-    share_friction(model, phase.breakaway, friction_torque, record.brake_torque[row])
-    for second in range(phase.first_second, phase.watched):
-        record_corner(row, second - phase.first_second, model, memory, phase, record)
-    phase.last_row = time
-    period = phase.output_period * phase.row_every
-    if period > 0.0 and abs(phase.next_row * period - time) <= 1e-12:
-        phase.next_row += 1
+    share_friction(model, modes.breakaway, friction_torque, record.brake_torque[row])
+    for second in range(memory.rows.first[SECOND_FACE], modes.watched):
+        record_corner(
+            row, memory.rows.owner[second], model, memory.equations.tree, contacts, memory.seconds,
+            impact, record,
+        )  # fmt: skip
+    output.last_row = time
+    period = output.period * output.every
+    if period > 0.0 and abs(output.next_row * period - time) <= 1e-12:
+        output.next_row += 1
 
 
 @kernel
-def comes_down(contact: int, phase: Phase) -> bool:
+def comes_down(contact: int, fired: Integers, samples: Samples) -> bool:
     """Whether an open contact reaches its limit at the end of the step, or is hit with others.
 
     What the end looked like is kept: the rows of the step may be written in parts.
     """
-    near = phase.end_value[2 * contact] <= 2.0 * TOGETHER and phase.end_rate[2 * contact] < 0.0
-    return bool(phase.fired[2 * contact] == 1 or near)
+    near = samples.end_value[2 * contact] <= 2.0 * TOGETHER and samples.end_rate[2 * contact] < 0.0
+    return bool(fired[2 * contact] == 1 or near)
 
 
 @kernel
@@ -176,8 +202,9 @@ def is_inside(time: float, begin: float, length: float) -> bool:
 
 @kernel
 def write_rows_within(
-    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record
-) -> int:
+    scene: Scene, control: Control, memory: Memory, phase: Phase, step: Step, impact: Impact,
+    output: Output, record: Record,
+) -> int:  # fmt: skip
     """Append the rows due within the finished step; return whether all, or what is in the way.
 
     An event at its end has rows of its own, one before it if velocities or normals may jump. Where
@@ -185,41 +212,47 @@ def write_rows_within(
     at the row: nothing but integration finds the state there. Rows before it are taken back, since
     the shorter step may meet an event that the longer one has passed.
     """
-    period = phase.output_period * phase.row_every
-    last = phase.time + phase.length
-    first, next_row, last_row = record.rows, phase.next_row, phase.last_row
+    modes, watch = phase.modes, phase.watch
+    period = output.period * output.every
+    last = step.time + step.length
+    first, next_row, last_row = record.rows, output.next_row, output.last_row
     touch = False
-    if phase.has_fired == 1:
+    if step.has_fired == 1:
         last -= 1e-12
-        for contact in range(phase.watched):
-            touch = touch or (phase.closed[contact] == 0 and comes_down(contact, phase))
-        for corner in range(2 * phase.watched, 2 * phase.watched + scene.model.nc):
-            touch = touch or phase.fired[corner] == 1
-    state = phase.slopes[SLOPES - 1]
+        for contact in range(modes.watched):
+            touch = touch or (
+                modes.closed[contact] == 0 and comes_down(contact, watch.fired, step.samples)
+            )
+        for point in range(scene.model.nc):
+            touch = touch or watch.fired[2 * modes.watched + point] == 1
+    state = output.dense_state
     while True:
-        time = phase.next_row * period
+        time = output.next_row * period
         part = 1.0
         if period > 0.0 and time <= last:
-            part = (time - phase.time) / phase.length
+            part = (time - step.time) / step.length
         else:  # the step may have no length at all
             if not touch:
                 return WRITTEN
             touch = False
-            time = phase.time + phase.length
-            for second in range(phase.first_second, phase.watched):
-                meets = phase.closed[second] == 0 and phase.fired[2 * second] == 1
-                phase.meets[second - phase.first_second] = 1 if meets else 0
+            time = step.time + step.length
+            for second in range(memory.rows.first[SECOND_FACE], modes.watched):
+                meets = modes.closed[second] == 0 and watch.fired[2 * second] == 1
+                impact.meets[memory.rows.owner[second]] = 1 if meets else 0
         if record.rows + ROWS_OF_AN_INSTANT > record.time.shape[0]:
             return NO_ROOM
         if part < 1.0:
-            interpolate(part, phase.begin, phase.dense, state)
+            interpolate(part, step.begin, step.dense, state)
         else:  # the end has been put on its constraints, and on the event
             for i in range(state.shape[0]):
-                state[i] = phase.end[i]
-        fits = put_right(scene, state, memory, phase)
-        inside = is_inside(time, phase.time, phase.length)
-        if not fits and inside and not last_row > phase.time:
-            phase.next_length = time - phase.time
-            record.rows, phase.next_row, phase.last_row = first, next_row, last_row
+                state[i] = step.end[i]
+        fits = put_right(
+            scene, state, memory.rows, step, memory.equations, memory.contacts, memory.surface,
+            memory.assembly, memory.loops, memory.seconds, phase, output,
+        )  # fmt: skip
+        inside = is_inside(time, step.time, step.length)
+        if not fits and inside and not last_row > step.time:
+            step.next_length = time - step.time
+            record.rows, output.next_row, output.last_row = first, next_row, last_row
             return TOO_FAR
-        write_right(scene, time, True, control, memory, phase, record)
+        write_right(scene, time, True, impact, control, memory, phase, output, record)

@@ -37,10 +37,13 @@ from heelstrike.dynamics.kernels import mass_matrix
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.geometry import add_impulse, row_product
 from heelstrike.sim.contacts.loops import rows_of
+from heelstrike.sim.contacts.rows import Rows
+from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import known_force, pose_problem, solve_candidates
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration
-from heelstrike.sim.event_driven.phase import Phase, SaddlePoint
-from heelstrike.sim.memory import Assembly, Equations, Memory
+from heelstrike.sim.event_driven.phase import HeldRows, Modes, Phase, SaddlePoint
+from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Tally
+from heelstrike.sim.push import Pushes
 
 SMALL_PIVOT = 1e-6
 """Pivots of the contacts' unit-diagonal matrix below this leave too few digits of the forces."""
@@ -89,21 +92,20 @@ def is_delicate(size: int, rank: int, system: Floats) -> bool:
 
 @kernel
 def write_equations(
-    size: int, model: Model, assembly: Assembly, equations: Equations, phase: Phase
+    size: int, model: Model, jacobian: Floats, held: HeldRows, equations: Equations, system: Floats
 ) -> None:
-    """Write the matrix of the equations: those of motion first, then those of ``phase.row``.
+    """Write the matrix of the equations: those of motion first, then those of ``held.row``.
 
-    A force along a row brings along its tangential one, by ``phase.lean``.
+    A force along a row brings along its tangential one, by ``held.lean``.
     """
-    nv, system, matrix = model.nv, phase.saddle.system, equations.mass_matrix
-    jacobian = assembly.jacobian
+    nv, matrix = model.nv, equations.mass_matrix
     mass_matrix(model, equations.tree, matrix)
     for i in range(nv):
         for j in range(nv):
             system[i, j] = matrix[i, j]
         system[i, i] += equations.added[i]
     for k in range(size):
-        row, lean = phase.row[k], phase.lean[k]
+        row, lean = held.row[k], held.lean[k]
         for j in range(nv):
             system[nv + k, j] = jacobian[row, j]
             system[j, nv + k] = -jacobian[row, j]
@@ -115,32 +117,36 @@ def write_equations(
 
 @kernel
 def state_accelerations(
-    count: int, model: Model, state: Floats, memory: Memory, phase: Phase
-) -> None:
+    count: int, model: Model, state: Floats, contacts: Contacts, loops: Loops, torque: Floats,
+    rows: Rows, seconds: Contacts, equations: Equations, assembly: Assembly, pushes: Pushes,
+    phase: Phase,
+) -> None:  # fmt: skip
     """State the problem of accelerations: the known force, and J̇ v of the candidates.
 
     No force is divided by an inertia.
     """
-    problem, bias, equations = memory.assembly.problem, phase.saddle.bias, memory.equations
-    rate, kept = equations.rate, phase.saddle.unknown
+    saddle = phase.saddle
+    problem, bias = assembly.problem, saddle.bias
+    rate, kept = equations.rate, saddle.rate
     for i in range(model.nv):
         kept[i] = rate[i]
         rate[i] = 0.0
     for place in range(count):
         normal, tangent = problem.free[2 * place], problem.free[2 * place + 1]
-        contact = memory.assembly.candidate[place]
+        contact = assembly.candidate[place]
         free_gap_acceleration(
-            model, memory.contacts, equations, contact, place, phase, memory.assembly
-        )
+            model, contacts, equations, contact, place, rows, seconds, phase.modes.breakaway,
+            phase.faces, assembly,
+        )  # fmt: skip
         for row in range(2 * place, 2 * place + 2):
             bias[row] = problem.free[row]
         problem.free[2 * place], problem.free[2 * place + 1] = normal, tangent
-    for row in range(rows_of(memory.loops)):
-        bias[2 * (count + row)] = memory.loops.rows.bias[row]
+    for row in range(rows_of(loops)):
+        bias[2 * (count + row)] = loops.rows.bias[row]
         bias[2 * (count + row) + 1] = 0.0
-    known_force(model, state, memory.torque, phase, memory.pushes, equations)
+    known_force(model, state, torque, rows, phase.modes, pushes, equations)
     for i in range(model.nv):
-        phase.saddle.force[i] = rate[i]
+        saddle.force[i] = rate[i]
         rate[i] = kept[i]
 
 
@@ -183,7 +189,7 @@ def solve_saddle_point(size: int, saddle: SaddlePoint) -> int:
 
 
 @kernel
-def list_rows(count: int, total: int, assembly: Assembly, phase: Phase) -> int:
+def list_rows(count: int, total: int, assembly: Assembly, held: HeldRows) -> int:
     """List the rows in which the modes of the answer allow no velocity; return how many."""
     problem, mode = assembly.problem, assembly.answer.mode
     size = 0
@@ -191,22 +197,22 @@ def list_rows(count: int, total: int, assembly: Assembly, phase: Phase) -> int:
         does, friction = mode[place], problem.friction[place]
         if problem.set[place] == INTERVAL:
             if does == STICK:
-                phase.row[size] = 2 * place + 1
-                phase.lean[size] = 0.0
+                held.row[size] = 2 * place + 1
+                held.lean[size] = 0.0
                 size += 1
             continue
         if does == OPEN:
             continue
-        phase.row[size] = 2 * place
-        phase.lean[size] = 0.0
+        held.row[size] = 2 * place
+        held.lean[size] = 0.0
         if does in (SLIP_FORWARD, SLIDING_FORWARD):
-            phase.lean[size] = -friction
+            held.lean[size] = -friction
         elif does in (SLIP_BACKWARD, SLIDING_BACKWARD):
-            phase.lean[size] = friction
+            held.lean[size] = friction
         size += 1
         if does == STICK and place < count and friction > 0.0:
-            phase.row[size] = 2 * place + 1
-            phase.lean[size] = 0.0
+            held.row[size] = 2 * place + 1
+            held.lean[size] = 0.0
             size += 1
     return size
 
@@ -229,29 +235,32 @@ def begin_impulses(total: int, assembly: Assembly) -> None:
 
 
 @kernel
-def solve_modes(count: int, total: int, model: Model, memory: Memory, phase: Phase) -> int:
+def solve_modes(
+    count: int, total: int, model: Model, equations: Equations, assembly: Assembly, held: HeldRows,
+    saddle: SaddlePoint,
+) -> int:  # fmt: skip
     """Correct the impulses of the answer, and find velocities, by the modes; return how many rows.
 
     The motion goes to ``saddle.unknown``, the units of coordinates and rows to ``saddle.scale``.
     """
-    assembly, nv, saddle = memory.assembly, model.nv, phase.saddle
+    nv = model.nv
     answer, jacobian, bias = assembly.answer, assembly.jacobian, saddle.bias
     begin_impulses(total, assembly)
-    size = list_rows(count, total, assembly, phase)
-    write_equations(size, model, assembly, memory.equations, phase)
+    size = list_rows(count, total, assembly, held)
+    write_equations(size, model, assembly.jacobian, held, equations, saddle.system)
     for j in range(nv):
         pushed = saddle.force[j]
         for row in range(2 * total):
             pushed += jacobian[row, j] * answer.impulse[row]
         saddle.system[j, nv + size] = pushed
     for k in range(size):
-        saddle.system[nv + k, nv + size] = -bias[phase.row[k]]
+        saddle.system[nv + k, nv + size] = -bias[held.row[k]]
     solve_saddle_point(nv + size, saddle)
     for k in range(size):
-        row, force = phase.row[k], saddle.unknown[nv + k]
+        row, force = held.row[k], saddle.unknown[nv + k]
         answer.impulse[row] += force
-        if phase.lean[k] != 0.0:
-            answer.impulse[row + 1] += phase.lean[k] * force
+        if held.lean[k] != 0.0:
+            answer.impulse[row + 1] += held.lean[k] * force
     for row in range(2 * total):
         answer.velocity[row] = bias[row] + row_product(jacobian, row, saddle.unknown[:nv])
     for place in range(total):
@@ -261,18 +270,16 @@ def solve_modes(count: int, total: int, model: Model, memory: Memory, phase: Pha
 
 
 @kernel
-def unit_of(row: int, nv: int, jacobian: Floats, saddle: SaddlePoint) -> float:
+def unit_of(row: int, nv: int, jacobian: Floats, scale: Floats) -> float:
     """Unit of the velocity along a row, in which those of the coordinates are 1."""
     largest = 0.0
     for j in range(nv):
-        largest = max(largest, abs(jacobian[row, j]) * saddle.scale[j])
+        largest = max(largest, abs(jacobian[row, j]) * scale[j])
     return largest
 
 
 @kernel
-def amended(
-    place: int, slide: int, data: float, nv: int, assembly: Assembly, saddle: SaddlePoint
-) -> int:
+def amended(place: int, slide: int, data: float, nv: int, assembly: Assembly, scale: Floats) -> int:
     """Mode of a candidate that does not contradict its impulse and velocity as the one it has does.
 
     What closes goes on sliding as it did, by ``slide``, or sticks to begin with.
@@ -280,10 +287,10 @@ def amended(
     problem, normal, tangent = assembly.problem, 2 * place, 2 * place + 1
     impulse, velocity = assembly.answer.impulse, assembly.answer.velocity
     mode = assembly.answer.mode[place]
-    across = PROVEN * data * unit_of(tangent, nv, assembly.jacobian, saddle)
+    across = PROVEN * data * unit_of(tangent, nv, assembly.jacobian, scale)
     speed, limit = across, problem.bound[place]
     if problem.set[place] != INTERVAL:
-        speed = PROVEN * data * unit_of(normal, nv, assembly.jacobian, saddle)
+        speed = PROVEN * data * unit_of(normal, nv, assembly.jacobian, scale)
         limit = problem.friction[place] * impulse[normal]
     force = (PROVEN * data) ** 2 / speed if speed > 0.0 else 0.0
     if mode == OPEN:
@@ -305,28 +312,29 @@ def amended(
 
 @kernel
 def amend_modes(
-    total: int, accelerations: bool, nv: int, data: float, phase: Phase, assembly: Assembly
-) -> bool:
+    total: int, accelerations: bool, nv: int, data: float, modes: Modes, scale: Floats,
+    assembly: Assembly,
+) -> bool:  # fmt: skip
     """Change the modes of the answer that it contradicts; return whether there are any."""
     changed = False
     for place in range(total):
         if assembly.problem.set[place] == LINE:
             continue
-        slide = phase.slide[assembly.candidate[place]] if accelerations else 0
-        mode = amended(place, slide, data, nv, assembly, phase.saddle)
+        slide = modes.slide[assembly.candidate[place]] if accelerations else 0
+        mode = amended(place, slide, data, nv, assembly, scale)
         changed = changed or mode != assembly.answer.mode[place]
         assembly.answer.mode[place] = mode
     return changed
 
 
 @kernel
-def size_of_data(total: int, nv: int, assembly: Assembly, saddle: SaddlePoint) -> float:
+def size_of_data(total: int, nv: int, jacobian: Floats, saddle: SaddlePoint) -> float:
     """Largest force on a coordinate, and velocity of a row that these can move, in their units."""
     largest = 0.0
     for i in range(nv):
         largest = max(largest, abs(saddle.force[i]) * saddle.scale[i])
     for row in range(2 * total):
-        unit = unit_of(row, nv, assembly.jacobian, saddle)
+        unit = unit_of(row, nv, jacobian, saddle.scale)
         if unit > 0.0:
             largest = max(largest, abs(saddle.bias[row]) / unit)
     return largest
@@ -334,19 +342,20 @@ def size_of_data(total: int, nv: int, assembly: Assembly, saddle: SaddlePoint) -
 
 @kernel
 def is_proven(
-    size: int, total: int, data: float, model: Model, phase: Phase, memory: Memory
-) -> bool:
+    size: int, total: int, data: float, model: Model, held: HeldRows, saddle: SaddlePoint,
+    equations: Equations, assembly: Assembly,
+) -> bool:  # fmt: skip
     """Certify the answer, whose modes agree with it; write its residuals.
 
     Whether the equations of motion hold and the held rows have no velocity, to a part of the data,
     and no unknown is beyond all proportion to them.
     """
-    assembly, matrix, nv = memory.assembly, memory.equations.mass_matrix, model.nv
-    answer, saddle, jacobian = assembly.answer, phase.saddle, assembly.jacobian
+    matrix, nv = equations.mass_matrix, model.nv
+    answer, jacobian = assembly.answer, assembly.jacobian
     worst = 0.0
     largest = 0.0
     for i in range(nv):
-        left = memory.equations.added[i] * saddle.unknown[i] - saddle.force[i]
+        left = equations.added[i] * saddle.unknown[i] - saddle.force[i]
         for j in range(nv):
             left += matrix[i, j] * saddle.unknown[j]
         for row in range(2 * total):
@@ -354,8 +363,8 @@ def is_proven(
         worst = max(worst, abs(left) * saddle.scale[i])
         largest = max(largest, abs(saddle.unknown[i]) / saddle.scale[i])
     for k in range(size):
-        worst = max(worst, abs(answer.velocity[phase.row[k]]) * saddle.scale[nv + k])
-        largest = max(largest, abs(answer.impulse[phase.row[k]]) / saddle.scale[nv + k])
+        worst = max(worst, abs(answer.velocity[held.row[k]]) * saddle.scale[nv + k])
+        largest = max(largest, abs(answer.impulse[held.row[k]]) / saddle.scale[nv + k])
     answer.residual[0] = worst / data if worst > 0.0 else 0.0
     answer.residual[1] = answer.residual[2] = 0.0  # the modes agree with it
     return worst <= PROVEN * data and largest <= GREATEST * data
@@ -363,20 +372,25 @@ def is_proven(
 
 @kernel
 def solve_by_saddle_point(
-    count: int, total: int, accelerations: bool, model: Model, memory: Memory, phase: Phase
-) -> bool:
+    count: int, total: int, accelerations: bool, model: Model, equations: Equations,
+    assembly: Assembly, phase: Phase,
+) -> bool:  # fmt: skip
     """Solve the contact problem of the candidates from the full equations; return whether proven.
 
     It begins with the modes and impulses of the answer.
     Forces or impulses, velocities, modes and residuals go to ``assembly.answer``, the accelerations
     of the coordinates, or what the impulses change of their velocities, to ``saddle.unknown``.
     """
-    assembly, nv = memory.assembly, model.nv
+    nv = model.nv
     for _ in range(ROUNDS):
-        size = solve_modes(count, total, model, memory, phase)
-        data = size_of_data(total, nv, assembly, phase.saddle)
-        if not amend_modes(total, accelerations, nv, data, phase, assembly):
-            return is_proven(size, total, data, model, phase, memory)
+        size = solve_modes(count, total, model, equations, assembly, phase.held, phase.saddle)
+        data = size_of_data(total, nv, assembly.jacobian, phase.saddle)
+        if not amend_modes(
+            total, accelerations, nv, data, phase.modes, phase.saddle.scale, assembly
+        ):
+            return is_proven(
+                size, total, data, model, phase.held, phase.saddle, equations, assembly
+            )
     return False
 
 
@@ -401,12 +415,14 @@ def solve_at_once(count: int, model: Model, memory: Memory, phase: Phase) -> boo
     That is where the last evaluation took the full equations.
     """
     assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode
-    answer, tally = assembly.answer, assembly.solver.tally
-    pose_problem(count, memory.loops, True, friction, guess, phase, assembly)
+    answer, tally = assembly.answer, memory.solver.tally
+    pose_problem(
+        count, memory.loops, True, friction, guess, memory.rows, phase.modes.slide, assembly
+    )
     total = assembly.problem.count
     for row in range(2 * total):
         answer.impulse[row] = 0.0
-    if not solve_by_saddle_point(count, total, True, model, memory, phase):
+    if not solve_by_saddle_point(count, total, True, model, memory.equations, assembly, phase):
         return False
     tally.solves += 1
     tally.shortcuts += 1
@@ -414,9 +430,9 @@ def solve_at_once(count: int, model: Model, memory: Memory, phase: Phase) -> boo
 
 
 @kernel
-def guess_modes(total: int, phase: Phase, assembly: Assembly) -> None:
+def guess_modes(total: int, bias: Floats, assembly: Assembly) -> None:
     """Let the candidates of an impact slip as they would without it, and those open that leave."""
-    problem, answer, free = assembly.problem, assembly.answer, phase.saddle.bias
+    problem, answer, free = assembly.problem, assembly.answer, bias
     for place in range(total):
         if problem.set[place] == LINE:
             continue
@@ -427,18 +443,19 @@ def guess_modes(total: int, phase: Phase, assembly: Assembly) -> None:
 
 @kernel
 def solve_once_more(
-    status: int, count: int, accelerations: bool, model: Model, memory: Memory, phase: Phase
-) -> bool:
+    status: int, count: int, accelerations: bool, model: Model, tally: Tally, equations: Equations,
+    assembly: Assembly, phase: Phase,
+) -> bool:  # fmt: skip
     """Solve again what the solvers left like this; return whether what comes out is proven."""
-    assembly, saddle, tally = memory.assembly, phase.saddle, memory.assembly.solver.tally
+    saddle = phase.saddle
     answer, total = assembly.answer, assembly.problem.count
     copy_answer(total, answer, saddle)
     for attempt in range(1 if status == SOLVED or accelerations else 2):
         if attempt == 1:
-            guess_modes(total, phase, assembly)
+            guess_modes(total, phase.saddle.bias, assembly)
         for row in range(2 * total if status != SOLVED else 0):
             answer.impulse[row] = 0.0
-        if solve_by_saddle_point(count, total, accelerations, model, memory, phase):
+        if solve_by_saddle_point(count, total, accelerations, model, equations, assembly, phase):
             if status != SOLVED:
                 tally.failures -= 1
                 tally.fallbacks += 1
@@ -457,19 +474,31 @@ def solve_accelerations(
     :func:`~heelstrike.sim.event_driven.candidates.solve_candidates`, of whose certificate nothing
     is left where rounding of the matrix counts.
     """
+    saddle = phase.saddle
     assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode
-    phase.saddle.used = 0
-    if phase.saddle.needed == 1:
-        state_accelerations(count, model, state, memory, phase)
+    saddle.used = 0
+    if saddle.needed == 1:
+        state_accelerations(
+            count, model, state, memory.contacts, memory.loops, memory.torque, memory.rows,
+            memory.seconds, memory.equations, assembly, memory.pushes, phase,
+        )  # fmt: skip
         if solve_at_once(count, model, memory, phase):
-            phase.saddle.used = 1
+            saddle.used = 1
             return SOLVED
-    status = solve_candidates(count, memory.loops, True, friction, guess, phase, assembly)
-    if status == SOLVED and not assembly.solver.yardstick.effort > STRAINED:
+    status = solve_candidates(
+        count, memory.loops, True, friction, guess, memory.rows, phase.modes.slide,
+        phase.forces.solvers, assembly, memory.solver,
+    )  # fmt: skip
+    if status == SOLVED and not memory.solver.yardstick.effort > STRAINED:
         return status
-    state_accelerations(count, model, state, memory, phase)
-    if solve_once_more(status, count, True, model, memory, phase):
-        phase.saddle.used = 1
+    state_accelerations(
+        count, model, state, memory.contacts, memory.loops, memory.torque, memory.rows,
+        memory.seconds, memory.equations, assembly, memory.pushes, phase,
+    )  # fmt: skip
+    if solve_once_more(
+        status, count, True, model, memory.solver.tally, memory.equations, assembly, phase
+    ):
+        saddle.used = 1
         return SOLVED
     return status
 
@@ -477,25 +506,31 @@ def solve_accelerations(
 @kernel
 def solve_velocities(count: int, model: Model, memory: Memory, phase: Phase) -> int:
     """The same of velocities, whose free terms are those of the contact problem."""
+    saddle = phase.saddle
     assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode
-    phase.saddle.used = 0
-    status = solve_candidates(count, memory.loops, False, friction, guess, phase, assembly)
-    if status == SOLVED and not assembly.solver.yardstick.effort > STRAINED:
+    saddle.used = 0
+    status = solve_candidates(
+        count, memory.loops, False, friction, guess, memory.rows, phase.modes.slide,
+        phase.forces.solvers, assembly, memory.solver,
+    )  # fmt: skip
+    if status == SOLVED and not memory.solver.yardstick.effort > STRAINED:
         return status
-    state_velocities(assembly.problem.count, assembly.problem.free, phase.saddle)
-    if solve_once_more(status, count, False, model, memory, phase):
-        phase.saddle.used = 1
+    state_velocities(assembly.problem.count, assembly.problem.free, saddle)
+    if solve_once_more(
+        status, count, False, model, memory.solver.tally, memory.equations, assembly, phase
+    ):
+        saddle.used = 1
         return SOLVED
     return status
 
 
 @kernel
 def add_impulses(
-    model: Model, assembly: Assembly, phase: Phase, equations: Equations, v: Floats
+    model: Model, assembly: Assembly, saddle: SaddlePoint, equations: Equations, v: Floats
 ) -> None:
     """Add what the answer of :func:`solve_velocities` does to velocities."""
-    if phase.saddle.used == 1:
+    if saddle.used == 1:
         for j in range(model.nv):
-            v[j] += phase.saddle.unknown[j]
+            v[j] += saddle.unknown[j]
     else:
         add_impulse(model, assembly, assembly.problem.count, equations, v)

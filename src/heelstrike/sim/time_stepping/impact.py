@@ -221,7 +221,7 @@ def close_gaps(step: float, count: int, memory: Memory) -> None:
 def note_wedge(model: Model, time: float, memory: Memory, impact: Impact, record: Record) -> None:
     """Tell of a wedge that begins, by the contact point that is deepest in the ground."""
     steps, gap = memory.tally.steps, memory.contacts.gap
-    memory.assembly.solver.tally.relaxed += 1
+    memory.solver.tally.relaxed += 1
     if impact.wedged != steps - 1:
         deepest = 0
         for contact in range(model.nc):
@@ -427,10 +427,11 @@ def pose_way_out(step: float, problem: ContactProblem, memory: Memory, impact: I
 
 @kernel
 def solve_impact(
-    order: Integers, members: int, problem: ContactProblem, impact: Impact, assembly: Assembly
-) -> bool:
+    order: Integers, members: int, problem: ContactProblem, solver: ContactWorkspace,
+    impact: Impact, assembly: Assembly,
+) -> bool:  # fmt: skip
     """Put the answer of the impact in the place of that of the positions; return success."""
-    status = solve_restitution(order, impact.problem, assembly.solver, impact, impact.answer)
+    status = solve_restitution(order, impact.problem, solver, impact, impact.answer)
     answer, its = assembly.answer, impact.answer
     for place in range(problem.count):
         answer.mode[place] = OPEN

@@ -741,10 +741,10 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         assemble_delassus(model, count, equations, assembly)
     problem.count = count
     if work.scheme == MOREAU_JEAN:
-        status = solve_restitution(work.order, problem, assembly.solver, impact, assembly.answer)
+        status = solve_restitution(work.order, problem, memory.solver, impact, assembly.answer)
         solved = status == SOLVED
     else:
-        status = solve_contact_kernel(work.order, problem, assembly.solver, assembly.answer)
+        status = solve_contact_kernel(work.order, problem, memory.solver, assembly.answer)
         solved = status == SOLVED
     resolves = solved and work.scheme == IMPACT_RESOLVED
     if resolves and falls_into(step, problem, memory, impact):
@@ -757,7 +757,7 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
             push_out(model, near, count, straight, problem, work, memory)
         members = find_members(step, problem, memory, impact)
         pose_impact(model, step, members, problem, memory, impact)
-        solved = solve_impact(work.order, members, problem, impact, assembly)
+        solved = solve_impact(work.order, members, problem, memory.solver, impact, assembly)
     push_all(model, near, count, straight, memory, memory.next_v)
     return solved
 
@@ -770,7 +770,7 @@ def push_out(
     """Let the positions of a wedge come out of the ground, where a way without friction leads."""
     impact, answer = work.impact, memory.assembly.answer
     pose_way_out(work.step, problem, memory, impact)
-    solver, its = memory.assembly.solver, impact.answer
+    solver, its = memory.solver, impact.answer
     if solve_contact_kernel(work.order, impact.problem, solver, its) == SOLVED:
         for row in range(2 * count):
             answer.impulse[row] = its.impulse[row]
