@@ -144,7 +144,7 @@ class _Account:
             else:
                 self.add(constant)
         for name in code.co_names:
-            if name in scope:
+            if name in scope and name != "__doc__":  # of an object, or the words of a module
                 self._write(name)
                 self._add_named(scope[name], code.co_names)
 
