@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import inspect
 from typing import Any
@@ -38,3 +39,5 @@ class Fields(griffe.Extension):
                 place.docstring.value = inspect.getdoc(value)
                 for each in told:
                     each.docstring = None
+            if dataclasses.is_dataclass(value):
+                place.labels.add("dataclass")

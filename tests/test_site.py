@@ -145,3 +145,14 @@ def test_every_cell_that_draws_has_its_picture(notebook: Path) -> None:
     drawing = sum(bool(re.search(r"plt\.show\(\)|\.plot\(\"", source)) for source in sources)
     outputs = page.read_text(encoding="utf-8").split("jp-OutputArea-output")[1:]
     assert sum("data:image/png;base64," in each for each in outputs) == drawing
+
+
+@pytest.mark.parametrize(
+    ("page", "text"),
+    [("robots", "Mass of the link."), ("simulation", "Name of the body, or index of the link.")],
+    ids=["bundle", "dataclass"],
+)
+def test_the_reference_tells_what_fields_are(page: str, text: str) -> None:
+    """Once, from what stands beneath them: griffe would show them apart from their class."""
+    html = (SITE / "reference" / page / "index.html").read_text(encoding="utf-8")
+    assert html.count(text) == 1

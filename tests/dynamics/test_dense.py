@@ -100,5 +100,6 @@ def test_what_is_no_number_stays_none() -> None:
     """A step that went wrong is seen by its answer."""
     factors, order, x = np.full((2, 2), np.nan), np.zeros(2, dtype=np.int64), np.ones(2)
     uncompiled(triangulate)(2, 2, False, factors, order)
+    assert list(order) == [0, 1]
     uncompiled(substitute)(2, factors, order, x)
     assert np.all(np.isnan(x))

@@ -28,7 +28,8 @@ _BY_VERSION = {"numpy", "numba", "llvmlite"} | sys.stdlib_module_names
 _VERSIONS = (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__)
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
 _METHOD = (types.FunctionType, classmethod, staticmethod)
-_WHERE = {"__file__", "__path__", "__cached__"}  # a package may lie anywhere
+# A package may lie anywhere, and the words of a module are for people.
+_NOT_OF_CODE = {"__file__", "__path__", "__cached__", "__doc__"}
 # The other flags say nothing that bytecode does not; Numba clears some of what a profiler sees run.
 _CALLED_WITH = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS | inspect.CO_GENERATOR
 _HAS_DOCSTRING = 0x4000000  # since Python 3.13
@@ -148,7 +149,7 @@ class _Account:
             else:
                 self.add(constant)
         for name in code.co_names:
-            if name in scope and name not in _WHERE:
+            if name in scope and name not in _NOT_OF_CODE:
                 self._write(name)
                 self._add_named(scope[name], code.co_names)
 
@@ -160,7 +161,7 @@ class _Account:
                 member = vars(value).get(name)
                 if (
                     name in vars(value)
-                    and name not in _WHERE
+                    and name not in _NOT_OF_CODE
                     and self._is_new((value.__name__, name), member)
                 ):
                     self._write(name)

@@ -89,7 +89,7 @@ def test_what_xacro_says_is_passed_on(tmp_path: Path) -> None:
 
 @installed
 def test_a_file_that_never_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(xacro, "LONGEST", 1.0)
+    monkeypatch.setattr(xacro, "LONGEST_EXPANSION", 1.0)
     endless = '<link name="${[0 for i in range(10**9) for j in range(10**9)]}"/>'
     with pytest.raises(RobotError, match="has not finished"):
         load(write(tmp_path, HEAD + endless + "</robot>"), xacro=True)
