@@ -313,6 +313,23 @@ class PoincareMap:
         )
 
 
+def check_steps(robot: Robot, ground: Ground) -> None:
+    """Refuse robots and ground on which no step repeats.
+
+    Raises
+    ------
+    SimulationError
+        If the ground is not one line, or the robot not free to move along it.
+    """
+    if len(ground.model().friction) > 1:
+        raise SimulationError("steps repeat on flat or sloping ground only, the same at every step")
+    if not np.array_equal(robot.model.axis[:2], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]):
+        raise SimulationError(
+            f"steps repeat of a robot that is free to move along the ground; the first two "
+            f"coordinates of {robot.name!r} are not its position x, z"
+        )
+
+
 def is_wheel(robot: Robot) -> bool:
     """Whether all contact points are spokes of one wheel: evenly spaced, balanced on its hinge."""
     model = robot.model
