@@ -19,6 +19,7 @@ from heelstrike.analysis.poincare_map import (
     Landing,
     PoincareMap,
     Section,
+    check_steps,
     derivative,
 )
 from heelstrike.analysis.stability.loop import ClosedLoop
@@ -276,13 +277,7 @@ def _check(robot: Robot, ground: Ground, state: Any, method: Any) -> None:
             f"{type(method).__name__}: no other finds touchdowns sharply enough. afresh=False "
             "finds those of a controller that goes on from step to step, by any method"
         )
-    if len(ground.model().friction) > 1:
-        raise SimulationError("limit cycles need flat or sloping ground, the same at every step")
-    if not np.array_equal(robot.model.axis[:2], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]):
-        raise SimulationError(
-            f"limit cycles need a robot that is free to move along the ground; the first two "
-            f"coordinates of {robot.name!r} are not its position x, z"
-        )
+    check_steps(robot, ground)
 
 
 @dataclass(frozen=True)

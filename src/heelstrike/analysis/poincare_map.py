@@ -28,7 +28,7 @@ from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.linearized.step import SAME_INSTANT
 from heelstrike.sim.run import Run
-from heelstrike.sim.simulation import Simulation, simulate
+from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
@@ -264,7 +264,7 @@ class PoincareMap:
             self.section.robot, self._controller, state=state, method=self._method,
             ground=self.section.ground, control_period=self._control_period,
         )  # fmt: skip
-        if memory is not None:
+        if memory is not None and self._carried.names:
             self._carried.put(memory, simulation)
         return simulation
 
@@ -274,22 +274,9 @@ class PoincareMap:
         Steps take about as long as the one before; where that is too short, they get the longest.
         """
         for duration in (min(SLACK * self._expected, self._longest), self._longest):
-            if self._carried.names:
-                simulation = self._simulation(state, memory)
-                simulation.advance(duration)
-                run = whole(simulation.record)
-            else:
-                run = whole(
-                    simulate(
-                        self.section.robot,
-                        self._controller,
-                        state=state,
-                        duration=duration,
-                        method=self._method,
-                        ground=self.section.ground,
-                        control_period=self._control_period,
-                    )
-                )
+            simulation = self._simulation(state, memory)
+            simulation.advance(duration)
+            run = whole(simulation.record)
             down: set[int] = set()
             for event in run.events:
                 if event.kind is EventKind.TOUCHDOWN and event.time > 0.0:
@@ -305,6 +292,23 @@ class PoincareMap:
         raise LimitCycleError(
             f"robot {run.robot.name!r} did not complete a step{lasted} "
             f"({run.message}); begin nearer to the cycle"
+        )
+
+
+def check_steps(robot: Robot, ground: Ground) -> None:
+    """Refuse robots and ground on which no step repeats.
+
+    Raises
+    ------
+    SimulationError
+        If the ground is not one line, or the robot not free to move along it.
+    """
+    if len(ground.model().friction) > 1:
+        raise SimulationError("steps repeat on flat or sloping ground only, the same at every step")
+    if not np.array_equal(robot.model.axis[:2], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]):
+        raise SimulationError(
+            f"steps repeat of a robot that is free to move along the ground; the first two "
+            f"coordinates of {robot.name!r} are not its position x, z"
         )
 
 

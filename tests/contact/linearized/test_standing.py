@@ -50,3 +50,19 @@ def test_coordinates_are_those_of_the_state() -> None:
     chart = Chart(standing, x)
     coordinates = 0.05 * np.random.default_rng(2).standard_normal(12)
     np.testing.assert_allclose(chart.coordinates(chart.moved(coordinates)), coordinates, atol=1e-9)
+
+
+def test_directions_do_not_hang_on_rounding() -> None:
+    """A sole's four rows hold three coordinates: what is left over is known to rounding only."""
+    standing, x = stance()
+    noise = np.random.default_rng(4)
+
+    class Noisy(Standing):
+        def gradient(self, x: Floats) -> Floats:
+            exact = super().gradient(x)
+            return exact + 1e-12 * noise.standard_normal(exact.shape)
+
+    noisy = Noisy(**vars(standing))
+    found = [Chart(each, x).directions for each in (standing, noisy, noisy)]
+    np.testing.assert_allclose(found[1], found[0], atol=1e-10)
+    np.testing.assert_allclose(found[2], found[0], atol=1e-10)

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.poincare_map import is_wheel
+from heelstrike.analysis.poincare_map import check_steps, is_wheel
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.linearized.slopes import along_the_ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
-from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.errors import LimitCycleError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
@@ -97,13 +97,7 @@ class ClosedLoop:
             "state": state, "method": method, "ground": ground, "control_period": control_period,
             "record_every": record_every,
         }  # fmt: skip
-        if len(self.ground.model().friction) > 1:
-            raise SimulationError("steps repeat on level or sloping ground only")
-        if not np.array_equal(robot.model.axis[:2], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]):
-            raise SimulationError(
-                f"steps repeat of a robot that is free to move along the ground; the first two "
-                f"coordinates of {robot.name!r} are not its position x, z"
-            )
+        check_steps(robot, self.ground)
         self.simulation = self.fresh()
         self.grid = self.simulation.control_period
 

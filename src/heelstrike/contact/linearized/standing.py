@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import qr
 
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.linearized.slopes import along_the_ground, contact_slopes
@@ -22,6 +23,9 @@ from heelstrike.robot.robot import Robot
 
 RANK_TOLERANCE = 1e-7
 """Two directions are one when the sine of the angle between them is below this."""
+
+FIRST = 1e-6
+"""Of two coordinates that are as free the first leads, by this much."""
 
 NEAREST, MOST = 1e-15, 20
 """Corrections (m, rad, m/s, rad/s) back to the equations, until they are this small."""
@@ -93,7 +97,8 @@ class Chart:
     Attributes
     ----------
     directions : (nq + nv, m) float
-        Errors of the state by the coordinates, orthonormal as they count.
+        Errors of the state by the coordinates, orthonormal as they count, and near to errors of
+        single numbers of the state: differences of a walk whose map has a kink hang on them.
     """
 
     def __init__(self, standing: Standing, origin: Floats, scale: Floats | None = None) -> None:
@@ -102,7 +107,11 @@ class Chart:
         gradient = standing.gradient(origin) / scale
         _, singular, rows = np.linalg.svd(gradient)
         rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
-        self.directions = rows[rank:].T / scale[:, None]
+        # Of dependent rows rounding decides what the last of these are; not what they span.
+        across = rows[rank:].T @ rows[rank:] * (1.0 - FIRST * np.arange(len(origin)))
+        basis, leading, _ = qr(across, pivoting=True)
+        forward = basis * np.sign(np.diag(leading))
+        self.directions = forward[:, : len(origin) - rank] / scale[:, None]
         self._back = np.linalg.pinv(gradient, rcond=RANK_TOLERANCE) / scale[:, None]
 
     def moved(self, coordinates: Floats, origin: Floats | None = None) -> Floats:

@@ -30,9 +30,8 @@ from heelstrike.contact import (
 from heelstrike.contact.linearized.slopes import both, contact_slopes, exchanged, following
 from heelstrike.contact.linearized.strikes import strikes
 from heelstrike.control.computed_torque import pitch_of
-from heelstrike.control.gait_lqr.transverse import PERIODS, SETTLED
+from heelstrike.control.gait_lqr.riccati import over_all_steps
 from heelstrike.dynamics.queries.held import HeldRobot
-from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -151,23 +150,18 @@ class FlatOrbit:
             (*_held(A, B, width), width * both) if count is None else _sampled(A, B, both, width)
             for A, B in self.between(number)
         ]
-        value, before = np.zeros_like(cost), np.inf
         gains = np.zeros((number, len(effort), nx))
-        for _ in range(PERIODS):
-            value = self.jump.T @ value @ self.jump
+
+        def sweep(value: Floats) -> tuple[Floats, Floats]:
             for k in range(number - 1, -1, -1):
                 A, B, price = moves[k]
                 answered = B.T @ value @ A + price[nx:, :nx]
                 gains[k] = np.linalg.solve(price[nx:, nx:] + B.T @ value @ B, answered)
                 left, chosen = A - B @ gains[k], np.vstack([np.eye(nx), -gains[k]])
                 value = chosen.T @ price @ chosen + left.T @ value @ left
-            size = np.abs(value).max()
-            if not np.isfinite(size):
-                break
-            if abs(size - before) <= SETTLED * size:
-                return gains
-            before = size
-        raise ControllerError("no regulator makes this walk repeat: its motors do not reach enough")
+            return value, gains
+
+        return over_all_steps(self.jump, sweep)
 
     def over_a_step(self, gains: Floats, *, held: bool = False) -> Floats:
         """What a step makes of errors under gains (intervals, nu, 2 nu), to before its impact.

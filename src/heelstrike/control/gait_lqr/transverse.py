@@ -30,15 +30,11 @@ from heelstrike.contact import ActiveContacts, linearize_contact
 from heelstrike.contact.linearized.slopes import both, contact_slopes, exchanged, following
 from heelstrike.contact.linearized.strikes import strikes
 from heelstrike.control.gait_lqr.orbit import Orbit, contacts_of
-from heelstrike.errors import ControllerError
+from heelstrike.control.gait_lqr.riccati import over_all_steps
 from heelstrike.robot.model import Floats
 
 STEPS, FINE = 256, 2048
 """Steps of the classical Runge-Kutta method a period: for gains, and for what comes of them."""
-
-PERIODS = 400
-SETTLED = 1e-10
-"""Periods until gains are those of all further ones, to this part of the largest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,27 +89,19 @@ class Transverse:
             drift = self.A[k].T @ value
             return drift + drift.T - value @ pushes[k] @ value + costs[k]
 
-        steps = len(self.theta) // 2
-        values = np.zeros((steps + 1, *self.jump.shape))
-        before = np.inf
-        for _ in range(PERIODS):
-            values[steps] = self.jump.T @ values[0] @ self.jump
-            for step in range(steps - 1, -1, -1):
-                k, end = 2 * step, values[step + 1]
+        def sweep(last: Floats) -> tuple[Floats, Floats]:
+            values = [last]
+            for k in range(len(self.theta) - 3, -1, -2):
+                end = values[-1]
                 one = slope(k + 2, end)
                 two = slope(k + 1, end + 0.5 * width * one)
                 three = slope(k + 1, end + 0.5 * width * two)
                 four = slope(k, end + width * three)
-                values[step] = end + width / 6.0 * (one + 2.0 * (two + three) + four)
-            size = np.abs(values[0]).max()
-            if not np.isfinite(size):
-                break
-            if abs(size - before) <= SETTLED * size:
-                gains = cheap @ np.moveaxis(self.B[::2], 1, 2) @ values
-                gains = gains / self.pace[::2, None, None] @ self.basis.T
-                return CubicSpline(self.theta[::2], gains)
-            before = size
-        raise ControllerError("no regulator makes this walk repeat: its motors do not reach enough")
+                values.append(end + width / 6.0 * (one + 2.0 * (two + three) + four))
+            return values[-1], np.array(values[::-1])
+
+        gains = cheap @ np.moveaxis(self.B[::2], 1, 2) @ over_all_steps(self.jump, sweep)
+        return CubicSpline(self.theta[::2], gains / self.pace[::2, None, None] @ self.basis.T)
 
     def over_a_step(self, gains: Floats) -> Floats:
         """What a step makes of w with gains (…, nu, 2 p − 1), impact included."""
