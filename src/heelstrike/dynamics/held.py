@@ -326,7 +326,7 @@ def forces_of_rows(force: Floats, held: HeldRows, exerted: Floats) -> None:
 
 
 @kernel
-def find_response(model: Model, work: Workspace, held: HeldRows, reaction: Reaction) -> None:
+def find_response(model: Model, held: HeldRows, work: Workspace, reaction: Reaction) -> None:
     """Find how the robot answers forces along the rows."""
     mass_matrix(model, work, reaction.matrix)
     factorize(model, reaction.matrix, reaction.factor)

@@ -25,6 +25,7 @@ from heelstrike import dynamics
 from heelstrike.control.computed_torque import pitch_of
 from heelstrike.control.gait_lqr.orbit import SMALL
 from heelstrike.control.gait_lqr.transverse import PERIODS, SETTLED
+from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
@@ -74,7 +75,7 @@ class FlatStance:
         """Velocities (nv,), the foot at rest."""
         v = np.zeros(self.robot.nv)
         v[self.driven] = rates
-        return HeldRobot.on(self.robot, q, self.foot.contacts).velocity(v)
+        return HeldRobot.on(Evaluation(self.robot, q), self.foot.contacts).velocity(v)
 
     def acceleration(self, joints: Floats, rates: Floats, torque: Floats) -> Floats:
         """Accelerations of the joints (nu,), under torques."""
@@ -84,13 +85,13 @@ class FlatStance:
 
     def stopped(self, q: Floats, v: Floats, points: Sequence[int]) -> Floats:
         """Velocities (nv,) just after a plastic impact of contact points."""
-        return HeldRobot.on(self.robot, q, points).stopped(v)[0]
+        return HeldRobot.on(Evaluation(self.robot, q), points).stopped(v)[0]
 
     def rate(self, q: Floats, v: Floats, torque: Floats, points: Sequence[int]) -> Floats:
         """Accelerations (nv,) while contact points stay in place."""
         robot = self.robot
         force = dynamics.applied_force(robot, q, v, torque) - dynamics.bias_force(robot, q, v)
-        return HeldRobot.on(robot, q, points, v).accelerated(force)[0]
+        return HeldRobot.on(Evaluation(robot, q, v), points).accelerated(force)[0]
 
     def relabelled(self, q: Floats, v: Floats) -> Floats:
         """Joints (2 nu,) with legs exchanged."""
