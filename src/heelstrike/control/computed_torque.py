@@ -14,14 +14,12 @@ import scipy.linalg
 from numpy.typing import ArrayLike
 
 from heelstrike.arguments import check_fields
-from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.compiler.bundle import array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import check_gait, gains_of, must_be
-from heelstrike.dynamics.frames import into_frame
+from heelstrike.control.followed_gait import FollowedGait, followed
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
-from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.queries.loops import loop_jacobian
-from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.polynomials import motion_in_piece, place_in_step
@@ -33,9 +31,11 @@ from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance import hold_still
-
-# A point of the swing foot that comes down more slowly than this (m/s) has landed.
-LANDED_SPEED = 1e-3
+from heelstrike.sim.controller.stance_clock import (
+    StanceClock,
+    exchange_at_touchdown,
+    has_landed,
+)
 
 UNREACHED = 1e-9
 """Share of a joint in a motion that counts as none."""
@@ -44,64 +44,13 @@ READINGS = 4
 """Samples of an encoder that a velocity is estimated from."""
 
 
-class Landing(Bundle):
-    """When a foot that touches without coming flat counts as landed.
-
-    Attributes
-    ----------
-    landing : float
-        After this time (s).
-    """
-
-    landing: float = number(float)
-
-
-class StepTiming(Landing):
-    """When a step may end.
-
-    Attributes
-    ----------
-    earliest : float
-        A touchdown counts only after this time in a step (s).
-    """
-
-    earliest: float = number(float)
-
-
-class Stance(Bundle):
-    """The foot that stands.
-
-    Attributes
-    ----------
-    stance : int
-        Which it is.
-    start : float
-        When its step began (s).
-    landed : int
-        Whether it is past the impact that made it the stance foot.
-    samples : int
-        Encoder readings since then.
-    """
-
-    stance: int = cell(int)
-    start: float = cell(float)
-    landed: int = cell(int)
-    samples: int = cell(int)
-
-
-class Parameters(StepTiming):
+class Parameters(FollowedGait):
     """Numbers of the law.
 
     Attributes
     ----------
     kp, kd : (nu,) float
         Gains of eq. 38 (1/s², 1/s).
-    breakpoints : (pieces + 1,) float
-        Times in a step between which one polynomial holds (s).
-    coefficients : (2, pieces, terms, nu) float
-        For either stance foot the joints' polynomials, lowest power first.
-    latest : float
-        The reference goes on along its polynomials until this time in a step (s).
     on_points : int
         Whether the feet are points.
     encoder_period, encoder_resolution : float
@@ -113,9 +62,6 @@ class Parameters(StepTiming):
 
     kp: Floats = array("nu")
     kd: Floats = array("nu")
-    breakpoints: Floats = array("pieces + 1")
-    coefficients: Floats = array(2, "pieces", "terms", "nu")
-    latest: float = number(float)
     on_points: int = number(int)
     encoder_period: float = number(float)
     encoder_resolution: float = number(float)
@@ -123,11 +69,14 @@ class Parameters(StepTiming):
     pitch_sign: float = number(float)
 
 
-class Memory(Stance):
+class Memory(StanceClock):
     """What the law remembers.
 
     Attributes
     ----------
+    samples : int
+        Encoder readings since the touchdown: velocities jump there, and no polynomial may reach
+        across it.
     sampled : float
         When the newest encoder reading was taken (s).
     readings : (4, nu) float
@@ -136,6 +85,7 @@ class Memory(Stance):
         Wanted of the joints.
     """
 
+    samples: int = cell(int)
     sampled: float = cell(float)
     readings: Floats = array(READINGS, "nu")
     acceleration: Floats = array("nu")
@@ -169,59 +119,6 @@ class Encoder:
             raise ControllerError(f"the encoder period must be positive, got {self.period}")
         if not 0.0 <= self.resolution < np.inf:
             raise ControllerError(f"the encoder resolution must be ≥ 0, got {self.resolution}")
-
-
-@kernel
-def approaching_speed(work: Workspace, contacts: Contacts, link: int, contact: int) -> float:
-    """Speed at which a contact point of a link comes down on the ground."""
-    place = place_of(work, contacts.position[contact])
-    return -into_frame(contacts.normal[contact], velocity_at(work.velocity, link, place))[0]
-
-
-@kernel
-def restart_at_touchdown(
-    t: float, contacts: Contacts, robot: ControlledRobot, parameters: StepTiming, memory: Stance
-) -> None:
-    """Exchange stance and swing when the swing foot has met the ground."""
-    if t - memory.start < parameters.earliest:
-        return
-    swing = 1 - memory.stance
-    for i in range(robot.nc):
-        if robot.contact_foot[i] == swing and contacts.force[i, 0] > 0.0:
-            memory.stance = swing
-            memory.start = t
-            memory.landed = 0
-            # Velocities jump at the impact: no polynomial may reach across it.
-            memory.samples = 0
-            return
-
-
-@kernel
-def has_landed(
-    t: float,
-    state: ControlState,
-    contacts: Contacts,
-    robot: ControlledRobot,
-    parameters: Landing,
-    memory: Stance,
-) -> bool:
-    """Whether the stance foot is past the impact that made it the stance foot.
-
-    Heel and toe rarely meet the ground at the same instant, and time stepping spreads an impact
-    over two steps. In between, velocities are neither those before the impact nor those after, and
-    differ from the reference by as much as the impact itself. A foot that has touched without
-    coming flat counts as landed after a while.
-    """
-    landed = memory.landed == 1 or t - memory.start > parameters.landing
-    if not landed:
-        landed = True
-        link = robot.foot_link[memory.stance]
-        for i in range(robot.nc):
-            if robot.contact_foot[i] == memory.stance:
-                speed = approaching_speed(state.kinematics, contacts, link, i)
-                landed = landed and speed < LANDED_SPEED
-    memory.landed = 1 if landed else 0
-    return landed
 
 
 @kernel
@@ -288,8 +185,9 @@ def computed_torque(
     parameters: Parameters, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques that make the joints follow the gait (eq. 39)."""
-    restart_at_touchdown(t, contacts, robot, parameters, memory)
-    landed = has_landed(t, state, contacts, robot, parameters, memory)
+    if exchange_at_touchdown(t, t - memory.start, parameters.earliest, contacts, robot, memory):
+        memory.samples = 0
+    landed = has_landed(t, parameters.landing, state, contacts, robot, memory)
     foot = memory.stance
     encoders = parameters.encoder_period >= 0.0
     seen = state
@@ -371,16 +269,10 @@ class ComputedTorque(Law):
             must_be(Encoder, "encoder", encoder)
         if gait.point_feet:
             _check_points(robot, encoder)
-        duration = gait.step_duration
-        pieces, mirrored = gait.pieces, gait.mirrored_pieces()
         parameters = Parameters(
             kp=gains_of("kp", kp, robot),
             kd=gains_of("kd", kd, robot),
-            breakpoints=gait.breakpoints,
-            coefficients=np.array([mirrored, pieces] if gait.stance_foot else [pieces, mirrored]),
-            earliest=0.5 * duration,
-            latest=1.1 * duration,
-            landing=0.02 * duration,
+            **followed(gait),
             on_points=gait.point_feet,
             encoder_period=-1.0 if encoder is None else encoder.period,
             encoder_resolution=0.0 if encoder is None else encoder.resolution,

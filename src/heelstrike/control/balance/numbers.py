@@ -6,9 +6,9 @@ from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.control.balance.constrained import Constrained
 from heelstrike.control.balance.footsteps import Plan, Planning
 from heelstrike.control.balance.reference import Reference
-from heelstrike.control.computed_torque import Landing, Stance
 from heelstrike.control.quadratic.program import Program
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.sim.controller.stance_clock import StanceClock
 
 
 class Weights(Bundle):
@@ -63,7 +63,7 @@ class Legs(Bundle):
     length: float = number(float)
 
 
-class Parameters(Landing):
+class Parameters(Bundle):
     """Numbers of the law.
 
     Attributes
@@ -93,6 +93,8 @@ class Parameters(Landing):
         Of the robot (N).
     touchdown : float
         Phase from which on a contact of the swing foot is a touchdown.
+    landing : float
+        A foot that touches without coming flat counts as landed after this time (s).
     calm, alarmed : float
         Errors of the capture point at the end of the step (m) up to which the gait is followed,
         and from which on balance is all that counts.
@@ -139,6 +141,7 @@ class Parameters(Landing):
     least_force: float = number(float)
     weight: float = number(float)
     touchdown: float = number(float)
+    landing: float = number(float)
     calm: float = number(float)
     alarmed: float = number(float)
     calming: float = number(float)
@@ -158,7 +161,7 @@ class Parameters(Landing):
     hold: float = number(float)
 
 
-class Memory(Stance):
+class Memory(StanceClock):
     """What the law remembers.
 
     Attributes

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
-from heelstrike.control.computed_torque import Landing, Stance
+from heelstrike.control.followed_gait import FollowedGait
 from heelstrike.control.regulation.disturbance import Disturbance
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.sim.controller.stance_clock import StanceClock
 
 MOMENTS, CONDITIONS = 2, 5
 """Conditions on the ground's wrench: toe and heel, then normal force and both ends of friction."""
@@ -14,21 +15,15 @@ PERIOD = 1e-3
 """Seconds between two calls."""
 
 
-class Parameters(Landing):
-    """Numbers of the law.
+class Parameters(FollowedGait):
+    """Numbers of the law; `earliest` and `latest` are times of the gait's clock.
 
     Attributes
     ----------
     kp, kd : (nu,) float
         Gains (1/s², 1/s).
-    breakpoints : (pieces + 1,) float
-        Times in a step between which one polynomial holds (s).
-    coefficients : (2, pieces, terms, nu) float
-        For either stance foot the joints' polynomials, lowest power first.
     ankle : (2,) int
         Actuator of the ankle of each foot.
-    earliest, latest : float
-        A touchdown counts only after this time of the gait; the reference ends at this (s).
     margin : float
         How far the zero moment point stays inside the sole (m).
     friction : float
@@ -47,11 +42,7 @@ class Parameters(Landing):
 
     kp: Floats = array("nu")
     kd: Floats = array("nu")
-    breakpoints: Floats = array("pieces + 1")
-    coefficients: Floats = array(2, "pieces", "terms", "nu")
     ankle: Integers = array(2, of=int)
-    earliest: float = number(float)
-    latest: float = number(float)
     margin: float = number(float)
     friction: float = number(float)
     least_force: float = number(float)
@@ -85,7 +76,7 @@ class Choice(Bundle):
     conditions: Floats = array(CONDITIONS, 3)
 
 
-class Memory(Stance):
+class Memory(StanceClock):
     """What the law remembers.
 
     Attributes
