@@ -173,7 +173,7 @@ def predict(robot: ControlledRobot, parameters: Parameters, memory: Memory) -> N
     """Move the estimate on by a period."""
     model, seen, step, reaction = robot.model, memory.state, parameters.period, memory.reaction
     hold_standing(robot, memory)
-    solve_rows(robot.motor, robot.held)
+    solve_rows(robot.unactuated, robot.held)
     find_response(model, robot.held, seen.kinematics, reaction)
     bias_force(model, seen.kinematics, memory.force)
     passive_force(model, seen.q, seen.v, memory.passive)
@@ -229,7 +229,7 @@ def correct(
     follow_speeds(robot, seen)
     hold_standing(robot, memory)
     if robot.held.count > 0:
-        solve_rows(robot.motor, robot.held)
+        solve_rows(robot.unactuated, robot.held)
         find_response(robot.model, robot.held, seen.kinematics, memory.reaction)
         change_least(robot.held, memory.reaction, seen.v)
     robot.update(seen)

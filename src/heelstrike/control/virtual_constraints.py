@@ -182,7 +182,7 @@ def hold_foot(
     """Hold a point foot; the phase is the last row of `robot.held`."""
     hold_point(robot, state, contacts, foot)
     add_row(phase[foot], robot.held)
-    solve_rows(robot.motor, robot.held)
+    solve_rows(robot.unactuated, robot.held)
 
 
 @kernel

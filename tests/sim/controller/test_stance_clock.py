@@ -37,7 +37,10 @@ def clocked(*instants: tuple[float, tuple[int, ...]]) -> list[tuple[int, float]]
     robot, clock = controlled_robot(walking.bravo7()), StanceClock.allocate(landed=1)
     told = []
     for t, pressed in instants:
-        exchange_at_touchdown(t, t - clock.start, EARLIEST, contacts(*pressed), robot, clock)
+        clock.landed = 1
+        seen = contacts(*pressed)
+        begun = exchange_at_touchdown(t, t - clock.start, EARLIEST, seen, robot, clock)
+        assert clock.landed == int(not begun)  # its impact is not over yet
         told.append((clock.stance, clock.start))
     return told
 

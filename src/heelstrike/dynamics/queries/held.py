@@ -83,9 +83,8 @@ class HeldRobot:
             self.rows.coordinate[:] = np.arange(size)
             return
         if dependent is None:
-            motor = np.full(model.nv, -1)
-            motor[model.actuator_joint] = np.arange(model.nu)
-            kernels.solve_rows(motor, self.rows)
+            without_motor = np.setdiff1d(np.arange(model.nv), model.actuator_joint)
+            kernels.solve_rows(without_motor, self.rows)
             return
         at.run(kernels.begin_solving, self.rows)
         for row, coordinate in enumerate(dependent):
