@@ -9,6 +9,10 @@ import pytest
 import walking
 
 import heelstrike as hs
+from heelstrike import dynamics
+from heelstrike.control.estimation import carry_trunk
+from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.sim.controller.interface import Contacts
 
 
@@ -119,3 +123,18 @@ def test_what_an_estimator_needs() -> None:
     law = hs.ComputedTorque(robot, walking.gait())
     with pytest.raises(hs.ControllerError, match="bandwidth"):
         hs.Estimated(law, bandwidth=-1.0)
+
+
+def test_the_trunk_goes_with_corrected_joints_in_x_and_in_z() -> None:
+    """Corrections of a leg's joints move the trunk so that its foot, on average, stays."""
+    robot = walking.bravo7()
+    q = walking.gait().initial_state.q
+    for points in ([0], [0, 1], [0, 1, 2]):
+        held = HeldRobot.on(Evaluation(robot, q), points).rows
+        change = np.random.default_rng(3).normal(size=robot.nv)
+        corrected = change.copy()
+        carry_trunk(len(points), held, corrected)
+        rates = dynamics.contact_jacobian(robot, q, points) @ corrected
+        np.testing.assert_allclose(rates.mean(axis=0), 0.0, atol=1e-13)
+        np.testing.assert_array_equal(corrected[2:], change[2:])
+        assert np.abs(corrected[:2] - change[:2]).min() > 0.01

@@ -34,13 +34,13 @@ def moving_on(robot: Robot, q: Any, v: Any, contacts: Any) -> tuple[np.ndarray, 
     """Acceleration and forces of the held rows under weight and springs alone."""
     torque = np.zeros(robot.nu)
     force = dynamics.applied_force(robot, q, v, torque) - dynamics.bias_force(robot, q, v)
-    return HeldRobot.on(robot, q, contacts, v).accelerated(force)
+    return HeldRobot.on(Evaluation(robot, q, v), contacts).accelerated(force)
 
 
 def test_a_rod_held_at_its_end_is_a_pendulum() -> None:
     """θ̈ = (3g/2L) sin θ from the vertical; the pivot bears m (a + g) of the middle."""
     robot, angle, rate = rod(), 0.4, 1.3
-    v = HeldRobot.on(robot, [0.1, 0.2, angle], [0]).velocity(np.array([9.0, 9.0, rate]))
+    v = HeldRobot.on(Evaluation(robot, [0.1, 0.2, angle]), [0]).velocity(np.array([9.0, 9.0, rate]))
     half = 0.5 * LENGTH
     # A positive angle leans forward: the middle goes to x.
     np.testing.assert_allclose(
@@ -58,7 +58,7 @@ def test_a_struck_rod_turns_about_the_end_that_stops() -> None:
     """Falling flat at u it turns on at 3u/2L, three quarters of its momentum left to the pivot."""
     robot, speed = rod(), 2.0
     q = np.array([0.0, 0.0, 0.5 * np.pi])  # it lies, its contact behind
-    after, impulse = HeldRobot.on(robot, q, [0]).stopped(np.array([0.0, -speed, 0.0]))
+    after, impulse = HeldRobot.on(Evaluation(robot, q), [0]).stopped(np.array([0.0, -speed, 0.0]))
     rate = 1.5 * speed / LENGTH
     np.testing.assert_allclose(after, [0.0, -0.5 * LENGTH * rate, rate], atol=1e-14)
     np.testing.assert_allclose(impulse, [0.0, 0.25 * MASS * speed], atol=1e-14)
@@ -69,7 +69,7 @@ def test_a_rolling_disc_holds_its_centre_not_what_touches() -> None:
     radius, rate = 0.1, 2.0
     robot = rod(radius)
     q = np.array([0.0, 0.0, 0.0])
-    v = HeldRobot.on(robot, q, [0]).velocity(np.array([0.0, 0.0, rate]))
+    v = HeldRobot.on(Evaluation(robot, q), [0]).velocity(np.array([0.0, 0.0, rate]))
     np.testing.assert_allclose(v, [(0.5 * LENGTH + radius) * rate, 0.0, rate], rtol=1e-14)
     acceleration, _ = moving_on(robot, q, v, [0])
     np.testing.assert_allclose(acceleration, [0.0, -0.5 * LENGTH * rate**2, 0.0], atol=1e-14)
@@ -92,7 +92,7 @@ def test_a_held_chain_is_a_double_pendulum() -> None:
     m1, m2, l1, l2, a1, a2, w1, w2 = 2.0, 1.0, 0.5, 0.3, 0.7, -0.4, 1.1, 2.3
     robot = double_pendulum()
     q = np.array([0.0, 0.0, -a1, -(a2 - a1)])
-    v = HeldRobot.on(robot, q, [0]).velocity(np.array([5.0, 5.0, -w1, -(w2 - w1)]))
+    v = HeldRobot.on(Evaluation(robot, q), [0]).velocity(np.array([5.0, 5.0, -w1, -(w2 - w1)]))
     acceleration, _ = moving_on(robot, q, v, [0])
     d = a1 - a2
     matrix = [[(m1 + m2) * l1, m2 * l2 * np.cos(d)], [l1 * np.cos(d), l2]]
@@ -120,7 +120,7 @@ def test_heel_and_toe_are_one_foot_and_forces_the_shortest(make: Any) -> None:
     robot = make()
     q, v = moving(robot)
     points = list(robot.feet[0].contacts)
-    held = HeldRobot.on(robot, q, points, v)
+    held = HeldRobot.on(Evaluation(robot, q, v), points)
     rows = np.concatenate(
         [
             dynamics.contact_jacobian(robot, q, points)[:, ::-1].reshape(-1, robot.nv),
@@ -140,7 +140,7 @@ def test_heel_and_toe_are_one_foot_and_forces_the_shortest(make: Any) -> None:
     # The disturbed foot's v is not that of a foot at rest: J̇v of its rows may contradict itself.
     still = held.velocity(v)
     np.testing.assert_allclose(rows @ still, 0.0, atol=1e-13)
-    held = HeldRobot.on(robot, q, points, still)
+    held = HeldRobot.on(Evaluation(robot, q, still), points)
     bias = np.concatenate(
         [
             dynamics.contact_bias_acceleration(robot, q, still, points)[:, ::-1].ravel(),

@@ -12,14 +12,12 @@ import scipy.linalg
 from numpy.typing import ArrayLike
 
 from heelstrike.arguments import check_fields
-from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.compiler.bundle import array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import check_gait, gains_of, must_be
-from heelstrike.dynamics.frames import into_frame
+from heelstrike.control.followed_gait import FollowedGait, followed
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
-from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.queries.loops import loop_jacobian
-from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
@@ -32,9 +30,11 @@ from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance import hold_still
-
-# A point of the swing foot that comes down more slowly than this (m/s) has landed.
-LANDED_SPEED = 1e-3
+from heelstrike.sim.controller.stance_clock import (
+    StanceClock,
+    exchange_at_touchdown,
+    has_landed,
+)
 
 UNREACHED = 1e-9
 """Share of a joint in a motion that counts as none."""
@@ -47,45 +47,12 @@ ALMOST_DUE = 1e-6
 """Part of an encoder's period by which rounding of times may make a reading early."""
 
 
-class Landing(Bundle):
-    """When a foot that touches without coming flat counts as landed."""
-
-    landing: float = number(float)
-    """After this time (s)."""
-
-
-class StepTiming(Landing):
-    """When a step may end."""
-
-    earliest: float = number(float)
-    """A touchdown counts only after this time in a step (s)."""
-
-
-class Stance(Bundle):
-    """The foot that stands."""
-
-    stance: int = cell(int)
-    """Which it is."""
-    start: float = cell(float)
-    """When its step began (s)."""
-    landed: int = cell(int)
-    """Whether it is past the impact that made it the stance foot."""
-    samples: int = cell(int)
-    """Encoder readings since then."""
-
-
-class Parameters(StepTiming):
+class Parameters(FollowedGait):
     """Numbers of the law."""
 
     kp: Floats = array("nu")
     kd: Floats = array("nu")
     """kp, kd: Gains of eq. 38 (1/s², 1/s)."""
-    breakpoints: Floats = array("pieces + 1")
-    """Times in a step between which one polynomial holds (s)."""
-    coefficients: Floats = array(2, "pieces", "terms", "nu")
-    """For either stance foot the joints' polynomials, lowest power first."""
-    latest: float = number(float)
-    """The reference goes on along its polynomials until this time in a step (s)."""
     on_points: int = number(int)
     """Whether the feet are points."""
     encoder_period: float = number(float)
@@ -97,9 +64,12 @@ class Parameters(StepTiming):
     """pitch, pitch_sign: Coordinate and axis sign of the trunk's pitch."""
 
 
-class Memory(Stance):
+class Memory(StanceClock):
     """What the law remembers."""
 
+    samples: int = cell(int)
+    """Encoder readings since the touchdown: velocities jump there, and no polynomial may reach
+    across it."""
     sampled: float = cell(float)
     """When the newest encoder reading was taken (s)."""
     readings: Floats = array(READINGS, "nu")
@@ -131,59 +101,6 @@ class Encoder:
             raise ControllerError(f"the encoder period must be positive, got {self.period}")
         if not 0.0 <= self.resolution < np.inf:
             raise ControllerError(f"the encoder resolution must be ≥ 0, got {self.resolution}")
-
-
-@kernel
-def approaching_speed(work: Workspace, contacts: Contacts, link: int, contact: int) -> float:
-    """Speed at which a contact point of a link comes down on the ground."""
-    place = place_of(work, contacts.position[contact])
-    return -into_frame(contacts.normal[contact], velocity_at(work.velocity, link, place))[0]
-
-
-@kernel
-def restart_at_touchdown(
-    t: float, contacts: Contacts, robot: ControlledRobot, parameters: StepTiming, memory: Stance
-) -> None:
-    """Exchange stance and swing when the swing foot has met the ground."""
-    if t - memory.start < parameters.earliest:
-        return
-    swing = 1 - memory.stance
-    for i in range(robot.nc):
-        if robot.contact_foot[i] == swing and contacts.force[i, 0] > 0.0:
-            memory.stance = swing
-            memory.start = t
-            memory.landed = 0
-            # Velocities jump at the impact: no polynomial may reach across it.
-            memory.samples = 0
-            return
-
-
-@kernel
-def has_landed(
-    t: float,
-    state: ControlState,
-    contacts: Contacts,
-    robot: ControlledRobot,
-    parameters: Landing,
-    memory: Stance,
-) -> bool:
-    """Whether the stance foot is past the impact that made it the stance foot.
-
-    Heel and toe rarely meet the ground at the same instant, and time stepping spreads an impact
-    over two steps. In between, velocities are neither those before the impact nor those after, and
-    differ from the reference by as much as the impact itself. A foot that has touched without
-    coming flat counts as landed after a while.
-    """
-    landed = memory.landed == 1 or t - memory.start > parameters.landing
-    if not landed:
-        landed = True
-        link = robot.foot_link[memory.stance]
-        for i in range(robot.nc):
-            if robot.contact_foot[i] == memory.stance:
-                speed = approaching_speed(state.kinematics, contacts, link, i)
-                landed = landed and speed < LANDED_SPEED
-    memory.landed = 1 if landed else 0
-    return landed
 
 
 @kernel
@@ -250,8 +167,9 @@ def computed_torque(
     parameters: Parameters, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques that make the joints follow the gait (eq. 39)."""
-    restart_at_touchdown(t, contacts, robot, parameters, memory)
-    landed = has_landed(t, state, contacts, robot, parameters, memory)
+    if exchange_at_touchdown(t, t - memory.start, parameters.earliest, contacts, robot, memory):
+        memory.samples = 0
+    landed = has_landed(t, parameters.landing, state, contacts, robot, memory)
     foot = memory.stance
     encoders = parameters.encoder_period >= 0.0
     seen = state
@@ -333,16 +251,10 @@ class ComputedTorque(Law):
             must_be(Encoder, "encoder", encoder)
         if gait.point_feet:
             _check_points(robot, encoder)
-        duration = gait.step_duration
-        pieces, mirrored = gait.pieces, gait.mirrored_pieces()
         parameters = Parameters(
             kp=gains_of("kp", kp, robot),
             kd=gains_of("kd", kd, robot),
-            breakpoints=gait.breakpoints,
-            coefficients=np.array([mirrored, pieces] if gait.stance_foot else [pieces, mirrored]),
-            earliest=0.5 * duration,
-            latest=1.1 * duration,
-            landing=0.02 * duration,
+            **followed(gait),
             on_points=gait.point_feet,
             encoder_period=-1.0 if encoder is None else encoder.period,
             encoder_resolution=0.0 if encoder is None else encoder.resolution,

@@ -155,8 +155,8 @@ def predict(robot: ControlledRobot, parameters: Parameters, memory: Memory) -> N
     """Move the estimate on by a period."""
     model, seen, step, reaction = robot.model, memory.state, parameters.period, memory.reaction
     hold_standing(robot, memory)
-    solve_rows(robot.motor, robot.held)
-    find_response(model, seen.kinematics, robot.held, reaction)
+    solve_rows(robot.unactuated, robot.held)
+    find_response(model, robot.held, seen.kinematics, reaction)
     bias_force(model, seen.kinematics, memory.force)
     passive_force(model, seen.q, seen.v, memory.passive)
     for j in range(robot.nv):
@@ -211,8 +211,8 @@ def correct(
     follow_speeds(robot, seen)
     hold_standing(robot, memory)
     if robot.held.count > 0:
-        solve_rows(robot.motor, robot.held)
-        find_response(robot.model, seen.kinematics, robot.held, memory.reaction)
+        solve_rows(robot.unactuated, robot.held)
+        find_response(robot.model, robot.held, seen.kinematics, memory.reaction)
         change_least(robot.held, memory.reaction, seen.v)
     robot.update(seen)
 

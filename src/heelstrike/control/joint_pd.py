@@ -16,13 +16,8 @@ from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import array, number
 from heelstrike.control.arguments import check_gait
-from heelstrike.control.computed_torque import (
-    Stance,
-    StepTiming,
-    has_landed,
-    pitch_of,
-    restart_at_touchdown,
-)
+from heelstrike.control.computed_torque import pitch_of
+from heelstrike.control.followed_gait import FollowedGait, followed
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.polynomials import motion_in_piece, place_in_step
@@ -32,6 +27,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller, per_actuator
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+from heelstrike.sim.controller.stance_clock import StanceClock, exchange_at_touchdown, has_landed
 
 
 class Feedforward(StrEnum):
@@ -52,24 +48,19 @@ class Feedforward(StrEnum):
     FULL = "full"
 
 
-class Parameters(StepTiming):
+class Parameters(FollowedGait):
     """Numbers of the law."""
 
     kp: Floats = array("nu")
     kd: Floats = array("nu")
     """kp, kd: Stiffness (N m/rad) and damping (N m s/rad)."""
-    breakpoints: Floats = array("pieces + 1")
-    coefficients: Floats = array(2, "pieces", "terms", "nu")
-    """The gait, as in :mod:`heelstrike.control.computed_torque`."""
-    latest: float = number(float)
-    """The reference goes on along its polynomials until this time in a step (s)."""
     weight: int = number(int)
     motion: int = number(int)
     """weight, motion: Whether the weight, and whether velocities and accelerations are fed
     forward."""
 
 
-class Memory(Stance):
+class Memory(StanceClock):
     """What the law remembers."""
 
     position: Floats = array("nu")
@@ -84,8 +75,8 @@ def joint_pd(
     parameters: Parameters, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques of the law above."""
-    restart_at_touchdown(t, contacts, robot, parameters, memory)
-    landed = has_landed(t, state, contacts, robot, parameters, memory)
+    exchange_at_touchdown(t, t - memory.start, parameters.earliest, contacts, robot, memory)
+    landed = has_landed(t, parameters.landing, state, contacts, robot, memory)
     piece, inside, moves = place_in_step(
         t - memory.start, parameters.latest, parameters.breakpoints
     )
@@ -174,18 +165,10 @@ class JointPD(Law):
         kp, kd = per_actuator("kp", kp, robot), per_actuator("kd", kd, robot)
         if np.any(kp < 0.0) or np.any(kd < 0.0):
             raise ControllerError(f"kp and kd must not be negative, got {kp} and {kd}")
-        sides = [gait.pieces, gait.mirrored_pieces()]
-        if gait.stance_foot:
-            sides.reverse()
-        duration = gait.step_duration
         parameters = Parameters(
             kp=kp,
             kd=kd,
-            breakpoints=gait.breakpoints,
-            coefficients=np.array(sides),
-            earliest=0.5 * duration,
-            latest=1.1 * duration,
-            landing=0.02 * duration,
+            **followed(gait),
             weight=int(known is not Feedforward.NONE),
             motion=int(known is Feedforward.FULL),
         )

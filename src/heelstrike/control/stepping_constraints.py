@@ -25,7 +25,6 @@ from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import gains_of, must_be, number_of
 from heelstrike.control.bearable import GROUND_ROWS, JOINT_ROWS, Bearable, Bounds, bear, prepare
-from heelstrike.control.computed_torque import LANDED_SPEED, approaching_speed
 from heelstrike.control.virtual_constraints import series
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.family import StepFamily
@@ -34,6 +33,7 @@ from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance import joint_torques
+from heelstrike.sim.controller.stance_clock import StanceClock, exchange_at_touchdown, has_landed
 
 # Phases, in parts of half a step from its middle, between which one shift goes over to the next.
 BEGINS, ENDS = -0.8, 0.5
@@ -79,15 +79,11 @@ class Parameters(Bundle):
     """Chebyshev series of the usual energy, by powers of the slope."""
 
 
-class Memory(Bundle):
+class Memory(StanceClock):
     """What the law remembers; what is not named is scratch."""
 
-    stance: int = cell(int)
-    """The foot that stands."""
     begun: int = cell(int)
     """Whether the step has begun."""
-    landed: int = cell(int)
-    """Whether the foot that stands is past the impact with which it came down."""
     slope: float = cell(float)
     """Slope that is believed, in steepest ones."""
     before: float = cell(float)
@@ -208,18 +204,13 @@ def follow(memory: Memory, theta: float, t: float, t1: float, t2: float) -> None
 
 
 @kernel
-def lands(
-    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
-    memory: Memory,
-) -> bool:  # fmt: skip
-    """Whether the swing foot is on the ground, on the side to which the robot goes."""
-    swing = 1 - memory.stance
-    if contacts.force[robot.foot_contact[swing], 0] <= 0.0:
-        return False
+def ahead_of_swing(state: ControlState, parameters: Parameters, memory: Memory) -> float:
+    """How far (rad) the swing foot is on the side to which the robot goes."""
     _, rate = phase_and_rate(state, parameters.phase, memory.stance)
+    swing = 1 - memory.stance
     theta, _ = phase_and_rate(state, parameters.phase, swing)
     middle = parameters.middle[swing, 0, 0]
-    return theta < middle if rate >= 0.0 else theta > middle
+    return middle - theta if rate >= 0.0 else theta - middle
 
 
 @kernel
@@ -259,8 +250,8 @@ def begin_step(
 
 @kernel
 def note_missing(
-    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
-    memory: Memory,
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
+    parameters: Parameters, memory: Memory,
 ) -> None:  # fmt: skip
     """Note how far the joints are from the gait, until the impact that began the step is over.
 
@@ -274,9 +265,7 @@ def note_missing(
         memory.missing[i] = state.joint_position[i] - memory.value[i]
         memory.bend[i] = state.joint_velocity[i] / rate - memory.gradient[i]
         memory.bend[i] *= 2.0 * FADES * memory.half[0]
-    here = robot.foot_contact[memory.stance]
-    speed = approaching_speed(state.kinematics, contacts, robot.foot_link[memory.stance], here)
-    memory.landed = 1 if speed < LANDED_SPEED else 0
+    has_landed(t, math.inf, state, contacts, robot, memory)
 
 
 @kernel
@@ -303,17 +292,18 @@ def take_up(memory: Memory, theta: float) -> None:
 
 @controller
 def stepping_constraints(
-    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
-    memory: Memory, torque: Floats,
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
+    parameters: Parameters, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques that follow the gait of a family which brings the energy back."""
+    ahead = ahead_of_swing(state, parameters, memory)
     if memory.begun == 0:
         prepare(memory.bearable.program)
-    if memory.begun == 0 or lands(state, contacts, robot, parameters, memory):
-        memory.stance = memory.stance if memory.begun == 0 else 1 - memory.stance
+        begin_step(state, contacts, robot, parameters, memory)
+    elif exchange_at_touchdown(t, ahead, 0.0, contacts, robot, memory):
         begin_step(state, contacts, robot, parameters, memory)
     if memory.landed == 0:
-        note_missing(state, contacts, robot, parameters, memory)
+        note_missing(t, state, contacts, robot, parameters, memory)
     theta, rate = phase_and_rate(state, parameters.phase, memory.stance)
     half = memory.half[0]
     x = (theta - memory.middle[0]) / half

@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.compiler.bundle import Bundle, array, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import (
     gains_of,
@@ -35,9 +35,10 @@ from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance import force_wanted, hold_point, joint_torques
+from heelstrike.sim.controller.stance_clock import StanceClock, exchange_at_touchdown
 
-# A swing foot that meets the ground before this share of the step scuffs; after it, it lands.
-LANDS_AFTER = 0.5
+# A swing foot that meets the ground before the middle of the step, at phase 0, scuffs.
+LANDS_AFTER = 0.0
 # In parts of half a step: so far beyond either end the series goes on, and so far beyond that the
 # postures become straight.
 BEYOND = 0.01
@@ -67,11 +68,9 @@ class Parameters(Bundle):
     """outputs, joints: Outputs of errors of the joints, C, and its inverse."""
 
 
-class Memory(Bundle):
+class Memory(StanceClock):
     """What the law remembers: the foot that stands. The rest is scratch."""
 
-    stance: int = cell(int)
-    """The foot that stands."""
     error: Floats = array("nu")
     error_rate: Floats = array("nu")
     """error, error_rate: How far the joints are from the gait."""
@@ -134,19 +133,6 @@ def phase_of_foot(state: ControlState, parameters: Parameters, foot: int) -> flo
 
 
 @kernel
-def exchange_at_touchdown(
-    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
-    memory: Memory,
-) -> None:  # fmt: skip
-    """Exchange stance and swing when the swing foot has met the ground late enough in the step."""
-    if phase_of_foot(state, parameters, memory.stance) < 2.0 * LANDS_AFTER - 1.0:
-        return
-    swing = 1 - memory.stance
-    if contacts.force[robot.foot_contact[swing], 0] > 0.0:
-        memory.stance = swing
-
-
-@kernel
 def want(
     state: ControlState, robot: ControlledRobot, parameters: Parameters, memory: Memory
 ) -> None:
@@ -183,7 +169,7 @@ def hold_foot(
     """Hold a point foot; the phase is the last row of `robot.held`."""
     hold_point(robot, state, contacts, foot)
     add_row(phase[foot], robot.held)
-    solve_rows(robot.motor, robot.held)
+    solve_rows(robot.unactuated, robot.held)
 
 
 @kernel
@@ -210,11 +196,12 @@ def demand(
 
 @controller
 def virtual_constraints(
-    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
-    memory: Memory, torque: Floats,
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
+    parameters: Parameters, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques that make the outputs obey ÿ = u(y, ẏ) on a point foot."""
-    exchange_at_touchdown(state, contacts, robot, parameters, memory)
+    gone = phase_of_foot(state, parameters, memory.stance)
+    exchange_at_touchdown(t, gone, LANDS_AFTER, contacts, robot, memory)
     want(state, robot, parameters, memory)
     hold_foot(state, contacts, robot, parameters.phase, memory.stance)
     demand(state, robot, memory.wanted, memory.slope)

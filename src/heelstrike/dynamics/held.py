@@ -195,30 +195,43 @@ def solve_row(row: int, coordinate: int, held: HeldRows) -> None:
 
 
 @kernel
-def solve_rows(motor: Integers, held: HeldRows) -> int:
+def largest_left(coordinate: int, held: HeldRows) -> tuple[float, int]:
+    """Largest entry of a coordinate in the rows that are not solved yet, and its row."""
+    best = 0.0
+    row = FREE
+    for i in range(held.count):
+        if held.coordinate[i] == FREE and abs(held.solved[i, coordinate]) > best:
+            best = abs(held.solved[i, coordinate])
+            row = i
+    return best, row
+
+
+@kernel
+def solve_rows(preferred: Integers, held: HeldRows) -> int:
     """Solve the rows by their largest entries; return their rank.
 
-    Coordinates without a motor, -1 in (nv,), are solved for before others.
+    Coordinates that are preferred, those without a motor, are solved for before others.
     """
-    rows, count, size = held.solved, held.count, held.row.shape[0]
+    count, size = held.count, held.row.shape[0]
     begin_solving(held)
     largest = 0.0
     for i in range(count):
         for j in range(size):
-            largest = max(largest, abs(rows[i, j]))
+            largest = max(largest, abs(held.rows[i, j]))
     rank = 0
-    for driven in range(2):
+    for others in range(2):
         while rank < count:
             best = NO_PIVOT * largest
             row = FREE
             coordinate = FREE
-            for j in range(size):
-                if (motor[j] >= 0) == (driven == 1) and held.row[j] == FREE:
-                    for i in range(count):
-                        if held.coordinate[i] == FREE and abs(rows[i, j]) > best:
-                            best = abs(rows[i, j])
-                            row = i
-                            coordinate = j
+            for k in range(size if others == 1 else preferred.shape[0]):
+                j = k if others == 1 else preferred[k]
+                if held.row[j] == FREE:
+                    entry, place = largest_left(j, held)
+                    if entry > best:
+                        best = entry
+                        row = place
+                        coordinate = j
             if row == FREE:
                 break
             solve_row(row, coordinate, held)
@@ -326,7 +339,7 @@ def forces_of_rows(force: Floats, held: HeldRows, exerted: Floats) -> None:
 
 
 @kernel
-def find_response(model: Model, work: Workspace, held: HeldRows, reaction: Reaction) -> None:
+def find_response(model: Model, held: HeldRows, work: Workspace, reaction: Reaction) -> None:
     """Find how the robot answers forces along the rows."""
     mass_matrix(model, work, reaction.matrix)
     factorize(model, reaction.matrix, reaction.factor)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import cache
 from typing import Any
 
@@ -346,3 +347,26 @@ def test_robots_it_cannot_control_are_refused() -> None:
     rabbit = hs.load_robot("rabbit")
     with pytest.raises(ControllerError, match="moves the joints"):
         hs.FootstepFeedback(rabbit, walking.gait())
+
+
+def test_motors_are_asked_for_what_their_lines_leave_at_their_speed() -> None:
+    """A motor that already turns the way it pushes gives less: τ ≤ τ₀ (1 − ω/ω₀), and as much more
+    against its speed."""
+    robot = walking.bravo7()
+    n, joints = robot.nv, robot.model.actuator_joint
+    lines = {"stall_torque": np.full(n, 60.0), "no_load_speed": np.full(n, 8.0)}
+    weak = dataclasses.replace(robot, model=robot.model.replaced(**lines))
+    whole = hs.WholeBody(weak, walking.gait())
+    start, driving = walking.gait().initial_state, 0
+    contacts = hs.Simulation(weak, state=start).contacts
+    for seed in range(6):
+        v = start.v.copy()
+        v[joints] = np.random.default_rng(seed).uniform(-6.0, 6.0, robot.nu)
+        torque = np.asarray(whole.torque(0.0, hs.State(start.q, v), contacts))
+        part = v[joints] / 8.0
+        least, most = 60.0 * (-1.0 - part), 60.0 * (1.0 - part)
+        assert np.all(torque >= least - 1e-9), seed
+        assert np.all(torque <= most + 1e-9), seed
+        at_line = np.isclose(torque, most) | np.isclose(torque, least)
+        driving += int(np.sum(at_line & (torque * part > 0.0)))
+    assert driving > 0  # the line bites where motors drive

@@ -23,22 +23,19 @@ from heelstrike.control.balance.tasks import (
     clear,
     solve_torques,
 )
-from heelstrike.control.computed_torque import has_landed
 from heelstrike.dynamics.kernels import center_of_mass, point_position
 from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+from heelstrike.sim.controller.stance_clock import STEEP, exchange_at_touchdown, has_landed
 
 JUST_BEGUN = 0.05
 """A step has just begun up to this phase."""
 
 TURNING = 0.15
 """How far within the sole a foot presses that touches at one end, as a part of its length."""
-
-STEEP = 0.6
-"""Ground whose normal rises less cannot be stood upon."""
 
 BUMP = 0.1
 """A slope that differs by as much from the one before may be but a bump."""
@@ -85,16 +82,6 @@ def begin_step(t: float, reference: Reference, memory: Memory) -> None:
 
 
 @kernel
-def touched(contacts: Contacts, robot: ControlledRobot, foot: int) -> bool:
-    """Whether a foot touches ground that it could stand on."""
-    for i in range(robot.nc):
-        steep = contacts.normal[i, 1] <= STEEP
-        if robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0 and not steep:
-            return True
-    return False
-
-
-@kernel
 def wall_at(contacts: Contacts, robot: ControlledRobot, foot: int) -> float:
     """Direction away from a wall that a foot touches, along the ground: ±1, and 0 of none."""
     for i in range(robot.nc):
@@ -105,19 +92,16 @@ def wall_at(contacts: Contacts, robot: ControlledRobot, foot: int) -> float:
 
 
 @kernel
-def exchange_at_touchdown(
+def begin_at_touchdown(
     t: float, contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
 ) -> None:
-    """Exchange stance and swing when the swing foot has met the ground."""
-    early = memory.phase < parameters.touchdown
-    if early or t - memory.start < TOO_EARLY * parameters.planning.earliest:
+    """Begin the next step when the swing foot has met the ground."""
+    soon = t - memory.start < TOO_EARLY * parameters.planning.earliest
+    if soon or memory.lifting == 1:
         return
-    swing = 1 - memory.stance
-    if memory.lifting == 0 and touched(contacts, robot, swing):
+    if exchange_at_touchdown(t, memory.phase, parameters.touchdown, contacts, robot, memory):
         # Where it stood: by now the impact may have lifted it.
         memory.rear[0], memory.rear[1] = memory.sole[0], memory.sole[1]
-        memory.stance = swing
-        memory.landed = 0
         memory.steps += 1
         # Some time since the last call; half of it is wrong by no more than half of it. A walk
         # then keeps step with the calls, its touchdowns midway between two.
@@ -490,11 +474,11 @@ def keep_balance(
     parameters: Parameters, memory: Memory, log: Log, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques that walk, by the gait or by where the next foot has to land."""
-    exchange_at_touchdown(t, contacts, robot, parameters, memory)
+    begin_at_touchdown(t, contacts, robot, parameters, memory)
     locate(state, robot, parameters, memory)
     lift_over(t, contacts, robot, parameters, memory)
     comes_down = memory.landed == 0
-    landed = has_landed(t, state, contacts, robot, parameters, memory)
+    landed = has_landed(t, parameters.landing, state, contacts, robot, memory)
     if comes_down and landed:
         learn_slope(parameters, memory)
     stand_or_walk(t, parameters, memory)

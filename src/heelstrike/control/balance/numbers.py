@@ -6,9 +6,9 @@ from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.control.balance.constrained import Constrained
 from heelstrike.control.balance.footsteps import Plan, Planning
 from heelstrike.control.balance.reference import Reference
-from heelstrike.control.computed_torque import Landing, Stance
 from heelstrike.control.quadratic.program import Program
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.sim.controller.stance_clock import StanceClock
 
 
 class Weights(Bundle):
@@ -45,7 +45,7 @@ class Legs(Bundle):
     """From hip to ankle with a straight knee (m)."""
 
 
-class Parameters(Landing):
+class Parameters(Bundle):
     """Numbers of the law."""
 
     reference: Reference = part(Reference)
@@ -76,6 +76,8 @@ class Parameters(Landing):
     """Of the robot (N)."""
     touchdown: float = number(float)
     """Phase from which on a contact of the swing foot is a touchdown."""
+    landing: float = number(float)
+    """A foot that touches without coming flat counts as landed after this time (s)."""
     calm: float = number(float)
     alarmed: float = number(float)
     """calm, alarmed: Errors of the capture point at the end of the step (m) up to which the gait is
@@ -112,7 +114,7 @@ class Parameters(Landing):
     than this (m)."""
 
 
-class Memory(Stance):
+class Memory(StanceClock):
     """What the law remembers."""
 
     time: float = cell(float)

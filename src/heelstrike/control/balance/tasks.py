@@ -10,6 +10,7 @@ from heelstrike.control.balance.numbers import Memory, Parameters
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import SOLVED, Program
 from heelstrike.robot.model import Floats
+from heelstrike.sim.controller.motors import motor_torque
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
 CONTACT_ROWS = 5
@@ -84,13 +85,11 @@ def add_contact(
 def torque_range(robot: ControlledRobot, state: ControlState, actuator: int) -> tuple[float, float]:
     """Least and greatest torque of a motor at its present speed."""
     model = robot.model
-    joint = model.actuator_joint[actuator]
     least, most = model.torque_lower[actuator], model.torque_upper[actuator]
-    stall = model.stall_torque[joint]
-    if stall < inf:
-        part = state.joint_velocity[actuator] / model.no_load_speed[joint]
-        least, most = max(least, -stall * (1.0 + part)), min(most, stall * (1.0 - part))
-    return least, most
+    return (
+        motor_torque(model, actuator, 0, least, state.v),
+        motor_torque(model, actuator, 0, most, state.v),
+    )
 
 
 @kernel

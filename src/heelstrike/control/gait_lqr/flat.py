@@ -31,6 +31,7 @@ from heelstrike.contact.linearized.slopes import both, contact_slopes, exchanged
 from heelstrike.contact.linearized.strikes import strikes
 from heelstrike.control.computed_torque import pitch_of
 from heelstrike.control.gait_lqr.riccati import over_all_steps
+from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.model import Floats
@@ -80,7 +81,7 @@ class FlatStance:
         """Coordinates (nq,) and velocities (nv,), the foot at rest."""
         q, v = self.position(joints), np.zeros(self.robot.nv)
         v[self.driven] = rates
-        return q, HeldRobot.on(self.robot, q, self.foot.contacts).velocity(v)
+        return q, HeldRobot.on(Evaluation(self.robot, q), self.foot.contacts).velocity(v)
 
     def errors(self, joints: Floats, rates: Floats) -> Floats:
         """Errors of all coordinates by those of the joints, (nq + nv, 2 nu)."""
@@ -97,7 +98,7 @@ class FlatStance:
         mirror = self.robot.mirror
         assert mirror is not None  # see pitch_of
         q, v = self.state(joints, rates)
-        stopped, _ = HeldRobot.on(self.robot, q, self.swing.contacts).stopped(v)
+        stopped, _ = HeldRobot.on(Evaluation(self.robot, q), self.swing.contacts).stopped(v)
         return np.concatenate([mirror.position(q), mirror.velocity(stopped)])[self.rows]
 
 

@@ -13,13 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from heelstrike.compiler.bundle import array, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import check_gait, positive, weights_of
-from heelstrike.control.computed_torque import (
-    Stance,
-    StepTiming,
-    has_landed,
-    pitch_of,
-    restart_at_touchdown,
-)
+from heelstrike.control.computed_torque import pitch_of
+from heelstrike.control.followed_gait import FollowedGait, followed
 from heelstrike.control.gait_lqr.flat import FINE, KEPT, FlatOrbit
 from heelstrike.control.gait_lqr.transverse import multipliers_of
 from heelstrike.errors import ControllerError
@@ -31,6 +26,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+from heelstrike.sim.controller.stance_clock import StanceClock, exchange_at_touchdown, has_landed
 
 REPEATS = 1e-6
 """Impacts may lead this far from the beginning of the gait (rad, rad/s)."""
@@ -39,7 +35,7 @@ FEWEST = 20
 """Calls a step with which the regulator is still one of the step."""
 
 
-class Parameters(StepTiming):
+class Parameters(FollowedGait):
     """Numbers of the law.
 
     Attributes
@@ -48,14 +44,8 @@ class Parameters(StepTiming):
         The foot that stands as torques and gains are given.
     actuator, actuator_sign : (nu,) int and float
         The mirror of the joints.
-    breakpoints : (pieces + 1,) float
-        Times in a step between which one polynomial holds (s).
-    coefficients : (2, pieces, terms, nu) float
-        For either stance foot the joints' polynomials, lowest power first.
     duration : float
         Of a step (s).
-    latest : float
-        The reference goes on along its polynomials until this time in a step (s).
     torque : (places, nu) float
     gains : (places, nu, 2 nu) float
         Torques of the gait, and K, evenly over the step; between them they are linear.
@@ -64,15 +54,12 @@ class Parameters(StepTiming):
     first: int = number(int)
     actuator: Integers = array("nu", of=int)
     actuator_sign: Floats = array("nu")
-    breakpoints: Floats = array("pieces + 1")
-    coefficients: Floats = array(2, "pieces", "terms", "nu")
     duration: float = number(float)
-    latest: float = number(float)
     torque: Floats = array("places", "nu")
     gains: Floats = array("places", "nu", "2 nu")
 
 
-class Memory(Stance):
+class Memory(StanceClock):
     """What the law remembers; the rest is scratch.
 
     Attributes
@@ -108,8 +95,8 @@ def flat_gait_lqr(
     parameters: Parameters, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques of the law above."""
-    restart_at_touchdown(t, contacts, robot, parameters, memory)
-    landed = has_landed(t, state, contacts, robot, parameters, memory)
+    exchange_at_touchdown(t, t - memory.start, parameters.earliest, contacts, robot, memory)
+    landed = has_landed(t, parameters.landing, state, contacts, robot, memory)
     phase = t - memory.start
     find_errors(state, parameters, memory, phase)
     n, first = robot.nu, memory.stance == parameters.first
@@ -224,21 +211,14 @@ class FlatGaitLQR(Law):
         mirror = robot.mirror
         assert mirror is not None  # see pitch_of
         driven = mirror.among(robot.model.actuator_joint)
-        sides = [gait.pieces, gait.mirrored_pieces()]
-        if gait.stance_foot:
-            sides.reverse()
         # Torques that are held until the next call are those of half way there.
         times = np.linspace(0.0, duration, KEPT + 1) + 0.5 * (period or 0.0)
         parameters = Parameters(
             first=gait.stance_foot,
             actuator=driven.joint,
             actuator_sign=driven.sign,
-            breakpoints=gait.breakpoints,
-            coefficients=np.array(sides),
+            **followed(gait),
             duration=duration,
-            earliest=0.5 * duration,
-            latest=1.1 * duration,
-            landing=0.02 * duration,
             torque=orbit.torques(times),
             gains=gains,
         )

@@ -22,6 +22,7 @@ from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+from heelstrike.sim.controller.stance_clock import StanceClock, exchange_at_touchdown
 
 LANDS_AFTER = 0.5
 """A swing foot that meets the ground before this part of the phase scuffs; after it, it lands."""
@@ -66,12 +67,11 @@ class Parameters(Bundle):
     gains: Floats = array("nu", "2 nv", "terms")
 
 
-class Memory(Bundle):
+class Memory(StanceClock):
     """What the law remembers: the foot that stands. The rest is scratch.
 
     Attributes
     ----------
-    stance : int
     x, away : (2 nv,) float
         State as in the walk, and how far from it.
     asked : (nu,) float
@@ -80,7 +80,6 @@ class Memory(Bundle):
         Chebyshev polynomials at the phase.
     """
 
-    stance: int = cell(int)
     x: Floats = array("2 nv")
     away: Floats = array("2 nv")
     asked: Floats = array("nu")
@@ -135,14 +134,12 @@ def value(series: Floats, polynomial: Floats) -> float:
 
 @controller
 def gait_lqr(
-    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
-    memory: Memory, log: Log, torque: Floats,
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
+    parameters: Parameters, memory: Memory, log: Log, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques of the law above."""
     part = seen_as_in_the_walk(state, parameters, memory)
-    swing = 1 - memory.stance
-    if part > LANDS_AFTER and contacts.force[robot.foot_contact[swing], 0] > 0.0:
-        memory.stance = swing
+    if exchange_at_touchdown(t, part, LANDS_AFTER, contacts, robot, memory):
         part = seen_as_in_the_walk(state, parameters, memory)
     log.phase = part
     x = min(max(2.0 * part - 1.0, -1.0 - BEYOND), 1.0 + BEYOND)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.control.arguments import check_gait, gains_of, number_of, positive
 from heelstrike.control.computed_torque import pitch_of
+from heelstrike.control.followed_gait import followed
 from heelstrike.control.regulation.law import regulate_zero_moment_point
 from heelstrike.control.regulation.numbers import PERIOD, Parameters
 from heelstrike.dynamics.inverse_kinematics import leg_joints
@@ -92,24 +93,16 @@ class ZeroMomentPointRegulation(Law):
         friction = gait.friction if friction is None else friction
         chosen = {"friction": friction, "returning": returning, "hurry": hurry}
         _check_numbers(robot, margin, least_force, (slowest, fastest), chosen, bandwidth)
-        sides = [gait.pieces, gait.mirrored_pieces()]
-        if gait.stance_foot:
-            sides.reverse()
-        duration = gait.step_duration
         parameters = Parameters(
             kp=gains_of("kp", kp, robot),
             kd=gains_of("kd", kd, robot),
-            breakpoints=gait.breakpoints,
-            coefficients=np.array(sides),
             ankle=np.array(_ankles(robot)),
-            earliest=0.5 * duration,
-            latest=1.1 * duration,
-            landing=0.02 * duration,
             margin=float(margin),
             least_force=float(least_force) * robot.weight,
             slowest=float(slowest),
             fastest=float(fastest),
             bandwidth=-1.0 if bandwidth is None else float(bandwidth),
+            **followed(gait),
             **{name: float(value) for name, value in chosen.items()},
         )
         begin = {"stance": gait.stance_foot, "landed": 1, "rate": 1.0}

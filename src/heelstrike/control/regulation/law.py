@@ -20,7 +20,6 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.computed_torque import has_landed
 from heelstrike.control.regulation.disturbance import observe, remember
 from heelstrike.control.regulation.interval import narrowed
 from heelstrike.control.regulation.numbers import (
@@ -39,6 +38,7 @@ from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance import hold_sole, joint_torques
+from heelstrike.sim.controller.stance_clock import exchange_at_touchdown, has_landed
 
 JUST_MET = 1e-9
 """Part of its terms by which a bound that the clock has just met may be missed: rounding."""
@@ -52,24 +52,6 @@ def advance(t: float, memory: Memory) -> float:
     memory.rate += elapsed * memory.hurry
     memory.time = t
     return elapsed
-
-
-@kernel
-def exchange_at_touchdown(
-    t: float, contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
-) -> None:
-    """Begin the next step, at the pace of this one, when the swing foot has met the ground."""
-    if memory.clock < parameters.earliest:
-        return
-    swing = 1 - memory.stance
-    for i in range(robot.nc):
-        if robot.contact_foot[i] == swing and contacts.force[i, 0] > 0.0:
-            memory.stance = swing
-            memory.start = t
-            memory.landed = 0
-            memory.clock = 0.0
-            memory.disturbance.known = 0
-            return
 
 
 @kernel
@@ -172,8 +154,11 @@ def regulate_zero_moment_point(
     """Joint torques of the law above."""
     choice, disturbance = memory.choice, memory.disturbance
     elapsed = advance(t, memory)
-    exchange_at_touchdown(t, contacts, robot, parameters, memory)
-    landed = has_landed(t, state, contacts, robot, parameters, memory)
+    # The next step begins at the pace of this one.
+    if exchange_at_touchdown(t, memory.clock, parameters.earliest, contacts, robot, memory):
+        memory.clock = 0.0
+        disturbance.known = 0
+    landed = has_landed(t, parameters.landing, state, contacts, robot, memory)
     if parameters.bandwidth >= 0.0 and landed and disturbance.known == 1 and elapsed > 0.0:
         observe(elapsed, parameters.bandwidth, state, contacts, robot, disturbance)
     foot = memory.stance

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
-from heelstrike.control.computed_torque import Landing, Stance
+from heelstrike.control.followed_gait import FollowedGait
 from heelstrike.control.regulation.disturbance import Disturbance
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.sim.controller.stance_clock import StanceClock
 
 MOMENTS, CONDITIONS = 2, 5
 """Conditions on the ground's wrench: toe and heel, then normal force and both ends of friction."""
@@ -14,22 +15,14 @@ PERIOD = 1e-3
 """Seconds between two calls."""
 
 
-class Parameters(Landing):
-    """Numbers of the law."""
+class Parameters(FollowedGait):
+    """Numbers of the law; `earliest` and `latest` are times of the gait's clock."""
 
     kp: Floats = array("nu")
     kd: Floats = array("nu")
     """kp, kd: Gains (1/s², 1/s)."""
-    breakpoints: Floats = array("pieces + 1")
-    """Times in a step between which one polynomial holds (s)."""
-    coefficients: Floats = array(2, "pieces", "terms", "nu")
-    """For either stance foot the joints' polynomials, lowest power first."""
     ankle: Integers = array(2, of=int)
     """Actuator of the ankle of each foot."""
-    earliest: float = number(float)
-    latest: float = number(float)
-    """earliest, latest: A touchdown counts only after this time of the gait; the reference ends at
-    this (s)."""
     margin: float = number(float)
     """How far the zero moment point stays inside the sole (m)."""
     friction: float = number(float)
@@ -62,7 +55,7 @@ class Choice(Bundle):
     """Numbers that must not be negative, likewise."""
 
 
-class Memory(Stance):
+class Memory(StanceClock):
     """What the law remembers."""
 
     time: float = cell(float)

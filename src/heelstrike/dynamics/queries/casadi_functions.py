@@ -12,6 +12,7 @@ import numpy as np
 from heelstrike import dynamics
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.evaluation import contact_indices
+from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.dynamics.queries.query import VECTORS, docstring
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
 from heelstrike.robot.robot import Robot
@@ -162,24 +163,15 @@ class CasadiDynamics:
         casadi.Function
             Of the inputs above, (nv,) and (2k,).
         """
-        equations = self.contact_equations(contacts)
-        n, k = self.robot.nv, equations.size1_in("contact_force")
-        m = count_rows(self.robot.model)
-        q, v, torque = (
-            casadi.MX.sym(name, getattr(self.robot, VECTORS[name])) for name in ("q", "v", "torque")
-        )
-        unknown = casadi.MX.sym("unknown", n + k + m)
-        pull = [unknown[n + k :]] if m else []
-        residual = equations(q, v, unknown[:n], unknown[n : n + k], torque, *pull)
-        nothing = casadi.DM.zeros(n + k + m)
-        system, right = casadi.substitute(
-            [casadi.jacobian(residual, unknown), -residual], [unknown], [nothing]
-        )
-        solution = casadi.solve(system, right)
+        at, torque = self._traced, self._symbol("torque")
+        points = contact_indices(self.robot, contacts)
+        force = at.applied_force(symbols(torque)) - at.bias_force()
+        acceleration, exerted = HeldRobot.on(at, points).accelerated(force)
+        along = exerted[: 2 * len(points)].reshape(-1, 2)[:, ::-1].ravel()  # z is the normal
         return casadi.Function(
             "contact_forward_dynamics",
-            [q, v, torque],
-            [solution[:n], solution[n : n + k]],
+            [*self._state.values(), torque],
+            [expression(acceleration), expression(along) if len(along) else casadi.SX(0, 1)],
             ["q", "v", "torque"],
             ["acceleration", "contact_force"],
         )

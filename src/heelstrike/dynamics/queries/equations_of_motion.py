@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.dynamics import kernels
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.evaluation import Evaluation
-from heelstrike.dynamics.queries.loops import held
+from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.dynamics.queries.query import of_position, of_state
 from heelstrike.robot.model import Floats, Model
 
@@ -88,7 +89,7 @@ def forward_dynamics(at: Evaluation, force: ArrayLike) -> Floats:
     :func:`heelstrike.contact_forward_dynamics`.
     """
     total, size = at.vector("force", force), at.model.nv
+    if count_rows(at.model):
+        return HeldRobot(at, []).accelerated(total - bias_force.at(at))[0]
     matrix, factor = at.zeros(size, size), at.zeros(size, size)
-    free = at.filled((size,), kernels.forward_dynamics, at.model, total, at.work, matrix, factor)
-    result: Floats = held(at, matrix, free)
-    return result
+    return at.filled((size,), kernels.forward_dynamics, at.model, total, at.work, matrix, factor)

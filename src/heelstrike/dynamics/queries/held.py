@@ -7,16 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from heelstrike.dynamics import held as kernels
 from heelstrike.dynamics.kernels import solve_factorized
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.evaluation import Evaluation
-from heelstrike.robot.model import Floats
-from heelstrike.robot.robot import Robot
+
+Array = NDArray[Any]
+"""Of numbers, or of symbols."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +38,8 @@ class Place:
     """
 
     link: int
-    position: Floats
-    center: Floats
+    position: Array
+    center: Array
     components: int
 
 
@@ -52,7 +54,8 @@ class HeldRobot:
         What is held.
     dependent : sequence of int, optional
         Coordinate that each row is solved for. By default, of numbers, those without a motor first,
-        by the largest entries; rows may then be dependent.
+        by the largest entries; rows may then be dependent. Symbols have none by default: their rows
+        are independent, and answer as :meth:`stopped` and :meth:`accelerated` only.
     loops : bool
         Whether closed loops and couplings are rows, too, after those of the places.
     """
@@ -76,10 +79,12 @@ class HeldRobot:
             )  # fmt: skip
         if loops:
             at.run(kernels.add_loops, model, at.q, at.v, at.work, self.rows)
+        if dependent is None and at.symbolic:
+            self.rows.coordinate[:] = np.arange(size)
+            return
         if dependent is None:
-            motor = np.full(model.nv, -1)
-            motor[model.actuator_joint] = np.arange(model.nu)
-            kernels.solve_rows(motor, self.rows)
+            without_motor = np.setdiff1d(np.arange(model.nv), model.actuator_joint)
+            kernels.solve_rows(without_motor, self.rows)
             return
         at.run(kernels.begin_solving, self.rows)
         for row, coordinate in enumerate(dependent):
@@ -87,11 +92,13 @@ class HeldRobot:
 
     @classmethod
     def on(
-        cls, robot: Robot, q: ArrayLike, contacts: Iterable[int | str], v: ArrayLike | None = None,
-        *, dependent: Sequence[int] | None = None,
-    ) -> HeldRobot:  # fmt: skip
+        cls,
+        at: Evaluation,
+        contacts: Iterable[int | str],
+        *,
+        dependent: Sequence[int] | None = None,
+    ) -> HeldRobot:
         """Hold contact points, on level ground: discs roll."""
-        at = Evaluation(robot, q, v)
         radius = at.model.contact_radius
         places = [
             Place(link, center - np.array([0.0, radius[i]]), center, 2)
@@ -99,17 +106,17 @@ class HeldRobot:
         ]
         return cls(at, places, dependent=dependent)
 
-    def velocity(self, free: Floats) -> Floats:
+    def velocity(self, free: Array) -> Array:
         """Velocities (nv,) of which the independent ones are given."""
         self.rows.target[:] = 0.0
         return self._completed(free)
 
-    def acceleration(self, free: Floats) -> Floats:
+    def acceleration(self, free: Array) -> Array:
         """Accelerations (nv,) of which the independent ones are given."""
         self._keep()
         return self._completed(free)
 
-    def _completed(self, free: Floats) -> Floats:
+    def _completed(self, free: Array) -> Array:
         whole = free.copy()
         self._at.run(kernels.complete, self.rows, whole)
         return whole
@@ -126,7 +133,7 @@ class HeldRobot:
         if self._loops:
             self._at.run(kernels.keep_loops, first, self.rows)
 
-    def reaction(self, force: Floats) -> tuple[Floats, Floats]:
+    def reaction(self, force: Array) -> tuple[Array, Array]:
         """What is exerted of a generalised force (nv,) that is needed, and what others must supply.
 
         Returns
@@ -142,12 +149,12 @@ class HeldRobot:
         self._at.run(kernels.find_left, force, self.rows, rest)
         return exerted, rest
 
-    def stopped(self, v: Floats) -> tuple[Floats, Floats]:
+    def stopped(self, v: Array) -> tuple[Array, Array]:
         """Velocities (nv,) after a plastic impact of all that is held, and its impulses (held,)."""
         self.rows.target[:] = 0.0
         return self._changed(v, self._response())
 
-    def accelerated(self, force: Floats) -> tuple[Floats, Floats]:
+    def accelerated(self, force: Array) -> tuple[Array, Array]:
         """Accelerations (nv,) under a generalised force A v̇ (nv,), and the forces (held,)."""
         self._keep()
         response = self._response()
@@ -160,10 +167,10 @@ class HeldRobot:
         response = kernels.Reaction.allocate(
             {"held": len(self.rows.target), "nv": model.nv}, dtype=object if at.symbolic else None
         )
-        at.run(kernels.find_response, model, at.work, self.rows, response)
+        at.run(kernels.find_response, model, self.rows, at.work, response)
         return response
 
-    def _changed(self, x: Floats, response: kernels.Reaction) -> tuple[Floats, Floats]:
+    def _changed(self, x: Array, response: kernels.Reaction) -> tuple[Array, Array]:
         changed = x.copy()
         self._at.run(kernels.change_least, self.rows, response, changed)
         return changed, response.force[: self.rows.count]

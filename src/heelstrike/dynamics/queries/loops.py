@@ -6,10 +6,6 @@ Rows go loop by loop (x, then z, in world axes), then coupling by coupling; see
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-
 from heelstrike.dynamics.loops import LoopRows, count_rows, find_rows
 from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.query import of_position, of_state
@@ -41,33 +37,3 @@ def loop_jacobian(at: Evaluation) -> Floats:
 def loop_bias_acceleration(at: Evaluation) -> Floats:
     """J̇ v of :func:`loop_jacobian`: while the loops hold, J v̇ + J̇ v is zero."""
     return rows_of(at).bias
-
-
-def held(at: Evaluation, matrix: Any, acceleration: Any) -> Any:
-    """Return an acceleration with what the forces of the loops add to it.
-
-    Parameters
-    ----------
-    at : Evaluation
-        The state.
-    matrix : (nv, nv) array
-        Mass matrix.
-    acceleration : (nv,) array
-        Acceleration without these forces.
-    """
-    rows: Any = rows_of(at)
-    if not rows.displacement.size:
-        return acceleration
-    if not at.symbolic:
-        response = np.linalg.solve(matrix, rows.jacobian.T)
-        lacking = rows.jacobian @ acceleration + rows.bias
-        force = np.linalg.lstsq(rows.jacobian @ response, -lacking, rcond=1e-11)[0]
-        return acceleration + response @ force
-    import casadi
-
-    from heelstrike.dynamics.queries.symbolic import expression, symbols
-
-    free, jacobian = expression(acceleration), expression(rows.jacobian)
-    response = casadi.solve(expression(matrix), jacobian.T)
-    force = casadi.solve(jacobian @ response, -(jacobian @ free + expression(rows.bias)))
-    return symbols(free + response @ force)

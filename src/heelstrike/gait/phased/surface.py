@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from heelstrike import dynamics
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
+from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.errors import GaitError
 from heelstrike.field_texts import dataclass
@@ -96,7 +97,7 @@ class Surface:
 
     def _on_its_foot(self, q: Floats) -> HeldRobot:
         """The robot with its stance foot held, where the trunk is following from the rest."""
-        return HeldRobot.on(self.robot, q, [self._stance], dependent=(0, 1))
+        return HeldRobot.on(Evaluation(self.robot, q), [self._stance], dependent=(0, 1))
 
     def _rows(self, q: Floats, contact: int) -> Floats:
         """Jacobian (2, nv) of a contact point, x and z."""
@@ -158,7 +159,7 @@ class Surface:
         assert mirror is not None
         q, v = self.position(before), self.tangent(before)
         rows = self._rows(q, self._swing)
-        after, impulse = HeldRobot.on(robot, q, [self._swing]).stopped(v)
+        after, impulse = HeldRobot.on(Evaluation(robot, q), [self._swing]).stopped(v)
         q_after, v_after = mirror.position(q), mirror.velocity(after)
         q_after[:2] -= dynamics.contact_positions(robot, q_after)[self._stance]
         inertia = dynamics.mass_matrix(robot, q_after)

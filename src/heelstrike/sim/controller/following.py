@@ -28,7 +28,7 @@ def follow_positions(robot: ControlledRobot, state: ControlState) -> None:
         add_loops(robot.model, state.q, state.v, state.kinematics, held)
         for row in range(count):
             held.target[row] = -held.loops.displacement[row]
-        solve_rows(robot.motor, held)
+        solve_rows(robot.unactuated, held)
         for i in range(count):
             coordinate = held.coordinate[i]
             if coordinate != FREE and robot.motor[coordinate] < 0:
@@ -54,7 +54,7 @@ def follow_speeds(robot: ControlledRobot, state: ControlState) -> None:
     if held.loops.bias.shape[0] > 0:
         held.count = 0
         add_loops(robot.model, state.q, state.v, state.kinematics, held)
-        solve_rows(robot.motor, held)
+        solve_rows(robot.unactuated, held)
         follow_held(robot, state)
 
 

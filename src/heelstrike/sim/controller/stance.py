@@ -59,7 +59,7 @@ def hold_place(
 def hold_sole(robot: ControlledRobot, state: ControlState, link: int, sole: Floats) -> None:
     """Hold a flat foot at a point of its sole; solve `robot.held` for accelerations."""
     hold_place(robot, state, link, sole, sole, 3)
-    solve_rows(robot.motor, robot.held)
+    solve_rows(robot.unactuated, robot.held)
 
 
 @kernel
@@ -81,7 +81,7 @@ def hold_still(robot: ControlledRobot, state: ControlState, foot: int) -> None:
     held.count = 0
     add_place(robot.model, work, link, work.origin[link], 3, held)
     add_loops(robot.model, state.q, state.v, work, held)
-    solve_rows(robot.motor, held)
+    solve_rows(robot.unactuated, held)
     for i in range(robot.nu):
         state.v[robot.model.actuator_joint[i]] = state.joint_velocity[i]
     follow_held(robot, state)
@@ -98,8 +98,27 @@ def force_wanted(robot: ControlledRobot, state: ControlState, force: Floats) -> 
 
 
 @kernel
+def motors_help(robot: ControlledRobot) -> bool:
+    """Whether a coordinate that follows from others has a motor, too."""
+    helped = False
+    for i in range(robot.nu):
+        helped = helped or robot.held.row[robot.model.actuator_joint[i]] != FREE
+    return helped
+
+
+@kernel
 def joint_torques(robot: ControlledRobot, torque: Floats) -> None:
     """Write the torques of least norm that leave ground and loops their part of `robot.force`."""
+    if motors_help(robot):
+        share_torques(robot, torque)
+        return
+    for i in range(robot.nu):
+        torque[i] = left_to_motors(robot.model.actuator_joint[i], robot.force, robot.held)
+
+
+@kernel
+def share_torques(robot: ControlledRobot, torque: Floats) -> None:
+    """Write the torques of least norm where there are more motors than ways to move."""
     held, motor, system, wanted = robot.held, robot.motor, robot.shares, robot.other
     rows, row_of = held.solved, held.row
     count = 0
@@ -143,15 +162,13 @@ def torques_for(
     held, motor, whole, force = robot.held, robot.motor, robot.acceleration, robot.force
     turning = FREE
     reached = True
-    helped = False
     for j in range(robot.nv):
-        helped = helped or (held.row[j] != FREE and motor[j] >= 0)
         if held.row[j] == FREE:
             whole[j] = 0.0 if motor[j] < 0 else acceleration[motor[j]]
             if motor[j] < 0:
                 reached = reached and turning == FREE
                 turning = j
-    if not reached or (turning != FREE and helped):
+    if not reached or (turning != FREE and motors_help(robot)):
         for i in range(robot.nu):
             torque[i] = np.nan
         return
@@ -192,5 +209,5 @@ def point_foot_torque(
     `torque` may be the array `acceleration`.
     """
     hold_point(self, state, contacts, foot)
-    solve_rows(self.motor, self.held)
+    solve_rows(self.unactuated, self.held)
     torques_for(self, state, acceleration, torque)

@@ -1,0 +1,50 @@
+"""A gait that joints follow by time, on either foot, and when its steps may end."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.gait.gait import Gait
+from heelstrike.robot.model import Floats
+
+
+class FollowedGait(Bundle):
+    """Numbers of a law that follows a gait.
+
+    Attributes
+    ----------
+    breakpoints : (pieces + 1,) float
+        Times in a step between which one polynomial holds (s).
+    coefficients : (2, pieces, terms, nu) float
+        For either stance foot the joints' polynomials, lowest power first.
+    earliest : float
+        A touchdown counts only after this time in a step (s).
+    latest : float
+        The reference goes on along its polynomials until this time in a step (s).
+    landing : float
+        A foot that touches without coming flat counts as landed after this time (s).
+    """
+
+    breakpoints: Floats = array("pieces + 1")
+    coefficients: Floats = array(2, "pieces", "terms", "nu")
+    earliest: float = number(float)
+    latest: float = number(float)
+    landing: float = number(float)
+
+
+def followed(gait: Gait) -> dict[str, Any]:
+    """Numbers of `FollowedGait`: touchdowns count in the second half of a step."""
+    sides = [gait.pieces, gait.mirrored_pieces()]
+    if gait.stance_foot:
+        sides.reverse()
+    duration = gait.step_duration
+    return {
+        "breakpoints": gait.breakpoints,
+        "coefficients": np.array(sides),
+        "earliest": 0.5 * duration,
+        "latest": 1.1 * duration,
+        "landing": 0.02 * duration,
+    }
