@@ -10,6 +10,7 @@ from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.event_driven.continuous_extension import Extension
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
 from heelstrike.sim.memory import contact_capacity, dry_joints
 
@@ -141,6 +142,8 @@ class Phase(Bundle):
     slopes : (16, 2 nv) float
     dense : (7, 2 nv) float
         Stages of the step and coefficients of its dense output.
+    extension : Extension
+        What is more exact than that, once there are rows within the step.
     torque : (nu,) float
         Torques at the end of the step, to see whether the controller jumps.
     time : float
@@ -234,6 +237,7 @@ class Phase(Bundle):
     trial: Floats = array("2 nv")
     slopes: Floats = array("stages", "2 nv")
     dense: Floats = array("dense_rows", "2 nv")
+    extension: Extension = part(Extension)
     torque: Floats = array("nu")
     time: float = cell(float)
     next_length: float = cell(float)
