@@ -268,6 +268,12 @@ def arrives(step: float, place: int, answer: ContactAnswer) -> bool:
 
 
 @dissolved_kernel
+def would_close(step: float, place: int, problem: ContactProblem) -> bool:
+    """Whether a candidate would touch at the end of the step if it were free."""
+    return step * problem.free[2 * place] < TOUCHING
+
+
+@dissolved_kernel
 def note_touching(model: Model, step: float, count: int, memory: Memory, impact: Impact) -> None:
     """Keep which of the candidates touch at the end of this step."""
     assembly = memory.assembly
@@ -289,7 +295,7 @@ def falls_into(
             continue
         if arrives(step, place, assembly.answer):
             now = gap_of(model, memory, impact.corner, candidate)
-            new = impact.touching[candidate] != before and problem.free[2 * place] < 0.0
+            new = impact.touching[candidate] != before and would_close(step, place, problem)
             if now < -TOUCHING or (new and now > TOUCHING):
                 return True
     return False
@@ -309,7 +315,7 @@ def find_members(
         if not takes_part:
             now = gap_of(model, memory, impact.corner, candidate)
             touched = impact.touching[candidate] == before
-            stays = touched or problem.free[2 * place] < 0.0
+            stays = touched or would_close(step, place, problem)
             takes_part = now <= TOUCHING or (stays and arrives(step, place, assembly.answer))
         if takes_part:
             impact.member[members] = place
