@@ -5,6 +5,8 @@ All positions, velocities and Jacobians are in world axes: x forward, z up, rota
 
 from __future__ import annotations
 
+from typing import NoReturn
+
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
@@ -40,6 +42,7 @@ from heelstrike.robot.sole import sole
 from heelstrike.sim.controller import stance
 from heelstrike.sim.controller import tied as following
 from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.controller.raised import EndOfRun
 
 NO_ENDING = -1
 """What `ControlledRobot.ending` is while the law lets the run go on."""
@@ -388,8 +391,20 @@ def controlled_robot(robot: Robot) -> ControlledRobot:
     Returns
     -------
     ControlledRobot
-        Its sizes and queries, and a state to ask about.
+        Its sizes and queries, and a state to ask about. Its ``stop`` raises
+        :class:`~heelstrike.EndOfRun`, which is how a controller in Python ends its run.
     """
+    view = robot_view(robot)
+    view.__dict__["stop"] = _end_run  # nobody looks at what a kernel would write here
+    return view
+
+
+def _end_run(ending: int) -> NoReturn:
+    raise EndOfRun(f"ending {ending}")
+
+
+def robot_view(robot: Robot) -> ControlledRobot:
+    """Make the view of a robot that a compiled law has."""
     driven = set(robot.model.actuator_joint.tolist())
     legs, rows = leg_joints(robot), count_rows(robot.model)
     view = ControlledRobot.allocate(
