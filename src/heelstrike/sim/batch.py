@@ -41,6 +41,7 @@ from heelstrike.sim.simulation import (
     Ending,
     check_duration,
     checked_method,
+    has_warned,
     simulation_to_the_end,
 )
 from heelstrike.sim.snapshot import Snapshot
@@ -320,6 +321,7 @@ def _task(
     setting = checked_setting(robot, state, **setup, **about)
     check_duration(duration)
     method.check(setting)
+    has_warned(method, setting)
     method.check_span(setting, duration)
     method.set_clock(setting, Clock())
     if isinstance(parameters, Mapping):

@@ -35,7 +35,7 @@ class Clock(Bundle):
         Height of the centre of mass above the ground below which the robot has fallen (m).
     begun, moving : int
         Whether the first instant has been prepared; whether this one has been decided, so that
-        what is left is to move on.
+        what is left is to move on: 2 where it was to be the last.
     finishing : int
         Whether this instant is to be decided and recorded, but not to be left.
     forked : int

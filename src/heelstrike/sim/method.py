@@ -149,6 +149,21 @@ class Method(ABC):
             That says what, and what to do instead.
         """
 
+    def warning(self, setting: Setting) -> str:  # noqa: ARG002 - for those that have one
+        """Say what a run should not begin without being told.
+
+        Parameters
+        ----------
+        setting : Setting
+            What is to be simulated.
+
+        Returns
+        -------
+        str
+            In a person's words; nothing if there is none.
+        """
+        return ""
+
     def check_span(self, setting: Setting, duration: float) -> None:
         """Refuse a time whose steps cannot be counted, or whose record does not fit into memory.
 

@@ -65,6 +65,17 @@ def test_a_batch_tells_of_them_once_a_run_at_the_line_that_asks_for_it() -> None
     assert [warning.filename for warning in told] == [__file__] * 3
 
 
+def test_a_simulation_tells_of_them_once() -> None:
+    """However often a state is set, or other ground laid."""
+    state = hs.State([0.0, 0.7, 0.0, 0.2], [0.5, 0.0, 0.0, 0.0])
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        simulation = hs.Simulation(sprung(5e4), state=state, stop_when_fallen=False)
+        simulation.state = state
+        simulation.ground = hs.Ground(friction=0.3)
+    assert len(told) == 1
+
+
 @pytest.mark.parametrize("share", [0.0, 0.7, 1.0])
 def test_where_a_spring_or_damper_becomes_too_stiff(share: float) -> None:
     """A wheel I on a spring k and a damper c swings up where h² k / 4 I + h c / 2 I > 1.

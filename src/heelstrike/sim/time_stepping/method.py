@@ -45,7 +45,6 @@ from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
-from heelstrike.robot.warning import warn
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
 from heelstrike.sim.contacts.brakes import note_brakes, share_friction, take_hold
@@ -85,7 +84,7 @@ from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.corners import Corner, join_forces, locate_corners
-from heelstrike.sim.time_stepping.doubts import SimulationWarning, too_light, too_stiff
+from heelstrike.sim.time_stepping.doubts import too_light, too_stiff
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
     TOUCHING,
@@ -259,9 +258,10 @@ class TimeStepping(Method):
                 f"{self.scheme.name} knows plastic impacts only, and this ground has "
                 f"restitution; use Scheme.IMPACT_RESOLVED or Scheme.MOREAU_JEAN"
             )
-        stiff = self._too_stiff(setting.robot, setting.state.q)
-        if stiff:
-            warn(stiff, SimulationWarning)
+
+    def warning(self, setting: Setting) -> str:
+        """Say which spring is too stiff for the step."""
+        return self._too_stiff(setting.robot, setting.state.q)
 
     def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:
         """Say what is too stiff or too light, and how deep a step ended in the ground."""
