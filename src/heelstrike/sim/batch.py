@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import are_numbers, refusal, takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import ControllerError, RobotError, SimulationError
@@ -401,6 +401,9 @@ def _parameters(parameters: Any) -> Sequence[Bundle | Mapping[str, Floats] | Non
             "parameters are a bundle, one bundle a run, or a mapping of names to arrays with one "
             f"entry a run; got {type(parameters).__name__}"
         )
+    for name, values in parameters.items():
+        if not are_numbers(values):
+            raise SimulationError(refusal(f"parameters: {name}", values, ("ArrayLike",)))
     columns = {name: np.asarray(values, dtype=np.float64) for name, values in parameters.items()}
     shapes = {name: values.shape for name, values in columns.items()}
     if len({shape[:1] for shape in shapes.values()} | {()}) != 2:

@@ -6,12 +6,13 @@ import sys
 import time as clock_time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import Any, NoReturn, Unpack
 
 import numpy as np
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import refusal, takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
@@ -381,6 +382,7 @@ class Simulation:
         """What a controller told of itself when it was last called."""
         return self._logs.log
 
+    @takes(SimulationError)
     def apply(self, push: Push | Sequence[Push]) -> None:
         """Let a push act, from its beginning or from now on, whichever is later.
 
@@ -448,6 +450,8 @@ class Simulation:
             With ``on_error="raise"``, what the controller raised.
         """
         instant = -np.inf
+        if not isinstance(until, Real):  # cheaper than a look at all arguments: calls are many
+            raise SimulationError(refusal("until", until, ("float",)))
         if np.isfinite(until):
             self.method.check_span(self._setting, max(until - self.time, 0.0))
             instant = self.method.instant(self._clock, until)

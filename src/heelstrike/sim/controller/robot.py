@@ -9,6 +9,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame, out_of_frame
@@ -36,6 +37,7 @@ from heelstrike.dynamics.loops import LoopRows, count_rows
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.spatial import momentum_of, power, spatial
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import sole
@@ -371,6 +373,7 @@ def extents_of(robot: Robot) -> dict[str, int]:
     return {**robot.model.extents, "components": 2, "held": held}
 
 
+@takes(ControllerError)
 def controlled_robot(robot: Robot) -> ControlledRobot:
     """Make the view that compiled laws have of a robot, for a controller in Python.
 
@@ -393,6 +396,11 @@ def controlled_robot(robot: Robot) -> ControlledRobot:
     ControlledRobot
         Its sizes and queries, and a state to ask about. Its ``stop`` raises
         :class:`~heelstrike.EndOfRun`, which is how a controller in Python ends its run.
+
+    Raises
+    ------
+    ControllerError
+        If it is none.
     """
     view = robot_view(robot)
     view.__dict__["stop"] = _end_run  # nobody looks at what a kernel would write here
