@@ -116,7 +116,9 @@ class Method(ABC):
     def row_period(self) -> tuple[str, float]:
         """Setting that says how often there is a row, and its value in seconds."""
 
-    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:  # noqa: ARG002
+    def doubts(
+        self, robot: Robot, q: Floats, sunk: float = 0.0, past: float = 0.0,  # noqa: ARG002
+    ) -> list[str]:  # fmt: skip
         """Say what makes its answers doubtful, and what to do about it.
 
         Parameters
@@ -127,6 +129,8 @@ class Method(ABC):
             A pose that it goes through.
         sunk : float
             How much deeper (m) in the ground it was than at the beginning.
+        past : float
+            How much farther (rad, m) a joint was beyond a stop than at the beginning.
 
         Returns
         -------
@@ -299,7 +303,9 @@ class UnknownMethod:
     settings: Mapping[str, str | int | float] = field(hash=False)
     impulses_in_events: bool = False
 
-    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:  # noqa: ARG002
+    def doubts(
+        self, robot: Robot, q: Floats, sunk: float = 0.0, past: float = 0.0,  # noqa: ARG002
+    ) -> list[str]:  # fmt: skip
         """Say nothing: nothing is known of it.
 
         Parameters
@@ -310,6 +316,8 @@ class UnknownMethod:
             A pose that it goes through.
         sunk : float
             How much deeper (m) in the ground it was than at the beginning.
+        past : float
+            How much farther (rad, m) a joint was beyond a stop than at the beginning.
 
         Returns
         -------

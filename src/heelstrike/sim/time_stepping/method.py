@@ -124,6 +124,8 @@ FAR_STEPS = 20.0
 CLOSING_RATE = 20.0
 # Contact points deeper in the ground (m) than this, and than the run began, put it in doubt.
 SUNK = 1e-2
+# The same of joints beyond their stops (rad, m): 20 rad/s for a millisecond.
+PAST = 2e-2
 
 
 class Stepping(Bundle):
@@ -263,13 +265,21 @@ class TimeStepping(Method):
         """Say which spring is too stiff for the step."""
         return self._too_stiff(setting.robot, setting.state.q)
 
-    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:
-        """Say what is too stiff or too light, and how deep a step ended in the ground."""
+    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0, past: float = 0.0) -> list[str]:
+        """Say what is too stiff or too light, and how far a step went too far."""
         deep = (
             f"a step ended with a contact point {sunk:.2g} m in the ground: it turned too far in a "
             f"step of {self.step:g} s, which has to be shorter"
         )
-        found = (self._too_stiff(robot, q), too_light(robot, q), deep if sunk > SUNK else "")
+        beyond = (
+            f"a step ended with a joint {past:.2g} rad or m beyond its stop: "
+            f"Scheme.{self.scheme.name} sees a stop once it is passed. Use a shorter step than "
+            f"{self.step:g} s, or Scheme.IMPACT_RESOLVED"
+        )
+        found = (
+            self._too_stiff(robot, q), too_light(robot, q), deep if sunk > SUNK else "",
+            beyond if past > PAST else "",
+        )  # fmt: skip
         return [doubt for doubt in found if doubt]
 
     def _too_stiff(self, robot: Robot, q: Floats) -> str:
