@@ -450,8 +450,9 @@ class Simulation:
             With ``on_error="raise"``, what the controller raised.
         """
         instant = -np.inf
-        if not isinstance(until, Real):  # cheaper than a look at all arguments: calls are many
-            raise SimulationError(refusal("until", until, ("float",)))
+        given: object = until
+        if not isinstance(given, Real):  # cheaper than a look at all arguments: calls are many
+            raise SimulationError(refusal("until", given, ("float",)))
         if np.isfinite(until):
             self.method.check_span(self._setting, max(until - self.time, 0.0))
             instant = self.method.instant(self._clock, until)
