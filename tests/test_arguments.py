@@ -133,6 +133,10 @@ def test_another_thing_than_is_taken_is_refused_in_words(name: str) -> None:
 STATE = walking.bravo7().reference_state()
 
 
+def simulation() -> hs.Simulation:
+    return hs.Simulation(walking.bravo7(), state=STATE)
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [
@@ -158,6 +162,19 @@ STATE = walking.bravo7().reference_state()
         ),
         (lambda: hs.load_robot("bravo7", floating=1), "floating must be True or False, got 1"),  # type: ignore[arg-type]
         (lambda: hs.load_robot("bravo7", package_path=[2]), "a folder of package_path must be"),  # type: ignore[list-item]
+        (lambda: simulation().advance("1"), r"until must be a number, got '1'"),  # type: ignore[arg-type]
+        (lambda: simulation().apply(1), "push must be"),  # type: ignore[arg-type]
+        (lambda: hs.control.controlled_robot("bravo7"), "robot must be a Robot"),  # type: ignore[arg-type]
+        (lambda: hs.dynamics.mass_matrix("bravo7", [0.0]), "robot must be a Robot"),  # type: ignore[arg-type]
+        (lambda: hs.dynamics.mass_matrix(walking.bravo7(), "a"), "q must be numbers, got 'a'"),
+        (lambda: hs.controller(3), "a controller must be a function, got 3"),  # type: ignore[call-overload]
+        (lambda: hs.controller(endings="fell")(print), "endings are several texts, got 'fell'"),
+        (
+            lambda: hs.simulate_batch(
+                walking.bravo7(), parameters={"k": ["a"]}, state=[STATE], duration=0.01
+            ),
+            "parameters: k must be numbers",
+        ),
     ],
 )
 def test_what_is_said(call: Callable[[], object], said: str) -> None:

@@ -350,6 +350,13 @@ def test_what_cannot_be() -> None:
         hs.Sensed(stand)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("shell", [hs.Actuated, hs.Sensed, hs.Estimated])
+@pytest.mark.parametrize("period", [0.0, -1e-3, float("nan"), float("inf")])
+def test_a_period_is_a_time(shell: Any, period: float) -> None:
+    with pytest.raises(hs.ControllerError, match=r"the period of .* must be a positive number"):
+        shell(law(), period=period)
+
+
 def test_a_robot_without_pitch_has_no_imu() -> None:
     build = hs.RobotBuilder("wheel")
     build.hinge("axle", None, inertia=0.5, torque=10.0)

@@ -57,6 +57,23 @@ def test_a_rod_lands_on_its_other_end(phase: float, restitution: float) -> None:
     np.testing.assert_allclose(ends, [restitution * speed, 0.0], atol=slack)
 
 
+@pytest.mark.parametrize("left", [5e-8, 9e-10, 5e-10, 0.0, -5e-10])
+def test_a_ball_that_all_but_arrives_in_a_step_bounces(left: float) -> None:
+    """However near to the ground (m) the end of a step is. Newton: up with e times its speed."""
+    step, speed, restitution = 1e-3, 1.0, 0.5
+    builder = hs.RobotBuilder("ball", gravity=0.0)
+    builder.floating_base("ball", (0.0, 0.0), mass=1.0, inertia=0.1)
+    builder.contact("ball", (0.0, 0.0))
+    run = hs.simulate(
+        builder.build(),
+        state=hs.State([0.0, 5.0 * step * speed + left, 0.0], [0.0, -speed, 0.0]),
+        duration=10 * step,
+        method=hs.TimeStepping(step=step),
+        ground=hs.Ground(friction=0.0, restitution=restitution),
+    )
+    assert run.velocity[-1, 1] == pytest.approx(restitution * speed, rel=1e-12)
+
+
 @pytest.mark.parametrize("seed", [65, 139, 301])
 def test_first_order_where_impacts_strike_several_contacts(seed: int) -> None:
     """The worst error of 8 phases of the step falls with it; that of split impacts does not.

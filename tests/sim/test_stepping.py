@@ -370,6 +370,56 @@ def test_what_has_ended_has_ended_until_it_is_restored() -> None:
         falling.advance(0.0005)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_a_robot_that_fell_falls_on_without_that_instant_twice(method: str) -> None:
+    robot, start = walking.bravo7(), walking.gait().initial_state
+    options: dict[str, Any] = {"method": METHODS[method], "control_period": 2e-3}
+    fell = hs.simulate(robot, Sway(), state=start, duration=5.0, **options)
+    assert fell.status is RunStatus.FELL
+    on = fell.time[-1] + 0.05
+    whole = hs.simulate(robot, Sway(), state=start, duration=on, stop_when_fallen=False, **options)
+    falling = hs.Simulation(robot, Sway(), state=fell.final, stop_when_fallen=False, **options)
+    falling.advance(on)
+    assert_same(whole, falling.record, since=fell.time[-1])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_changed_acts_where_a_robot_fell(method: str) -> None:
+    """A push that begins with that instant is all that is new."""
+    fell = hs.simulate(
+        walking.bravo7(), state=walking.gait().initial_state, duration=5.0, method=METHODS[method]
+    )
+    push = hs.Push("trunk", force=(3000.0, 0.0), start=fell.time[-1], duration=1e-2)
+    falling, pushed = (
+        hs.Simulation(
+            walking.bravo7(), state=fell.final, method=METHODS[method], stop_when_fallen=False,
+            pushes=pushes,
+        )
+        for pushes in ((), push)
+    )  # fmt: skip
+    for one in (falling, pushed):
+        one.advance(fell.time[-1] + 0.01)
+    robot = walking.bravo7()
+    before, after = (
+        hs.dynamics.momentum(robot, one.state.q, one.state.v)[0] for one in (falling, pushed)
+    )
+    assert after - before > 5.0  # of 30 N s, and the ground holds
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_state_that_is_set_knows_nothing_of_the_old_place(method: str) -> None:
+    """No force, no touchdown and no lift-off of where the robot was."""
+    standing = simulation(method, "none", stop_when_fallen=False)
+    standing.advance(0.1)
+    assert standing.contacts.force.any()
+    up = walking.gait().initial_state
+    standing.forget()
+    standing.state = hs.State(up.q + np.array([0.0, 0.5, *np.zeros(len(up.q) - 2)]), up.v)
+    assert not standing.contacts.force.any()
+    standing.advance(0.15)
+    assert not [each for each in standing.record.events if each.contact < 4]
+
+
 def test_ctrl_c_stops_and_the_simulation_goes_on() -> None:
     def interrupt(t: float) -> None:
         raise KeyboardInterrupt

@@ -12,7 +12,7 @@ import math
 from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.around import PERIOD, Around, Shell, Shown, inside
+from heelstrike.control.around import Around, Shell, Shown, own_period
 from heelstrike.control.sensing import periods
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats
@@ -152,7 +152,7 @@ class Actuated(Around):
         self, controller: Controller, *, delay: float = 0.0, bandwidth: float | None = None,
         efficiency: float = 1.0, period: float | None = None,
     ) -> None:  # fmt: skip
-        period = min(inside(controller).period or PERIOD, PERIOD) if period is None else period
+        period = own_period(ACTUATED.name, controller, period)
         late = periods("delay", delay, period)
         share, left = 1.0, 0.0
         if bandwidth is not None:

@@ -132,6 +132,21 @@ class AskedInPython(ControllerFunction):
         return type(self), (self.partner,)
 
 
+def own_period(name: str, controller: Controller, period: float | None) -> float:
+    """Return the seconds between two calls of a shell: by default the controller's, 1 ms at most.
+
+    Raises
+    ------
+    ControllerError
+        If `period` is no time.
+    """
+    if period is None:
+        return min(inside(controller).period or PERIOD, PERIOD)
+    if not 0.0 < period < math.inf:
+        raise ControllerError(f"the period of {name!r} must be a positive number (s), got {period}")
+    return period
+
+
 class Around(Law):
     """A shell with a controller inside: a law like any other.
 
@@ -163,10 +178,7 @@ class Around(Law):
         extents: dict[str, int], late: bool = False,
     ) -> None:  # fmt: skip
         law = inside(controller)
-        if period is None:
-            period = min(law.period or PERIOD, PERIOD)
-        if not (0.0 < period < math.inf):
-            raise ControllerError(f"the period of {shell.name!r} must be positive, got {period}")
+        period = own_period(shell.name, controller, period)
         inner = period if law.period is None else law.period
         every = round(inner / period)
         if every < 1 or abs(every * period - inner) > 1e-9 * inner:

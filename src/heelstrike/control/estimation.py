@@ -24,7 +24,7 @@ import numpy as np
 from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.around import PERIOD, Around, Shell, Shown, inside
+from heelstrike.control.around import Around, Shell, Shown, own_period
 from heelstrike.dynamics.held import (
     HeldRows,
     Reaction,
@@ -305,7 +305,7 @@ class Estimated(Around):
         for name, value in (("bandwidth", bandwidth), ("threshold", threshold)):
             if not (math.isfinite(value) and value > 0.0):
                 raise ControllerError(f"the {name} of an estimator must be positive, got {value!r}")
-        period = min(inside(controller).period or PERIOD, PERIOD) if period is None else period
+        period = own_period(ESTIMATED.name, controller, period)
         kept = math.exp(-2.0 * math.pi * bandwidth * period)
         own = Parameters(
             period=period, position_gain=1.0 - kept**2, velocity_gain=(1.0 - kept) ** 2,

@@ -15,7 +15,7 @@ import numpy as np
 from heelstrike.arguments import check_fields, takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.around import PERIOD, Around, Shell, Shown, inside
+from heelstrike.control.around import Around, Shell, Shown, own_period
 from heelstrike.control.noise import normal, seeded
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
@@ -371,7 +371,7 @@ class Sensed(Around):
         imu: InertialUnit | None = None, feet: FootSensors | None = None,
         delay: float = 0.0, period: float | None = None, seed: int = 0,
     ) -> None:  # fmt: skip
-        period = min(inside(controller).period or PERIOD, PERIOD) if period is None else period
+        period = own_period(SENSED.name, controller, period)
         late = periods("delay", delay, period)
         seen, unit, under = (
             encoders or Encoders(),

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import are_numbers, refusal, takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import ControllerError, RobotError, SimulationError
@@ -42,6 +42,7 @@ from heelstrike.sim.simulation import (
     Ending,
     check_duration,
     checked_method,
+    has_warned,
     simulation_to_the_end,
 )
 from heelstrike.sim.snapshot import Snapshot
@@ -307,6 +308,7 @@ def _task(
     setting = checked_setting(robot, state, **setup, **about)
     check_duration(duration)
     method.check(setting)
+    has_warned(method, setting)
     method.check_span(setting, duration)
     method.set_clock(setting, Clock())
     if isinstance(parameters, Mapping):
@@ -386,6 +388,9 @@ def _parameters(parameters: Any) -> Sequence[Bundle | Mapping[str, Floats] | Non
             "parameters are a bundle, one bundle a run, or a mapping of names to arrays with one "
             f"entry a run; got {type(parameters).__name__}"
         )
+    for name, values in parameters.items():
+        if not are_numbers(values):
+            raise SimulationError(refusal(f"parameters: {name}", values, ("ArrayLike",)))
     columns = {name: np.asarray(values, dtype=np.float64) for name, values in parameters.items()}
     shapes = {name: values.shape for name, values in columns.items()}
     if len({shape[:1] for shape in shapes.values()} | {()}) != 2:

@@ -34,7 +34,7 @@ class Clock(Bundle):
     begun: int = cell(int)
     moving: int = cell(int)
     """begun, moving: Whether the first instant has been prepared; whether this one has been
-    decided, so that what is left is to move on."""
+    decided, so that what is left is to move on: 2 where it was to be the last."""
     finishing: int = cell(int)
     """Whether this instant is to be decided and recorded, but not to be left."""
     forked: int = cell(int)

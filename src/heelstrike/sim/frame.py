@@ -69,6 +69,9 @@ BAD_CONTROLLER = int(Outcome.BAD_CONTROLLER)
 FORK = int(Outcome.FORK)
 STOPPED = int(Outcome.STOPPED)
 
+# Of an instant that has been decided and recorded, and was the last.
+TOLD = 2
+
 
 class Scene(NamedTuple):
     """What a motion hangs on and no method changes: who decides the torques, robot and ground.
@@ -135,6 +138,10 @@ def frame(kernels: Kernels) -> Callable[..., int]:
         """Advance a simulation until its time is up or something stops it; return what."""
         controller = controller_in(control.function)
         scene = Scene(controller, model, ground)
+        if clock.moving == TOLD:  # taken up again, to be left or looked at
+            if clock.finishing == 0 and clock.time >= clock.until:
+                return DONE
+            clock.moving = 1 - clock.finishing
         while True:
             if is_full(record, clock):
                 return RECORD_FULL
@@ -171,8 +178,10 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                 if code != DONE:
                     return code
                 if center_height(model, ground, memory.equations.tree) < clock.fallen_height:
+                    clock.moving = TOLD
                     return FELL
                 if control.robot.ending >= 0:
+                    clock.moving = TOLD
                     return STOPPED
                 if clock.finishing == 1:
                     return DONE

@@ -267,6 +267,12 @@ class Reported(Bundle):
     stopped: Integers = array("nv", of=int)
     resting: Integers = array("capacity", of=int)
 
+    def forget(self) -> None:
+        """Be as at the beginning."""
+        for each in (self.closed, self.slipping, self.stopped):
+            each[:] = 0
+        self.resting[:] = -1
+
 
 class Memory(Bundle):
     """State of a simulation and all that its kernels write to, in the bundles that they receive.

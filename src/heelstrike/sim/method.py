@@ -119,7 +119,9 @@ class Method(ABC):
     def row_period(self) -> tuple[str, float]:
         """Setting that says how often there is a row, and its value in seconds."""
 
-    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:  # noqa: ARG002
+    def doubts(
+        self, robot: Robot, q: Floats, sunk: float = 0.0, past: float = 0.0,  # noqa: ARG002
+    ) -> list[str]:  # fmt: skip
         """Say what makes its answers doubtful, and what to do about it.
 
         Parameters
@@ -130,6 +132,8 @@ class Method(ABC):
             A pose that it goes through.
         sunk : float
             How much deeper (m) in the ground it was than at the beginning.
+        past : float
+            How much farther (rad, m) a joint was beyond a stop than at the beginning.
 
         Returns
         -------
@@ -151,6 +155,21 @@ class Method(ABC):
         SimulationError
             That says what, and what to do instead.
         """
+
+    def warning(self, setting: Setting) -> str:  # noqa: ARG002 - for those that have one
+        """Say what a run should not begin without being told.
+
+        Parameters
+        ----------
+        setting : Setting
+            What is to be simulated.
+
+        Returns
+        -------
+        str
+            In a person's words; nothing if there is none.
+        """
+        return ""
 
     def check_span(self, setting: Setting, duration: float) -> None:
         """Refuse a time whose steps cannot be counted, or whose record does not fit into memory.
@@ -294,7 +313,9 @@ class UnknownMethod:
     impulses_in_events: bool = False
     """Whether impulses of impacts are in the events of a run, not in the forces of its rows."""
 
-    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:  # noqa: ARG002
+    def doubts(
+        self, robot: Robot, q: Floats, sunk: float = 0.0, past: float = 0.0,  # noqa: ARG002
+    ) -> list[str]:  # fmt: skip
         """Say nothing: nothing is known of it.
 
         Parameters
@@ -305,6 +326,8 @@ class UnknownMethod:
             A pose that it goes through.
         sunk : float
             How much deeper (m) in the ground it was than at the beginning.
+        past : float
+            How much farther (rad, m) a joint was beyond a stop than at the beginning.
 
         Returns
         -------

@@ -286,7 +286,10 @@ class Run(ShownInNotebooks):
             return ""
         begun = max(0.0, -float(self.gap[0].min(initial=0.0)))
         sunk = self.certificates.penetration - begun
-        return "; ".join(self.method.doubts(self.robot, self.position[0], sunk))
+        model = self.robot.model
+        beyond = np.maximum(model.lower - self.position, self.position - model.upper)
+        past = float(np.max(beyond, initial=0.0) - np.max(beyond[0], initial=0.0))
+        return "; ".join(self.method.doubts(self.robot, self.position[0], sunk, past))
 
     @property
     def final_state(self) -> State:

@@ -7,12 +7,13 @@ import sys
 import time as clock_time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from numbers import Real
 from pathlib import Path
 from typing import Any, NoReturn, Unpack
 
 import numpy as np
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import refusal, takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
@@ -22,6 +23,7 @@ from heelstrike.interruption import acknowledge
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.robot.warning import warn
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus
 from heelstrike.sim.contacts.brakes import braked_joints, brakes_of, brakes_on, put_on
@@ -51,7 +53,7 @@ from heelstrike.sim.setting import (
     identity_of,
 )
 from heelstrike.sim.snapshot import Snapshot
-from heelstrike.sim.time_stepping import TimeStepping
+from heelstrike.sim.time_stepping import SimulationWarning, TimeStepping
 
 # Rows of one chunk of the record, and most steps between two looks at Ctrl-C and the progress bar.
 CHUNK = 4096
@@ -213,8 +215,9 @@ class Simulation:
         self.robot, self.method, self._setting = setting.robot, method, setting
         self._given_period = setting.control_period
         self._ground, self._pushes = setting.ground, setting.pushes
+        self._has_warned = False
         if memory is None:
-            method.check(setting)
+            self._check(setting)
         self._memory = allocate_memory(self.robot, self._pushes) if memory is None else memory
         self._memory.q[:] = setting.state.q
         self._memory.v[:] = setting.state.v
@@ -268,12 +271,14 @@ class Simulation:
                 "in the ground; robot.placed(state, ground) gives a state that is not"
             )
         latches_at(self.robot, state, self._ground, self.latched)
-        self.method.check(replace(self._setting, ground=self._ground, state=state))
-        self._memory.q[:], self._memory.v[:] = state.q, state.v
-        loops = self._memory.loops
-        loops.brake_position[:] = state.q[self.robot.model.brake_joint]
+        self._check(replace(self._setting, ground=self._ground, state=state))
+        memory = self._memory
+        memory.q[:], memory.v[:] = state.q, state.v
+        memory.loops.brake_position[:] = state.q[self.robot.model.brake_joint]
+        memory.contacts.force[:] = 0.0
+        memory.reported.forget()
         self.method.forget_ground(self.robot, self._work, self._clock, stops=True)
-        self.method.reconsider(self._work)
+        self._reconsider()
 
     @property
     def contacts(self) -> Contacts:
@@ -299,11 +304,22 @@ class Simulation:
                 f"{float(np.max(deep / at.normal[:, 1])):.3g} m, or lay it before "
                 "the robot is there"
             )
-        self.method.check(replace(self._setting, ground=ground, state=self.state))
+        self._check(replace(self._setting, ground=ground, state=self.state))
         mine, its = self._ground.numbers(), ground.numbers()
         if not all(np.array_equal(mine[name], its[name]) for name in mine):
             self.method.forget_ground(self.robot, self._work, self._clock)
+            self._clock.moving = 0
         self._ground = ground
+
+    def _check(self, setting: Setting) -> None:
+        """Refuse what the method cannot simulate, and warn of what it can hardly, once."""
+        self.method.check(setting)
+        self._has_warned = self._has_warned or has_warned(self.method, setting)
+
+    def _reconsider(self) -> None:
+        """Decide this instant anew, even if it had been: what it hangs on has been changed."""
+        self._clock.moving = 0
+        self.method.reconsider(self._work)
 
     def _depth(self, state: State, ground: Ground) -> Floats:
         """How deep points would be in a ground, (nc,) in m; 0 of those no deeper than now."""
@@ -321,7 +337,7 @@ class Simulation:
     def latched(self, joints: Iterable[str | int]) -> None:
         held = self._memory.loops.held
         held[:] = latches_at(self.robot, self.state, self._ground, joints)
-        self.method.reconsider(self._work)
+        self._reconsider()
 
     @property
     def braked(self) -> tuple[str, ...]:
@@ -335,7 +351,7 @@ class Simulation:
     def braked(self, joints: Iterable[str | int]) -> None:
         wanted = brakes_of(self.robot, joints)
         put_on(self.robot, wanted, self.state, PUT_ON, self._memory)
-        self.method.reconsider(self._work)
+        self._reconsider()
 
     @property
     def controller(self) -> Controller | None:
@@ -371,6 +387,7 @@ class Simulation:
         """What a controller told of itself when it was last called."""
         return self._logs.log
 
+    @takes(SimulationError)
     def apply(self, push: Push | Sequence[Push]) -> None:
         """Let a push act, from its beginning or from now on, whichever is later.
 
@@ -396,6 +413,8 @@ class Simulation:
         share = self._memory.pushes.share  # of those that act
         pushes.share[: len(share)] = share
         self._memory = self._memory.replaced(pushes=pushes)
+        if added:
+            self._clock.moving = 0
 
     def step(self) -> RunStatus:
         """Take one step of the method; return how the simulation goes.
@@ -436,6 +455,9 @@ class Simulation:
             With ``on_error="raise"``, what the controller raised.
         """
         instant = -np.inf
+        given: object = until
+        if not isinstance(given, Real):  # cheaper than a look at all arguments: calls are many
+            raise SimulationError(refusal("until", given, ("float",)))
         if np.isfinite(until):
             self.method.check_span(self._setting, max(until - self.time, 0.0))
             instant = self.method.instant(self._clock, until)
@@ -1027,6 +1049,14 @@ def simulation_to_the_end(
         status, message, simulation.error, state, simulation.time, simulation._event_counts,
         counted(memory), run,
     )  # fmt: skip
+
+
+def has_warned(method: Method, setting: Setting) -> bool:
+    """Warn of what a run should not begin without being told; return whether there is any."""
+    doubt = method.warning(setting)
+    if doubt:
+        warn(doubt, SimulationWarning)
+    return bool(doubt)
 
 
 def check_duration(duration: float) -> None:

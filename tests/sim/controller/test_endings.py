@@ -9,7 +9,7 @@ import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.control import RandomNumbers
+from heelstrike.control import RandomNumbers, controlled_robot
 from heelstrike.sim import RunStatus
 from heelstrike.sim.method import Method
 
@@ -155,6 +155,38 @@ def test_what_its_law_has_ended_goes_on_from_its_end(method: Method) -> None:
     simulation.parameters.time = 1.0
     assert simulation.advance(0.03) is RunStatus.COMPLETED
     assert simulation.time == pytest.approx(0.03, abs=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
+def test_its_last_instant_is_not_decided_twice(method: Method) -> None:
+    """Noise that a law draws tells how often it was called."""
+    start: dict[str, Any] = {"method": method, "control_period": 1e-3}
+    whole = run_of(law(time=1.0, noise=1.0), duration=0.03, **start)
+    ended = run_of(law(noise=1.0), **start)
+    simulation = hs.Simulation(walking.bravo7(), law(noise=1.0), state=ended.final, **start)
+    simulation.parameters.time = 1.0
+    assert simulation.advance(simulation.time) is RunStatus.COMPLETED
+    for _ in range(2):  # a look at the last instant is forgotten
+        assert set(simulation.record.time) <= {ended.time[-1]}
+    simulation.advance(0.03)
+    rest = simulation.record
+    assert rest.time[0] > ended.time[-1]
+    np.testing.assert_array_equal(rest.position, whole.position[whole.time > ended.time[-1]])
+
+
+def test_a_view_of_the_robot_ends_the_run_of_a_controller_in_python() -> None:
+    class Asking:
+        def __init__(self) -> None:
+            self.robot = controlled_robot(walking.bravo7())
+
+        def torque(self, t: float, state: hs.State, contacts: Any) -> Any:
+            if t >= 0.02 - 1e-9:
+                self.robot.stop(2)
+            return np.zeros(6)
+
+    run = run_of(Asking())
+    assert run.status is RunStatus.STOPPED
+    assert run.message == "the controller ended the run at t = 0.02 s: ending 2"
 
 
 def test_a_look_at_the_record_does_not_end_it() -> None:

@@ -65,6 +65,36 @@ def test_a_batch_tells_of_them_once_a_run_at_the_line_that_asks_for_it() -> None
     assert [warning.filename for warning in told] == [__file__] * 3
 
 
+def test_a_simulation_tells_of_them_once() -> None:
+    """However often a state is set, or other ground laid."""
+    state = hs.State([0.0, 0.7, 0.0, 0.2], [0.5, 0.0, 0.0, 0.0])
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        simulation = hs.Simulation(sprung(5e4), state=state, stop_when_fallen=False)
+        simulation.state = state
+        simulation.ground = hs.Ground(friction=0.3)
+    assert len(told) == 1
+
+
+def test_a_joint_beyond_its_stop_is_told_of() -> None:
+    """At 60 rad/s a scheme that sees a stop once it is passed is 0.06 rad beyond it after 1 ms."""
+
+    def swung(scheme: hs.Scheme) -> hs.Run:
+        build = hs.RobotBuilder("wheel", gravity=0.0)
+        build.hinge("axle", None, mass=1.0, inertia=0.1, limits=(-0.5, 0.5))
+        return hs.simulate(
+            build.build(), state=hs.State([0.47], [60.0]), duration=0.01,
+            method=hs.TimeStepping(scheme=scheme),
+        )  # fmt: skip
+
+    assert not swung(hs.Scheme.IMPACT_RESOLVED).doubt
+    run = swung(hs.Scheme.MOREAU_JEAN)
+    past = float(run.position.max()) - 0.5
+    assert past > 0.02
+    assert f"a joint {past:.2g} rad or m beyond its stop" in run.doubt
+    assert not judge(run).good
+
+
 @pytest.mark.parametrize("share", [0.0, 0.7, 1.0])
 def test_where_a_spring_or_damper_becomes_too_stiff(share: float) -> None:
     """A wheel I on a spring k and a damper c swings up where h² k / 4 I + h c / 2 I > 1.
@@ -106,7 +136,7 @@ def test_a_step_that_ends_deep_in_the_ground_is_no_good_run() -> None:
     assert run.doubt in " ".join(str(run.summary()).split())
     assert not judge(run).good
     sunk = dataclasses.replace(run, gap=np.full_like(run.gap, -run.certificates.penetration))
-    assert not sunk.doubt
+    assert "m in the ground" not in sunk.doubt
 
 
 def test_a_link_with_next_to_no_inertia_fails_in_words_and_what_to_do_helps() -> None:

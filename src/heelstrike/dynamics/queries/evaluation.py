@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import are_numbers, refusal
 from heelstrike.dynamics import kernels
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import RobotError
@@ -34,6 +35,8 @@ class Evaluation:
     """
 
     def __init__(self, robot: Robot, q: ArrayLike, v: ArrayLike | None = None) -> None:
+        if not isinstance(robot, Robot):
+            raise RobotError(refusal("robot", robot, ("Robot",)))
         self.robot, self.model = robot, robot.model
         self.symbolic = isinstance(q, np.ndarray) and q.dtype == object
         self.q = self.vector("q", q)
@@ -109,6 +112,8 @@ def joint_vector(robot: Robot, name: str, value: ArrayLike) -> Floats:
         That names them, if it has another length.
     """
     entries = robot.actuator_names if name == "torque" else robot.joint_names
+    if not are_numbers(value):
+        raise RobotError(refusal(name, value, ("ArrayLike",)))
     vector = np.ascontiguousarray(value, dtype=np.float64)
     if vector.shape != (len(entries),):
         raise RobotError(
@@ -120,7 +125,7 @@ def joint_vector(robot: Robot, name: str, value: ArrayLike) -> Floats:
 
 def plane_vector(name: str, value: ArrayLike) -> Floats:
     """Return a point or vector (x, z) of the plane, (2,), or raise a `RobotError`."""
-    vector = np.ascontiguousarray(value, dtype=np.float64)
+    vector = np.ascontiguousarray(value if are_numbers(value) else (), dtype=np.float64)
     if vector.shape != (2,) or not np.all(np.isfinite(vector)):
         raise RobotError(f"{name} must be two finite numbers (x, z) in metres, got {value!r}")
     return vector

@@ -21,8 +21,8 @@ from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.robot import (
     ControlledRobot,
     ControlState,
-    controlled_robot,
     extents_of,
+    robot_view,
 )
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ class ReadyLaw:
         shown: dict[str, Any] = {
             "state": ControlState.allocate(extents),
             "contacts": Contacts.allocate(extents),
-            "robot": controlled_robot(robot),
+            "robot": robot_view(robot),
         }
         self._shown: dict[str, Bundle] = {}
         if law.function.is_ours and tree is not None and contacts is not None:

@@ -13,6 +13,7 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.arguments import refusal, shown
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.bundle_type import bundle_at
 from heelstrike.compiler.compilation import (
@@ -65,6 +66,11 @@ class ControllerFunction:
         self, function: Callable[..., None], compiles: bool, scope: Mapping[str, Any],
         endings: Sequence[str] = (),
     ) -> None:  # fmt: skip
+        if not callable(function):
+            raise ControllerError(refusal("a controller", function, ("Callable",)))
+        several = isinstance(endings, Sequence) and not isinstance(endings, str)
+        if not several or not all(isinstance(each, str) for each in endings):
+            raise ControllerError(f"endings are several texts, got {shown(endings)}")
         self.python: Callable[..., None] = getattr(function, "py_func", function)
         update_wrapper(self, self.python)
         self.function = function

@@ -5,10 +5,12 @@ All positions, velocities and Jacobians are in world axes: x forward, z up, rota
 
 from __future__ import annotations
 
+from typing import NoReturn
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.mold import Mold
@@ -38,11 +40,13 @@ from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.spatial import momentum_of, power, spatial
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import sole
 from heelstrike.sim.controller import following, stance
 from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.controller.raised import EndOfRun
 
 NO_ENDING = -1
 """What `ControlledRobot.ending` is while the law lets the run go on."""
@@ -347,6 +351,7 @@ def extents_of(robot: Robot) -> dict[str, int]:
     return {**robot.model.extents, "components": 2, "held": held}
 
 
+@takes(ControllerError)
 def controlled_robot(robot: Robot) -> ControlledRobot:
     """Make the view that compiled laws have of a robot, for a controller in Python.
 
@@ -367,8 +372,25 @@ def controlled_robot(robot: Robot) -> ControlledRobot:
     Returns
     -------
     ControlledRobot
-        Its sizes and queries, and a state to ask about.
+        Its sizes and queries, and a state to ask about. Its ``stop`` raises
+        :class:`~heelstrike.EndOfRun`, which is how a controller in Python ends its run.
+
+    Raises
+    ------
+    ControllerError
+        If it is none.
     """
+    view = robot_view(robot)
+    view.__dict__["stop"] = _end_run  # nobody looks at what a kernel would write here
+    return view
+
+
+def _end_run(ending: int) -> NoReturn:
+    raise EndOfRun(f"ending {ending}")
+
+
+def robot_view(robot: Robot) -> ControlledRobot:
+    """Make the view of a robot that a compiled law has."""
     if robot not in _MOLDS:
         _MOLDS[robot] = Mold(_laid_out(robot))
     return _MOLDS[robot].cast()

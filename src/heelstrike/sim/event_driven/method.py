@@ -165,9 +165,9 @@ class EventDriven(Method):
         Longest step in seconds; an open contact point that would touch the ground and leave it
         again within a quarter of this may only be seen thanks to its velocity.
     output_period : float or None
-        Seconds between two rows of the record, which come from the dense output: they change no
-        step, and are up to some ten times as wrong as the ends of steps. None for a row at every
-        step. Events have rows of their own: one, or two if velocities jump.
+        Seconds between two rows of the record, which change no step and are about as exact as the
+        ends of steps. None for a row at every step. Events have rows of their own: one, or two if
+        velocities jump.
     solver : str
         Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``.
     swing_feet_pass : bool

@@ -20,6 +20,7 @@ from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.rows import contact_count
+from heelstrike.sim.event_driven.continuous_extension import Extension
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
 
 Floats = NDArray[np.float64]
@@ -245,6 +246,8 @@ class Step(Bundle):
         The same before it is put on its constraints; scratch.
     dense : (7, 2 nv) float
         Coefficients of its dense output.
+    extension : Extension
+        What is more exact than that, once there are rows within the step.
     end_force : (contacts, 2) float
         Contact forces at its end (N).
     torque : (nu,) float
@@ -269,6 +272,7 @@ class Step(Bundle):
     end: Floats = array("2 nv")
     unsettled: Floats = array("2 nv")
     dense: Floats = array("dense_rows", "2 nv")
+    extension: Extension = part(Extension)
     end_force: Floats = array("contacts", "components")
     torque: Floats = array("nu")
     length: float = cell(float)

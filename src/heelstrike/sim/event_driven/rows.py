@@ -1,4 +1,4 @@
-"""Rows of the record of an event-driven run: at events, and in between from the dense output."""
+"""Rows of the record of an event-driven run: at events, and in between from the step about them."""
 
 from __future__ import annotations
 
@@ -12,6 +12,13 @@ from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import slides
+from heelstrike.sim.event_driven.continuous_extension import (
+    BETWEEN,
+    PLACES,
+    fit_correction,
+    interpolate_corrected,
+    move_places,
+)
 from heelstrike.sim.event_driven.corners import record_corner
 from heelstrike.sim.event_driven.dormand_prince import interpolate
 from heelstrike.sim.event_driven.dynamics import (
@@ -41,6 +48,9 @@ ROWS_OF_AN_INSTANT = 4
 WRITTEN, NO_ROOM, TOO_FAR = 0, 1, 2
 # Part of a step from which on a row is at its end.
 AT_ITS_END = 0.999
+# Slopes within a step are evaluated again, so often at most, where they move it by more than so
+# many tolerances: each time what is left is a sixteenth or so.
+REPEATED, FAR = 3, 4.0
 
 
 @kernel
@@ -201,6 +211,32 @@ def is_inside(time: float, begin: float, length: float) -> bool:
 
 
 @kernel
+def extend(scene: Scene, control: Control, memory: Memory, phase: Phase, step: Step) -> None:
+    """Correct the dense output of the finished step by the slopes that the motion has on it.
+
+    Where that leads nowhere, as under a torque that switches, the dense output stays as it is.
+    """
+    extension, moved = step.extension, 0.0
+    for j in range(BETWEEN):
+        interpolate(PLACES[j], step.begin, step.dense, extension.state[j])
+    for _ in range(REPEATED):
+        for j in range(BETWEEN):
+            time = step.time + PLACES[j] * step.length
+            state, slope = extension.state[j], extension.slope[j]
+            evaluate(scene, time, state, control, memory, phase, slope)
+        fit_correction(step.length, step.dense, extension.slope, extension.correction)
+        moved = move_places(
+            step.begin, step.end, step.dense, step.relative, step.absolute, extension
+        )
+        if not moved > FAR:
+            break
+    if not moved <= INTERPOLATED:
+        for k in range(extension.correction.shape[0]):
+            for i in range(step.begin.shape[0]):
+                extension.correction[k, i] = 0.0
+
+
+@kernel
 def write_rows_within(
     scene: Scene, control: Control, memory: Memory, phase: Phase, step: Step, impact: Impact,
     output: Output, record: Record,
@@ -216,7 +252,7 @@ def write_rows_within(
     period = output.period * output.every
     last = step.time + step.length
     first, next_row, last_row = record.rows, output.next_row, output.last_row
-    touch = False
+    touch, is_extended = False, False
     if step.has_fired == 1:
         last -= 1e-12
         for contact in range(modes.watched):
@@ -242,7 +278,10 @@ def write_rows_within(
         if record.rows + ROWS_OF_AN_INSTANT > record.time.shape[0]:
             return NO_ROOM
         if part < 1.0:
-            interpolate(part, step.begin, step.dense, state)
+            if not is_extended:
+                extend(scene, control, memory, phase, step)
+                is_extended = True
+            interpolate_corrected(part, step.begin, step.dense, step.extension.correction, state)
         else:  # the end has been put on its constraints, and on the event
             for i in range(state.shape[0]):
                 state[i] = step.end[i]

@@ -241,6 +241,12 @@ def arrives(step: float, place: int, answer: ContactAnswer) -> bool:
 
 
 @dissolved_kernel
+def would_close(step: float, place: int, problem: ContactProblem) -> bool:
+    """Whether a candidate would touch at the end of the step if it were free."""
+    return step * problem.free[2 * place] < TOUCHING
+
+
+@dissolved_kernel
 def note_touching(step: float, count: int, memory: Memory, impact: Impact) -> None:
     """Keep which of the candidates touch at the end of this step."""
     assembly = memory.assembly
@@ -257,7 +263,7 @@ def falls_into(step: float, problem: ContactProblem, memory: Memory, impact: Imp
         candidate = assembly.candidate[place]
         now = memory.rows.gap[candidate]
         if now < np.inf and arrives(step, place, assembly.answer):
-            new = impact.touching[candidate] != before and problem.free[2 * place] < 0.0
+            new = impact.touching[candidate] != before and would_close(step, place, problem)
             if now < -TOUCHING or (new and now > TOUCHING):
                 return True
     return False
@@ -274,7 +280,7 @@ def find_members(step: float, problem: ContactProblem, memory: Memory, impact: I
         takes_part = now == np.inf  # dry friction and loops are always there
         if not takes_part:
             touched = impact.touching[candidate] == before
-            stays = touched or problem.free[2 * place] < 0.0
+            stays = touched or would_close(step, place, problem)
             takes_part = now <= TOUCHING or (stays and arrives(step, place, assembly.answer))
         if takes_part:
             impact.member[members] = place

@@ -45,7 +45,6 @@ from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
-from heelstrike.robot.warning import warn
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
 from heelstrike.sim.contacts.brakes import note_brakes, share_friction, take_hold
@@ -94,7 +93,7 @@ from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.corners import join_forces, locate_corners
-from heelstrike.sim.time_stepping.doubts import SimulationWarning, too_light, too_stiff
+from heelstrike.sim.time_stepping.doubts import too_light, too_stiff
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
     TOUCHING,
@@ -134,6 +133,8 @@ FAR_STEPS = 20.0
 CLOSING_RATE = 20.0
 # Contact points deeper in the ground (m) than this, and than the run began, put it in doubt.
 SUNK = 1e-2
+# The same of joints beyond their stops (rad, m): 20 rad/s for a millisecond.
+PAST = 2e-2
 
 
 class Stepping(Bundle):
@@ -270,17 +271,26 @@ class TimeStepping(Method):
                 f"{self.scheme.name} knows plastic impacts only, and this ground has "
                 f"restitution; use Scheme.IMPACT_RESOLVED or Scheme.MOREAU_JEAN"
             )
-        stiff = self._too_stiff(setting.robot, setting.state.q)
-        if stiff:
-            warn(stiff, SimulationWarning)
 
-    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:
-        """Say what is too stiff or too light, and how deep a step ended in the ground."""
+    def warning(self, setting: Setting) -> str:
+        """Say which spring is too stiff for the step."""
+        return self._too_stiff(setting.robot, setting.state.q)
+
+    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0, past: float = 0.0) -> list[str]:
+        """Say what is too stiff or too light, and how far a step went too far."""
         deep = (
             f"a step ended with a contact point {sunk:.2g} m in the ground: it turned too far in a "
             f"step of {self.step:g} s, which has to be shorter"
         )
-        found = (self._too_stiff(robot, q), too_light(robot, q), deep if sunk > SUNK else "")
+        beyond = (
+            f"a step ended with a joint {past:.2g} rad or m beyond its stop: "
+            f"Scheme.{self.scheme.name} sees a stop once it is passed. Use a shorter step than "
+            f"{self.step:g} s, or Scheme.IMPACT_RESOLVED"
+        )
+        found = (
+            self._too_stiff(robot, q), too_light(robot, q), deep if sunk > SUNK else "",
+            beyond if past > PAST else "",
+        )  # fmt: skip
         return [doubt for doubt in found if doubt]
 
     def _too_stiff(self, robot: Robot, q: Floats) -> str:
