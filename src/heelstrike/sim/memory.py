@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
-from heelstrike.compiler.compilation import dissolved_kernel
+from heelstrike.contact.modes import STICK
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
@@ -337,20 +337,6 @@ class Memory(Bundle):
     tally: Tally = part(Tally)
 
 
-@dissolved_kernel
-def note_group(kind: int, first: int, count: int, assembly: Assembly) -> int:
-    """Note that the candidates of a kind are those from `first` on, the last of `count`."""
-    assembly.begin[kind] = first
-    assembly.until[kind] = count
-    return count
-
-
-@dissolved_kernel
-def are_there(kind: int, assembly: Assembly) -> bool:
-    """Whether any candidate is of a kind."""
-    return bool(assembly.until[kind] > assembly.begin[kind])
-
-
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
     nc, model = robot.nc, robot.model
@@ -401,5 +387,6 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         pushes=pushes_on(robot, pushes),
     )  # fmt: skip
     memory.surface.friction[rows.first[DRY_JOINT] : rows.end[DRY_JOINT]] = 1.0
+    memory.reaction.mode[rows.first[LOOP] :] = STICK
     memory.reported.resting[:] = -1
     return memory
