@@ -5,6 +5,9 @@ its kernels are handed, and the kernels that those of this package call.
 """
 
 from heelstrike.compiler.compilation import kernel as kernel
+from heelstrike.contact.modes import SOLVED as SOLVED
+from heelstrike.contact.problem import solve_contact_kernel as solve_contact_kernel
+from heelstrike.dynamics.kernels import integrate as integrate
 from heelstrike.dynamics.kernels import passive_force as passive_force
 from heelstrike.sim.batch import Batch, simulate_batch
 from heelstrike.sim.clock import Clock as Clock
@@ -18,11 +21,35 @@ from heelstrike.sim.compliant.contact_law import (
 )
 from heelstrike.sim.compliant.law import FrictionLaw as FrictionLaw
 from heelstrike.sim.compliant.law import NormalLaw as NormalLaw
+from heelstrike.sim.contacts.brakes import find_loops_of_step as find_loops_of_step
+from heelstrike.sim.contacts.brakes import note_brakes as note_brakes
+from heelstrike.sim.contacts.brakes import share_friction as share_friction
+from heelstrike.sim.contacts.candidates import hold_latched as hold_latched
+from heelstrike.sim.contacts.candidates import list_candidate as list_candidate
+from heelstrike.sim.contacts.candidates import list_dry_joints as list_dry_joints
+from heelstrike.sim.contacts.candidates import locate_stops as locate_stops
+from heelstrike.sim.contacts.candidates import note_answer as note_answer
+from heelstrike.sim.contacts.candidates import note_group as note_group
+from heelstrike.sim.contacts.candidates import write_rows as write_rows
+from heelstrike.sim.contacts.geometry import add_impulse as add_impulse
+from heelstrike.sim.contacts.geometry import assemble_delassus as assemble_delassus
 from heelstrike.sim.contacts.geometry import contact_rows as contact_rows
 from heelstrike.sim.contacts.geometry import contact_velocity as contact_velocity
 from heelstrike.sim.contacts.geometry import evaluate_equations as evaluate_equations
 from heelstrike.sim.contacts.geometry import locate_contacts as locate_contacts
+from heelstrike.sim.contacts.geometry import row_product as row_product
 from heelstrike.sim.contacts.geometry import solve_mass_matrix as solve_mass_matrix
+from heelstrike.sim.contacts.latches import react as react
+from heelstrike.sim.contacts.loops import append_loops as append_loops
+from heelstrike.sim.contacts.loops import close_loops as close_loops
+from heelstrike.sim.contacts.loops import free_loops as free_loops
+from heelstrike.sim.contacts.loops import rows_of as rows_of
+from heelstrike.sim.contacts.loops import steady_loops as steady_loops
+from heelstrike.sim.contacts.rows import DRY_JOINT as DRY_JOINT
+from heelstrike.sim.contacts.rows import LOOP as LOOP
+from heelstrike.sim.contacts.rows import POINT as POINT
+from heelstrike.sim.contacts.rows import SECOND_FACE as SECOND_FACE
+from heelstrike.sim.contacts.rows import STOP as STOP
 from heelstrike.sim.controller.interface import Contacts, Controller
 from heelstrike.sim.controller.raised import ControllerWarning, EndOfRun
 from heelstrike.sim.event_driven import EventDriven
@@ -34,6 +61,7 @@ from heelstrike.sim.frame import Kernels
 from heelstrike.sim.frame import Scene as Scene
 from heelstrike.sim.memory import Memory as Memory
 from heelstrike.sim.method import Method, UnknownMethod
+from heelstrike.sim.method import solver_order as solver_order
 from heelstrike.sim.push import Push
 from heelstrike.sim.push import add_pushes as add_pushes
 from heelstrike.sim.push import share_over_step as share_over_step

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
-from heelstrike.compiler.compilation import dissolved_kernel
 from heelstrike.compiler.mold import Mold
+from heelstrike.contact.modes import STICK
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
@@ -345,20 +345,6 @@ class Memory(Bundle):
     tally: Tally = part(Tally)
 
 
-@dissolved_kernel
-def note_group(kind: int, first: int, count: int, assembly: Assembly) -> int:
-    """Note that the candidates of a kind are those from `first` on, the last of `count`."""
-    assembly.begin[kind] = first
-    assembly.until[kind] = count
-    return count
-
-
-@dissolved_kernel
-def are_there(kind: int, assembly: Assembly) -> bool:
-    """Whether any candidate is of a kind."""
-    return bool(assembly.until[kind] > assembly.begin[kind])
-
-
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
     if robot not in _MOLDS:
@@ -419,5 +405,6 @@ def _laid_out(robot: Robot) -> Memory:
         pushes=pushes_on(robot, ()),
     )  # fmt: skip
     memory.surface.friction[rows.first[DRY_JOINT] : rows.end[DRY_JOINT]] = 1.0
+    memory.reaction.mode[rows.first[LOOP] :] = STICK
     memory.reported.resting[:] = -1
     return memory

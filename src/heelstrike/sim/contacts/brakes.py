@@ -23,7 +23,15 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.latches import several
-from heelstrike.sim.contacts.loops import BEGINS_TO_RUB, HOLDS, OFF, PUT_ON, RUBS, TAKES_HOLD
+from heelstrike.sim.contacts.loops import (
+    BEGINS_TO_RUB,
+    HOLDS,
+    OFF,
+    PUT_ON,
+    RUBS,
+    TAKES_HOLD,
+    find_loops,
+)
 from heelstrike.sim.contacts.rows import DRY_JOINT
 from heelstrike.sim.memory import Loops, Memory
 from heelstrike.sim.record.record import Record
@@ -51,6 +59,20 @@ def take_hold(model: Model, loops: Loops) -> bool:
             loops.braked[brake] = BEGINS_TO_RUB if slips else TAKES_HOLD
         found = found or loops.braked[brake] == TAKES_HOLD
     return found
+
+
+@kernel
+def find_loops_of_step(model: Model, memory: Memory) -> None:
+    """Find the rows of loops and brakes.
+
+    Where brakes take hold the velocity that J̇ v is of ends: brakes that stop a loop twice over
+    could not meet it.
+    """
+    loops = memory.loops
+    stops = take_hold(model, loops)
+    find_loops(model, memory.q, memory.v, memory.equations.tree, loops)
+    for row in range(loops.rows.bias.shape[0] if stops else 0):
+        loops.rows.bias[row] = 0.0
 
 
 @kernel

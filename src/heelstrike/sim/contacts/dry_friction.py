@@ -10,37 +10,7 @@ joints, flat feet and joint stops is one problem with one certificate.
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.sets import INTERVAL
 from heelstrike.robot.model import Floats, Integers
-from heelstrike.sim.contacts.geometry import write_unit_row
-from heelstrike.sim.contacts.rows import DRY_JOINT, Rows
-from heelstrike.sim.memory import Assembly
-
-
-@kernel
-def select_dry_joints(
-    rows: Rows, step: float, count: int, breakaway: Floats, guess: Integers, v: Floats,
-    assembly: Assembly,
-) -> int:  # fmt: skip
-    """Append the joints with dry friction to the candidates of a step; return how many there are.
-
-    Those whose brake is off, and that have none of their own, are left out; `guess` holds the
-    contact modes of all entries of the table.
-    """
-    problem = assembly.problem
-    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
-        joint = rows.owner[dry]
-        if breakaway[joint] == 0.0:
-            continue
-        write_unit_row(joint, 2 * count + 1, 1.0, assembly)
-        problem.free[2 * count + 1] = v[joint]
-        problem.set[count] = INTERVAL
-        problem.friction[count] = 1.0
-        problem.bound[count] = step * breakaway[joint]
-        assembly.answer.mode[count] = guess[dry]
-        assembly.candidate[count] = dry
-        count += 1
-    return count
 
 
 @kernel

@@ -36,9 +36,8 @@ from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
-from heelstrike.contact.modes import OPEN, SOLVED, STICK
+from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.contact.workspace import ContactProblem
 from heelstrike.dynamics.kernels import integrate, passive_force
 from heelstrike.dynamics.workspace import Workspace
@@ -47,8 +46,17 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
-from heelstrike.sim.contacts.brakes import note_brakes, share_friction, take_hold
-from heelstrike.sim.contacts.dry_friction import select_dry_joints
+from heelstrike.sim.contacts.brakes import find_loops_of_step, note_brakes, share_friction
+from heelstrike.sim.contacts.candidates import (
+    are_there,
+    hold_latched,
+    list_candidate,
+    list_dry_joints,
+    locate_stops,
+    note_answer,
+    note_group,
+    write_rows,
+)
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -59,15 +67,12 @@ from heelstrike.sim.contacts.geometry import (
     row_product,
     solve_mass_matrix,
     weigh,
-    write_unit_row,
 )
-from heelstrike.sim.contacts.latches import hold, react
+from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import (
     append_loops,
     close_loops,
-    find_loops,
     free_loops,
-    note_loops,
     rows_of,
     speed_along,
     steady_loops,
@@ -86,7 +91,7 @@ from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCIT
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.frame import DIVERGED, DONE, SOLVER_FAILED, Kernels, Scene
-from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints, are_there, note_group
+from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
@@ -324,20 +329,6 @@ def add_springs(
         added[i] = ahead * (damping[i] + ahead * stiffness[i])
 
 
-@kernel
-def find_loops_of_step(model: Model, memory: Memory) -> None:
-    """Find the rows of loops and brakes.
-
-    Where brakes take hold the velocity that J̇ v is of ends: brakes that stop a loop twice over
-    could not meet it.
-    """
-    loops = memory.loops
-    stops = take_hold(model, loops)
-    find_loops(model, memory.q, memory.v, memory.equations.tree, loops)
-    for row in range(loops.rows.bias.shape[0] if stops else 0):
-        loops.rows.bias[row] = 0.0
-
-
 @dissolved_kernel
 def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -> None:
     """Kinematics, contact points, mass matrix and bias force of the state now."""
@@ -452,40 +443,31 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
             if work.impact.relaxed == 0:
                 work.impact.bounce[count] = memory.surface.restitution[contact] * before
                 normal += work.impact.bounce[count]
+        list_candidate(POINT, contact, count, memory)
         problem.free[2 * count] = normal
         problem.free[2 * count + 1] = velocity[contact, 1]
-        problem.set[count] = CONE
-        problem.friction[count] = memory.surface.friction[contact]
-        assembly.answer.mode[count] = memory.reaction.mode[contact]
-        candidate[count] = contact
         count += 1
     return count
 
 
 @dissolved_kernel
-def locate_stops(q: Floats, rows: Rows) -> None:
-    """Write the gaps of the joint stops."""
-    for stop in range(rows.first[STOP], rows.end[STOP]):
-        rows.gap[stop] = rows.side[stop] * (q[rows.owner[stop]] - rows.limit[stop])
-
-
-@dissolved_kernel
-def stops_are_near(step: float, v: Floats, rows: Rows) -> bool:
+def stops_are_near(model: Model, step: float, q: Floats, v: Floats) -> bool:
     """Whether any joint stop could act in a step that bounds the gap at its end."""
     near = 0
-    for stop in range(rows.first[STOP], rows.end[STOP]):
-        near += rows.gap[stop] < step * max(CLOSING_RATE, 2.0 * abs(v[rows.owner[stop]]))
+    for joint in range(model.nv):
+        reach = step * max(CLOSING_RATE, 2.0 * abs(v[joint]))
+        near += (q[joint] - model.lower[joint] < reach) | (model.upper[joint] - q[joint] < reach)
     return near > 0
 
 
 @dissolved_kernel
-def select_stops(work: Stepping, count: int, memory: Memory) -> int:
+def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> int:
     """Append the joint stops that could act in this step: contacts without friction."""
-    assembly, problem, step = memory.assembly, memory.assembly.problem, work.step
-    linearised, calls, rows = is_linearised(work.scheme), work.impact.calls, memory.rows
-    locate_stops(memory.q, rows)
-    if linearised and calls == 0 and not stops_are_near(step, memory.next_v, rows):
+    problem, step, rows = memory.assembly.problem, work.step, memory.rows
+    linearised, calls = is_linearised(work.scheme), work.impact.calls
+    if linearised and calls == 0 and not stops_are_near(model, step, memory.q, memory.next_v):
         return count
+    locate_stops(memory.q, rows)
     for stop in range(rows.first[STOP], rows.end[STOP]):
         joint, side, gap = rows.owner[stop], rows.side[stop], rows.gap[stop]
         normal = side * memory.next_v[joint]
@@ -499,41 +481,18 @@ def select_stops(work: Stepping, count: int, memory: Memory) -> int:
                 continue
         elif not gap <= work.activation:
             continue
+        list_candidate(STOP, stop, count, memory)
         problem.free[2 * count] = normal
         problem.free[2 * count + 1] = 0.0
-        problem.set[count] = HALF_LINE
-        problem.friction[count] = 0.0
-        assembly.answer.mode[count] = memory.reaction.mode[stop]
-        assembly.candidate[count] = stop
         count += 1
-    return count
-
-
-@dissolved_kernel
-def hold_latched(model: Model, count: int, memory: Memory) -> int:
-    """Let the stops of engaged latches hold; return how many candidates there are with them.
-
-    Where the gap decides, and a scheme has left a joint before its stop, it is held there.
-    """
-    loops, assembly, stops = memory.loops, memory.assembly, memory.rows.latch_stop
-    missing = hold(count, stops, loops.held, assembly)
-    while missing >= 0:
-        joint = model.latch_joint[missing]
-        assembly.problem.free[2 * count] = -model.latch_side[missing] * memory.next_v[joint]
-        assembly.problem.free[2 * count + 1] = 0.0
-        assembly.problem.friction[count] = 0.0
-        assembly.answer.mode[count] = STICK
-        assembly.candidate[count] = stops[missing]
-        count += 1
-        missing = hold(count, stops, loops.held, assembly)
     return count
 
 
 @kernel
 def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> int:
-    """Append the second faces of corners that could act in this step, and write their rows."""
+    """Append the second faces of corners that could act in this step."""
     assembly, rows, step = memory.assembly, memory.rows, work.step
-    problem, tree, surface = assembly.problem, memory.equations.tree, memory.surface
+    problem, tree = assembly.problem, memory.equations.tree
     for second in range(rows.first[SECOND_FACE], rows.end[SECOND_FACE]):
         gap = rows.gap[second]
         if gap > FAR_STEPS * CLOSING_SPEED * step:
@@ -549,34 +508,16 @@ def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> 
             if gap + 0.5 * step * before > work.activation:
                 continue
             if work.impact.relaxed == 0:
-                work.impact.bounce[count] = surface.restitution[second] * before
+                work.impact.bounce[count] = memory.surface.restitution[second] * before
                 normal += work.impact.bounce[count]
         elif gap > work.activation:
             continue
+        list_candidate(SECOND_FACE, second, count, memory)
         problem.free[2 * count] = normal
         tangent = row_product(assembly.jacobian, 2 * count + 1, memory.next_v)
         problem.free[2 * count + 1] = tangent
-        problem.set[count] = CONE
-        problem.friction[count] = surface.friction[second]
-        assembly.answer.mode[count] = memory.reaction.mode[second]
-        assembly.candidate[count] = second
         count += 1
     return count
-
-
-@kernel
-def write_rows(
-    model: Model, tree: Workspace, contacts: Contacts, rows: Rows, assembly: Assembly
-) -> None:
-    """Write the Jacobian rows of the candidates that are contact points and stops.
-
-    A stop has a normal row ±1 at its joint and a tangent row of zeros.
-    """
-    for place in range(assembly.begin[POINT], assembly.until[POINT]):
-        contact_rows(model, tree, contacts, assembly.candidate[place], place, assembly)
-    for place in range(assembly.begin[STOP], assembly.until[STOP]):
-        stop = assembly.candidate[place]
-        write_unit_row(rows.owner[stop], 2 * place, rows.side[stop], assembly)
 
 
 @kernel
@@ -747,7 +688,7 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:
-        write_rows(model, equations.tree, contacts, rows, assembly)
+        write_rows(model, equations.tree, contacts, memory.seconds, rows, assembly)
         assemble_delassus(model, count, equations, assembly)
     problem.count = count
     if work.scheme == MOREAU_JEAN:
@@ -878,12 +819,10 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
             assembly.answer.residual[i] = 0.0
         near = select_candidates(model, work, memory)
         note_group(POINT, 0, near, assembly)
-        count = hold_latched(model, select_stops(work, near, memory), memory)
+        count = select_stops(model, work, near, memory)
+        count = hold_latched(model, count, memory.next_v, memory)
         first = note_group(STOP, near, count, assembly)
-        count = select_dry_joints(
-            memory.rows, work.step, count, memory.breakaway, memory.reaction.mode, memory.next_v,
-            assembly,
-        )  # fmt: skip
+        count = list_dry_joints(count, work.step, memory.next_v, memory)
         first = note_group(DRY_JOINT, first, count, assembly)
         if impact.corner.near > 0:
             count = select_corners(model, count, work, memory)
@@ -918,48 +857,6 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
     if are_there(SECOND_FACE, assembly):
         join_forces(model, memory.seconds, memory.contacts)
     return solved
-
-
-@dissolved_kernel
-def note_answer(model: Model, step: float, memory: Memory) -> None:
-    """Keep the forces, slips and modes of the candidates; all others have none."""
-    assembly, answer, rows = memory.assembly, memory.assembly.answer, memory.rows
-    candidate, begin, until, impulse = (
-        assembly.candidate,
-        assembly.begin,
-        assembly.until,
-        answer.impulse,
-    )
-    force, reaction, seconds = memory.contacts.force, memory.reaction, memory.seconds
-    for joint in range(model.nv):
-        reaction.stop_torque[joint] = 0.0
-    for contact in range(model.nc):
-        force[contact, 0] = 0.0
-        force[contact, 1] = 0.0
-        reaction.slip[contact] = 0.0
-    for entry in range(rows.first[DRY_JOINT]):
-        reaction.mode[entry] = OPEN
-    for place in range(begin[POINT], until[POINT]):
-        contact = candidate[place]
-        force[contact, 0] = impulse[2 * place] / step
-        force[contact, 1] = impulse[2 * place + 1] / step
-        reaction.slip[contact] = answer.velocity[2 * place + 1]
-        reaction.mode[contact] = answer.mode[place]
-    for place in range(begin[STOP], until[STOP]):
-        stop = candidate[place]
-        reaction.stop_torque[rows.owner[stop]] += rows.side[stop] * impulse[2 * place] / step
-        reaction.mode[stop] = answer.mode[place] != OPEN
-    for place in range(begin[DRY_JOINT], until[DRY_JOINT]):
-        dry = candidate[place]
-        reaction.friction_torque[rows.owner[dry]] = impulse[2 * place + 1] / step
-        reaction.mode[dry] = answer.mode[place]
-    for place in range(begin[SECOND_FACE], until[SECOND_FACE]):
-        second = candidate[place]
-        contact = rows.owner[second]
-        seconds.force[contact, 0] = impulse[2 * place] / step
-        seconds.force[contact, 1] = impulse[2 * place + 1] / step
-        reaction.mode[second] = answer.mode[place]
-    note_loops(rows, until[LOOP], step, impulse, memory.loops)
 
 
 @dissolved_kernel

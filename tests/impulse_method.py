@@ -1,0 +1,155 @@
+"""A contact method from outside: the paper's ordering, with all that may hold a robot.
+
+What is asked of contacts is the certified solver's; who they are is in the table of rows. Points,
+stops, latches, joints with dry friction, loops, couplings and brakes all take part.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import heelstrike as hs
+from heelstrike import sim
+from heelstrike.robot import Robot
+
+
+class Numbers(hs.Bundle):
+    """What the kernels read."""
+
+    step: float = hs.number(float)
+    order: Any = hs.array("solvers", of=int)
+
+
+@sim.kernel
+def begin(model: Any, ground: Any, memory: Any, work: Any, record: Any) -> int:
+    if sim.rows_of(memory.loops) > 0:
+        if not sim.close_loops(model, memory.equations, memory.loops, memory.q):
+            return sim.DIVERGED
+        sim.steady_loops(model, memory.q, memory.equations, memory.loops, memory.v)
+    return sim.DONE
+
+
+@sim.kernel
+def prepare(model: Any, ground: Any, memory: Any, work: Any) -> None:
+    tree = memory.equations.tree
+    sim.evaluate_equations(model, memory.q, memory.v, memory.equations)
+    sim.locate_contacts(model, ground, tree, memory.contacts, memory.surface)
+    sim.locate_stops(memory.q, memory.rows)
+    sim.find_loops_of_step(model, memory)
+
+
+@sim.kernel
+def move_freely(model: Any, time: float, work: Any, memory: Any) -> None:
+    equations = memory.equations
+    force, rate = equations.force, equations.rate
+    sim.passive_force(model, memory.q, memory.v, force)
+    for i in range(model.nu):
+        force[model.actuator_joint[i]] += memory.torque[i]
+    if sim.share_over_step(time, work.step, memory.pushes):
+        sim.add_pushes(model, equations.tree, memory.pushes, force)
+    for j in range(model.nv):
+        rate[j] = force[j] - equations.bias[j]
+    sim.solve_mass_matrix(model, equations, rate)
+    for j in range(model.nv):
+        memory.next_v[j] = memory.v[j] + work.step * rate[j]
+
+
+@sim.kernel
+def list_closed(kind: int, count: int, memory: Any) -> int:
+    first = count
+    for entry in range(memory.rows.first[kind], memory.rows.end[kind]):
+        if memory.rows.gap[entry] <= 0.0:
+            sim.list_candidate(kind, entry, count, memory)
+            count += 1
+    sim.note_group(kind, first, count, memory.assembly)
+    return count
+
+
+@sim.kernel
+def pose(model: Any, step: float, memory: Any) -> int:
+    assembly, loops, v = memory.assembly, memory.loops, memory.next_v
+    near = list_closed(sim.POINT, 0, memory)
+    count = sim.hold_latched(model, list_closed(sim.STOP, near, memory), v, memory)
+    stopped = sim.note_group(sim.STOP, near, count, assembly)
+    count = sim.list_dry_joints(count, step, v, memory)
+    sim.note_group(
+        sim.SECOND_FACE, sim.note_group(sim.DRY_JOINT, stopped, count, assembly), count, assembly
+    )
+    tree, seconds = memory.equations.tree, memory.seconds
+    sim.write_rows(model, tree, memory.contacts, seconds, memory.rows, assembly)
+    for row in range(2 * count):
+        assembly.problem.free[row] = sim.row_product(assembly.jacobian, row, v)
+    total = sim.append_loops(count, loops, assembly)
+    sim.free_loops(total, loops, v, 0.5 * step, assembly)
+    return sim.note_group(sim.LOOP, count, total, assembly)
+
+
+@sim.kernel
+def decide(scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Any) -> int:
+    model, assembly, status = scene.model, memory.assembly, sim.SOLVED
+    move_freely(model, clock.time, work, memory)
+    assembly.problem.count = pose(model, work.step, memory)
+    if assembly.problem.count > 0:
+        sim.assemble_delassus(model, assembly.problem.count, memory.equations, assembly)
+        solver, answer = assembly.solver, assembly.answer
+        status = sim.solve_contact_kernel(work.order, assembly.problem, solver, answer)
+        sim.add_impulse(model, assembly, assembly.problem.count, memory.equations, memory.next_v)
+    sim.note_answer(model, work.step, memory)
+    sim.note_extremes(model, memory)
+    first, end = record.events, clock.start + (clock.index + 1) * work.step
+    sim.note_events(model, clock.time, end, work.step, memory, record)
+    sim.react(model, first, memory.q, record, memory.loops)
+    rubbed, braked = memory.reaction.friction_torque, memory.loops.brake_force
+    sim.share_friction(model, memory.breakaway, rubbed, braked)
+    sim.note_brakes(model, clock.time, work.step, record, memory.loops)
+    return sim.DONE if status == sim.SOLVED else sim.SOLVER_FAILED
+
+
+@sim.kernel
+def report(scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Any) -> None:
+    sim.note_row_when_due(memory, clock, record)
+
+
+@sim.kernel
+def move(scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Any) -> int:
+    memory.tally.steps += 1
+    sim.integrate(scene.model, memory.q, memory.next_v, work.step, memory.q)
+    for j in range(scene.model.nv):
+        memory.v[j] = memory.next_v[j]
+    loops = memory.loops
+    if sim.rows_of(loops) > 0 and not sim.close_loops(
+        scene.model, memory.equations, loops, memory.q
+    ):
+        return sim.DIVERGED
+    clock.time = clock.start + (clock.index + 1) * work.step
+    return sim.DONE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Impulses(sim.Method):
+    """The paper's ordering on ground without corners."""
+
+    kernels = sim.Kernels(begin, prepare, decide, report, move)
+    work = Numbers
+
+    step: float = 1e-3
+    solver: str = "lemke"
+
+    @property
+    def step_length(self) -> float:  # type: ignore[override]
+        return self.step
+
+    @property
+    def row_period(self) -> tuple[str, float]:
+        return "step", self.step
+
+    @property
+    def solves_with(self) -> str:
+        return self.solver
+
+    def new_work(self, robot: Robot) -> Numbers:
+        return Numbers(step=self.step, order=sim.solver_order(self.solver))
+
+    def room(self, robot: Robot) -> tuple[int, int]:
+        return 1, 2 * (robot.nc + robot.nv) + robot.model.latches + robot.model.brakes + 2
