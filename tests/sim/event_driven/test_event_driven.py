@@ -19,7 +19,8 @@ from heelstrike.sim import (
     EventKind,
     RunStatus,
 )
-from heelstrike.sim.event_driven.method import LOOKS, NO_BRIDGE
+from heelstrike.sim.event_driven.deciding import LOOKS
+from heelstrike.sim.event_driven.moving import NO_BRIDGE
 from heelstrike.sim.event_driven.phase import allocate_motion
 from heelstrike.sim.frame import Outcome
 
@@ -421,20 +422,3 @@ def test_no_step_is_longer_than_the_longest() -> None:
     )  # fmt: skip
     assert np.diff(run.time).max() == pytest.approx(4e-3, rel=1e-9)
     assert run.steps == pytest.approx(26, abs=2)
-
-
-def test_no_step_is_longer_than_the_longest() -> None:
-    """A ball in free flight makes no error: its steps are as long as they may be."""
-    build = RobotBuilder("ball")
-    build.floating_base("ball", mass=1.0, inertia=0.1)
-    build.contact("ball", (0.0, 0.0), radius=0.1)
-    runs = [
-        hs.simulate(
-            build.build(), state=hs.State([0.0, 9.0, 0.0], [1.0, 0.0, 0.0]), duration=0.5,
-            method=hs.EventDriven(max_step=longest, output_period=None), stop_when_fallen=False,
-        )
-        for longest in (4e-3, 0.05)
-    ]  # fmt: skip
-    short, long = (np.diff(run.time).max() for run in runs)
-    assert short == pytest.approx(4e-3, rel=1e-9)
-    assert long == pytest.approx(0.05, rel=1e-9)

@@ -44,27 +44,19 @@ from heelstrike.sim.contacts.loops import (
 from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.candidates import free_acceleration, solve_candidates
-from heelstrike.sim.event_driven.corners import is_struck, log_impulse
-from heelstrike.sim.event_driven.dynamics import evaluate, observe_faces, solve_constraints
-from heelstrike.sim.event_driven.faces import has_corners, locate, stand_on_face
-from heelstrike.sim.event_driven.gaps import (
+from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
+from heelstrike.sim.event_driven.phase import Bridge, Faces, Impact, Modes, Motion, Phase, Step
+from heelstrike.sim.event_driven.rows import write_row
+from heelstrike.sim.event_driven.smooth.candidates import free_acceleration, solve_candidates
+from heelstrike.sim.event_driven.smooth.corners import is_struck, log_impulse
+from heelstrike.sim.event_driven.smooth.dynamics import evaluate, observe_faces, solve_constraints
+from heelstrike.sim.event_driven.smooth.faces import has_corners, locate, stand_on_face
+from heelstrike.sim.event_driven.smooth.gaps import (
     free_gap_acceleration,
     gap_now,
     gap_rows,
     gap_velocity,
 )
-from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
-from heelstrike.sim.event_driven.phase import (
-    Bridge,
-    Faces,
-    Impact,
-    Modes,
-    Motion,
-    Phase,
-    Step,
-)
-from heelstrike.sim.event_driven.rows import write_row
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Reported, Surface
 from heelstrike.sim.record.record import Record

@@ -18,13 +18,13 @@ from heelstrike.sim.contacts.geometry import (
 from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
 from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, STOP, Rows
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.candidates import free_acceleration
-from heelstrike.sim.event_driven.corners import is_struck, log_impulse
-from heelstrike.sim.event_driven.dynamics import gather_closed
-from heelstrike.sim.event_driven.faces import locate
-from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
 from heelstrike.sim.event_driven.phase import Bounces, Impact, Modes, Phase, Step
-from heelstrike.sim.event_driven.saddle_point import (
+from heelstrike.sim.event_driven.smooth.candidates import free_acceleration
+from heelstrike.sim.event_driven.smooth.corners import is_struck, log_impulse
+from heelstrike.sim.event_driven.smooth.dynamics import gather_closed
+from heelstrike.sim.event_driven.smooth.faces import locate
+from heelstrike.sim.event_driven.smooth.gaps import free_gap_acceleration, gap_rows, gap_velocity
+from heelstrike.sim.event_driven.smooth.saddle_point import (
     add_impulses,
     solve_accelerations,
     solve_velocities,

@@ -11,25 +11,20 @@ from heelstrike.sim.contacts.loops import note_loops, rows_of
 from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.candidates import slides
-from heelstrike.sim.event_driven.corners import record_corner
 from heelstrike.sim.event_driven.dormand_prince import interpolate
-from heelstrike.sim.event_driven.dynamics import (
+from heelstrike.sim.event_driven.location import TOGETHER
+from heelstrike.sim.event_driven.phase import Impact, Output, Phase, Samples, Step
+from heelstrike.sim.event_driven.smooth.candidates import slides
+from heelstrike.sim.event_driven.smooth.corners import record_corner
+from heelstrike.sim.event_driven.smooth.dynamics import evaluate
+from heelstrike.sim.event_driven.smooth.projection import (
     INTERPOLATED,
-    evaluate,
     explained,
     is_in_place,
     project,
 )
-from heelstrike.sim.event_driven.location import TOGETHER, shortest_step
-from heelstrike.sim.event_driven.phase import (
-    Impact,
-    Output,
-    Phase,
-    Samples,
-    Step,
-)
-from heelstrike.sim.event_driven.saddle_point import solve_accelerations
+from heelstrike.sim.event_driven.smooth.saddle_point import solve_accelerations
+from heelstrike.sim.event_driven.steps import shortest_step
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Surface
 from heelstrike.sim.record.record import Record
