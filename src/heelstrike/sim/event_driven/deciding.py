@@ -38,7 +38,8 @@ from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import JOINT_STOP, log_event, note_residual
 
 PAINLEVE = int(EventKind.PAINLEVE)
-# At the start of a run, points nearer to the ground than this (m) and slower (m/s) are on it.
+# At the start of a run, points nearer to the ground than this (m) and slower (m/s) are on it: no
+# robot is placed more exactly than to a micrometre.
 ON_THE_GROUND = 1e-6
 # Speed (m/s) of approach that makes a sliding point without consistent force collide. As near to a
 # pole of the forces as steps get that may be too little, and it is more each time, up to a most.
@@ -54,8 +55,11 @@ BRIDGED = 1e3
 LONG_BRIDGE = 1e-6
 # How far ahead (s) forces that reached a limit are looked at, first and last; how far beyond it, as
 # a fraction of the weight, they must be by then; how often modes are tried in one instant.
+# The first is a thousand times what events are located to; nine looks, each so many times as far,
+# reach the last. Forces are noise below 1e-10.
 FIRST_LOOK = 1e-9
 LAST_LOOK = 1e-4
+FURTHER = 4.0
 CLEARLY = 1e-7
 LOOKS = 24
 # Forces that are so far beyond a limit, as a fraction of the weight, when a phase begins, are none.
@@ -242,7 +246,7 @@ def decide_modes(
         if forced:
             forced = is_unclear(ahead, phase.watch)
             if forced:
-                ahead *= 4.0
+                ahead *= FURTHER
                 continue
             if decision.burst >= INSISTENT:
                 insist(phase.watch.fired, phase.forces.force, phase.modes)

@@ -36,14 +36,16 @@ from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, no
 IMPACT = int(EventKind.IMPACT)
 ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
 
-# Velocities (m/s) up to which a point on the ground is at rest.
+# Velocities (m/s) up to which a point on the ground is at rest: what a contact problem is certified
+# to, where robots have some m/s.
 REST = 1e-9
-# Velocities (m/s, rad/s) along a loop up to which it has none.
+# Velocities (m/s, rad/s) along a loop up to which it has none: rounding of some hundred operations.
 ROUNDING = 1e-13
 # Energy counts as made when it exceeds this part of the energy that went through the contacts.
 NOTICEABLE = 1e-9
 # Bounces shorter than this (s) lose what restitution gave them, and of those shorter than this the
-# rest: what speed is left of them is less than anyone could see.
+# rest: what speed is left of them is less than anyone could see. Under gravity the first rises by
+# 1e-12 m, a gap to which events are located, the second by rounding.
 SHORTEST_BOUNCE = 1e-6
 NO_BOUNCE = 1e-8
 PLASTIC, AT_REST = 1, 2

@@ -27,16 +27,23 @@ SAMPLES = 4
 """Places in a step, evenly spaced, at which the event functions are looked at."""
 
 EVENT_TIME = 1e-12
-"""Seconds to which events are located."""
+"""Seconds to which events are located: what 1 m/s is wrong by then is rounding of a robot's metre
+times some thousands, and times of hours have still digits for it."""
 
 TOGETHER = 1e-10
-"""Points nearer to the ground than this (m) share an impact."""
+"""Points nearer to the ground than this (m) share an impact: a hundred times what 1 m/s makes of
+``EVENT_TIME``, and less than the tolerance of a step."""
 
 # How far an event function must be below zero to count: m, m/s, and a fraction of the weight.
 GAP_NOISE = 1e-13
 CORNER_NOISE = 1e-11
 SPEED_NOISE = 1e-12
 FORCE_NOISE = 1e-10
+# A root is kept off the ends of its interval by this part of what it is located to, so that both
+# ends move; one that is followed back from where it is negative is located to this part of that.
+INSIDE, FINER = 0.4, 0.1
+# A rate takes 4/27 of itself away from a cubic at the most; this is a little more.
+TAKEN_AWAY = 0.15
 # Where a point that has just left the ground is looked for: at this part of the way to the first
 # sample, and so on, until that is less than this (s); and one that rises no further from it than
 # this (m), until that is less than this (s).
@@ -117,12 +124,12 @@ def find_root(
     width = EVENT_TIME / length
     going_back = low_value <= 0.0
     for attempt in range(200):
-        if high - low <= (0.1 * width if going_back else width):
+        if high - low <= (FINER * width if going_back else width):
             break
         part = low + 0.5 * (high - low)
         if attempt % 3 != 2 and not going_back:
             part = high - high_value * (high - low) / (high_value - low_value)
-            part = min(max(part, low + 0.4 * width), high - 0.4 * width)
+            part = min(max(part, low + INSIDE * width), high - INSIDE * width)
         evaluate_within(scene, part, length, with_forces, control, memory, phase, step)
         value = turn * watch.rate[function] if turn != 0.0 else watch.value[function]
         if value > 0.0:
@@ -197,7 +204,7 @@ def lowest_place(before: float, rate: float, value: float, later_rate: float) ->
     Rates are per interval. Returns ``NO_EVENT`` where it stays above zero.
     """
     down = max(-rate, 0.0) + max(later_rate, 0.0)
-    if min(before, value) > 0.15 * down:  # 4/27 is the most that a rate takes away
+    if min(before, value) > TAKEN_AWAY * down:
         return NO_EVENT
     third = rate + later_rate - 2.0 * (value - before)
     second = value - before - rate - third

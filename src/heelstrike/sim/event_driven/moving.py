@@ -16,7 +16,7 @@ from heelstrike.sim.contacts.rows import (
 )
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.bridge import cross
+from heelstrike.sim.event_driven.bridge import SHORTEST_BRIDGE, cross
 from heelstrike.sim.event_driven.deciding import INSISTENT
 from heelstrike.sim.event_driven.events import meet_event
 from heelstrike.sim.event_driven.location import EVENT_TIME
@@ -24,7 +24,7 @@ from heelstrike.sim.event_driven.phase import Decision, Motion, Step
 from heelstrike.sim.event_driven.rows import NO_ROOM, TOO_FAR, write_row, write_rows_within
 from heelstrike.sim.event_driven.smooth.corners import show_forces
 from heelstrike.sim.event_driven.smooth.dynamics import evaluate
-from heelstrike.sim.event_driven.steps import integrate, longest_turn, shortest_step
+from heelstrike.sim.event_driven.steps import ALMOST, integrate, longest_turn, shortest_step
 from heelstrike.sim.frame import DONE, FORK, RECORD_FULL, SOLVER_FAILED, Scene
 from heelstrike.sim.memory import Memory, Tally
 from heelstrike.sim.record.record import Record
@@ -38,7 +38,14 @@ INSTANT = 1e-10
 EVENTS_AT_ONCE, EVENTS_A_BRIDGE = 200.0, 50.0
 EVENTS_A_SECOND = 1e5
 SHORT_STEP = 1e-6
+SHORT_PART = 0.01  # of the longest
 SHARE_OF_A_STEP = 0.2
+# Length (s) of the first step that is tried behind a bridge, or where none could be taken: that of
+# the shortest bridge.
+AFRESH = SHORTEST_BRIDGE
+# Two times are one when they differ by the rounding of an addition (nearly twice 2⁻⁵²), relative,
+# or relative to this (s) of those near zero.
+SAME_TIME, EARLY = 4e-16, 1e-3
 # Why the loop gave up.
 NO_BRIDGE = 1
 
@@ -78,7 +85,7 @@ def end_bounces(
 def pass_time(length: float, stop: float, step: Step, decision: Decision) -> None:
     """Let time move on, to `stop` if that is the same but for rounding."""
     step.time += length
-    if abs(step.time - stop) <= 4e-16 * max(abs(stop), 1e-3):
+    if abs(step.time - stop) <= SAME_TIME * max(abs(stop), EARLY):
         step.time = stop
     decision.allowance = min(decision.allowance + EVENTS_A_SECOND * length, EVENTS_AT_ONCE)
 
@@ -103,7 +110,7 @@ def end_step(
         decision.burst = decision.burst + 1 if together else 0
         decision.last_event = step.time
         decision.allowance -= 1.0
-    elif step.length < min(SHORT_STEP, 0.01 * step.longest):
+    elif step.length < min(SHORT_STEP, SHORT_PART * step.longest):
         decision.allowance -= SHARE_OF_A_STEP
 
 
@@ -123,18 +130,13 @@ def move_over(
     """Leave an instant by a bridge, behind which it is looked for what there is to be met."""
     phase = work.phase
     watch = phase.watch
-    step, bounces, series, output, decision = (
-        work.step,
-        work.bounces,
-        work.series,
-        work.output,
-        work.decision,
-    )
+    step, bounces = work.step, work.bounces
+    series, output, decision = work.series, work.output, work.decision
     end = stop
     if output.period > 0.0:  # a row is due no later than at its end
         period = output.period * output.every
         due = output.next_row * period
-        end = min(stop, due if due > step.time + 1e-12 else due + period)
+        end = min(stop, due if due > step.time + EVENT_TIME else due + period)
     first = record.events
     if not cross(scene, end, control, memory, work, record):
         series.reason = NO_BRIDGE
@@ -151,7 +153,7 @@ def move_over(
         watch.fired[i] = 0
     decision.burst = 0
     decision.allowance = EVENTS_A_BRIDGE
-    step.next_length = 1e-6
+    step.next_length = AFRESH
     write_row(
         scene, step.time, step.begin, False, step, work.impact, control, memory, phase, output,
         record,
@@ -207,7 +209,7 @@ def move(
         turn = longest_turn(model, memory.equations.tree.motion, step.begin)
         step.next_length = min(step.next_length, turn)
         wish = step.longest if decision.bridging == 1 else min(step.next_length, step.longest)
-        if clock.forked == 0 and stop == clock.until and step.time + 1.0001 * wish >= stop:
+        if clock.forked == 0 and stop == clock.until and step.time + ALMOST * wish >= stop:
             clock.forked = 1
             return FORK
         if decision.bridging == 1:
@@ -215,7 +217,7 @@ def move(
         if not integrate(scene, stop, control, memory, phase, step):
             if not jam(model, phase.modes.slide, decision):
                 decision.bridging = 1
-            step.next_length = 1e-6
+            step.next_length = AFRESH
             return DONE
     written = write_rows_within(
         scene, control, memory, phase, step, work.impact, work.output, record

@@ -12,7 +12,7 @@ from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.dormand_prince import interpolate
-from heelstrike.sim.event_driven.location import TOGETHER
+from heelstrike.sim.event_driven.location import EVENT_TIME, TOGETHER
 from heelstrike.sim.event_driven.phase import Impact, Output, Phase, Samples, Step
 from heelstrike.sim.event_driven.smooth.candidates import slides
 from heelstrike.sim.event_driven.smooth.corners import record_corner
@@ -175,7 +175,7 @@ def write_right(
         )  # fmt: skip
     output.last_row = time
     period = output.period * output.every
-    if period > 0.0 and abs(output.next_row * period - time) <= 1e-12:
+    if period > 0.0 and abs(output.next_row * period - time) <= EVENT_TIME:
         output.next_row += 1
 
 
@@ -213,7 +213,7 @@ def write_rows_within(
     first, next_row, last_row = record.rows, output.next_row, output.last_row
     touch = False
     if step.has_fired == 1:
-        last -= 1e-12
+        last -= EVENT_TIME
         for contact in range(modes.watched):
             touch = touch or (
                 modes.closed[contact] == 0 and comes_down(contact, watch.fired, step.samples)

@@ -41,8 +41,14 @@ SHORTENED = 0.25
 # Angle (rad) by which links may turn in a step. What turns freely makes no error however long the
 # step is, and its points would be in the ground and out of it between two samples.
 TURN = 4.0
-# Shortest step as a multiple of the rounding of time.
-SHORTEST_STEP = 8.0
+# Shortest step as a multiple of the rounding of time, relative; times near zero count as this (s).
+SHORTEST_STEP, ROUNDING, EARLY = 8.0, 2.2e-16, 1e-3
+# The error of a step grows with its length to the power 8. How much longer the next step may be at
+# most, how much shorter at least, and with what safety: as SciPy's integrators have them; how much
+# shorter where the error is no number.
+ORDER, MOST, LEAST, SAFETY, NO_NUMBER = -0.125, 10.0, 0.2, 0.9, 0.1
+# A step that would end this near before a stop, relative, goes on to it: no step is left over.
+ALMOST = 1.0001
 
 
 @kernel
@@ -57,15 +63,15 @@ def longest_good_step(
     """
     rejected = False
     while True:
-        if step.time + 1.0001 * length >= stop:
+        if step.time + ALMOST * length >= stop:
             length = stop - step.time
         if length < shortest_step(step.time):
             return 0.0, 1.0, rejected
         error = take_step(scene, length, control, memory, phase, step)
-        factor = 10.0 if error == 0.0 else min(10.0, 0.9 * error**-0.125)
+        factor = MOST if error == 0.0 else min(MOST, SAFETY * error**ORDER)
         if error <= 1.0:
             return length, factor, rejected
-        length *= max(0.2, factor) if error < np.inf else 0.1
+        length *= max(LEAST, factor) if error < np.inf else NO_NUMBER
         rejected = True
 
 
@@ -216,7 +222,7 @@ def integrate(
         if rejected:
             step.next_length = length * min(factor, 1.0)
         else:  # a step cut short by a stop says little about how long the next may be
-            step.next_length = max(min(wish, 10.0 * length), length * factor)
+            step.next_length = max(min(wish, MOST * length), length * factor)
         part = first_event(scene, length, control, memory, phase, step)
         step.has_fired = 0 if part == NO_EVENT else 1
         good, fits = True, True
@@ -248,4 +254,4 @@ def integrate(
 @kernel
 def shortest_step(time: float) -> float:
     """Length below which a step would not move time on by a meaningful number."""
-    return SHORTEST_STEP * 2.2e-16 * max(abs(time), 1e-3)
+    return SHORTEST_STEP * ROUNDING * max(abs(time), EARLY)

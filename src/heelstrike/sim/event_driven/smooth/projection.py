@@ -37,6 +37,8 @@ EXPLAINED, INTERPOLATED = 100.0, 1e4
 # How far (m, rad) what is open may be beyond its limit to be put back on it: less is nothing, more
 # is no rounding.
 SHALLOW, DEEP = 2e-11, 1e-8
+# Positions that are no further off (m, rad) than this are right but for rounding of a metre.
+IN_PLACE = 1e-14
 # How far (m, rad) and how fast (m/s, rad/s) a state may be off its constraints as it is.
 PLACED, STILL = 5e-11, 1e-9
 
@@ -191,7 +193,7 @@ def project(
             worst = max(worst, abs(error))
         if attempt == 0:
             strayed = worst
-        positions = worst > 1e-14 and attempt < 4
+        positions = worst > IN_PLACE and attempt < 4
         if not positions:
             for i in range(size):
                 speed = row_product(assembly.jacobian, row[i], v)

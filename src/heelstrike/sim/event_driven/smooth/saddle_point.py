@@ -31,7 +31,7 @@ from heelstrike.contact.modes import (
     STICK,
 )
 from heelstrike.contact.sets import INTERVAL, LINE
-from heelstrike.contact.workspace import ContactAnswer
+from heelstrike.contact.workspace import ContactAnswer, Tally
 from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import mass_matrix
 from heelstrike.robot.model import Floats, Model
@@ -46,7 +46,7 @@ from heelstrike.sim.event_driven.smooth.candidates import (
     solve_candidates,
 )
 from heelstrike.sim.event_driven.smooth.gaps import free_gap_acceleration
-from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Tally
+from heelstrike.sim.memory import Assembly, Equations, Loops, Memory
 from heelstrike.sim.push import Pushes
 
 SMALL_PIVOT = 1e-6
