@@ -268,7 +268,9 @@ def leaves_of(kind: type | None) -> int:
         return 1
     if kind is Model:
         return 0
-    return sum(leaves_of(each if holds_others(each) else None) for each in members_of(kind).values())
+    return sum(
+        leaves_of(each if holds_others(each) else None) for each in members_of(kind).values()
+    )
 
 
 def reach_of(kernel: Kernel) -> int:

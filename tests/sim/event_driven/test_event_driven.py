@@ -19,7 +19,8 @@ from heelstrike.sim import (
     EventKind,
     RunStatus,
 )
-from heelstrike.sim.event_driven.method import LOOKS, NO_BRIDGE
+from heelstrike.sim.event_driven.deciding import LOOKS
+from heelstrike.sim.event_driven.moving import NO_BRIDGE
 from heelstrike.sim.event_driven.phase import allocate_motion
 from heelstrike.sim.frame import Outcome
 

@@ -44,27 +44,19 @@ from heelstrike.sim.contacts.loops import (
 from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.candidates import free_acceleration, solve_candidates
-from heelstrike.sim.event_driven.corners import is_struck, log_impulse
-from heelstrike.sim.event_driven.dynamics import evaluate, observe_faces, solve_constraints
-from heelstrike.sim.event_driven.faces import has_corners, locate, stand_on_face
-from heelstrike.sim.event_driven.gaps import (
+from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
+from heelstrike.sim.event_driven.phase import Bridge, Faces, Impact, Modes, Motion, Phase, Step
+from heelstrike.sim.event_driven.rows import write_row
+from heelstrike.sim.event_driven.smooth.candidates import free_acceleration, solve_candidates
+from heelstrike.sim.event_driven.smooth.corners import is_struck, log_impulse
+from heelstrike.sim.event_driven.smooth.dynamics import evaluate, observe_faces, solve_constraints
+from heelstrike.sim.event_driven.smooth.faces import has_corners, locate, stand_on_face
+from heelstrike.sim.event_driven.smooth.gaps import (
     free_gap_acceleration,
     gap_now,
     gap_rows,
     gap_velocity,
 )
-from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
-from heelstrike.sim.event_driven.phase import (
-    Bridge,
-    Faces,
-    Impact,
-    Modes,
-    Motion,
-    Phase,
-    Step,
-)
-from heelstrike.sim.event_driven.rows import write_row
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Reported, Surface
 from heelstrike.sim.record.record import Record
@@ -73,17 +65,19 @@ from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, no
 BRIDGE = int(EventKind.BRIDGE)
 
 # Length (s) of the first bridge of a series, how much longer each further one is, and how many
-# there may be; progress (s) that ends a series.
+# there may be, of which the last takes 0.26 s; progress (s) that ends a series.
 SHORTEST_BRIDGE = 1e-6
 LONGER = 4.0
 MOST_BRIDGES = 10
 PROGRESS = 1e-3
-# Gap (m) up to which a contact touches; speed (m/s, rad/s) at which another might within a bridge.
+# Gap (m) up to which a contact touches: more than projection leaves, and what the shortest bridge
+# moves at 1 mm/s. Speed (m/s, rad/s) at which another might within a bridge: of a fall from 20 m.
 TOUCHING = 1e-9
 CLOSING_SPEED = 20.0
 # Approach (m/s, rad/s) at the end of a bridge that is no more than the turning of the rows leaves.
 SETTLED = 1e-6
-# Approach (m/s) below which a bridge knows no restitution: bounces so small are what piled up.
+# Approach (m/s) below which a bridge knows no restitution: bounces so small, of 5e-8 m, are what
+# piled up.
 SLOW = 1e-3
 # What a bridge of order one is wrong by grows with the square of its length: its halves together
 # are half as wrong as the whole, its quarters a quarter. So it is this many times as wrong as the

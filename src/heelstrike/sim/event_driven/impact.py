@@ -18,13 +18,13 @@ from heelstrike.sim.contacts.geometry import (
 from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
 from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, STOP, Rows
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.candidates import free_acceleration
-from heelstrike.sim.event_driven.corners import is_struck, log_impulse
-from heelstrike.sim.event_driven.dynamics import gather_closed
-from heelstrike.sim.event_driven.faces import locate
-from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
 from heelstrike.sim.event_driven.phase import Bounces, Impact, Modes, Phase, Step
-from heelstrike.sim.event_driven.saddle_point import (
+from heelstrike.sim.event_driven.smooth.candidates import free_acceleration
+from heelstrike.sim.event_driven.smooth.corners import is_struck, log_impulse
+from heelstrike.sim.event_driven.smooth.dynamics import gather_closed
+from heelstrike.sim.event_driven.smooth.faces import locate
+from heelstrike.sim.event_driven.smooth.gaps import free_gap_acceleration, gap_rows, gap_velocity
+from heelstrike.sim.event_driven.smooth.saddle_point import (
     add_impulses,
     solve_accelerations,
     solve_velocities,
@@ -36,14 +36,16 @@ from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, no
 IMPACT = int(EventKind.IMPACT)
 ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
 
-# Velocities (m/s) up to which a point on the ground is at rest.
+# Velocities (m/s) up to which a point on the ground is at rest: what a contact problem is certified
+# to, where robots have some m/s.
 REST = 1e-9
-# Velocities (m/s, rad/s) along a loop up to which it has none.
+# Velocities (m/s, rad/s) along a loop up to which it has none: rounding of some hundred operations.
 ROUNDING = 1e-13
 # Energy counts as made when it exceeds this part of the energy that went through the contacts.
 NOTICEABLE = 1e-9
 # Bounces shorter than this (s) lose what restitution gave them, and of those shorter than this the
-# rest: what speed is left of them is less than anyone could see.
+# rest: what speed is left of them is less than anyone could see. Under gravity the first rises by
+# 1e-12 m, a gap to which events are located, the second by rounding.
 SHORTEST_BOUNCE = 1e-6
 NO_BOUNCE = 1e-8
 PLASTIC, AT_REST = 1, 2

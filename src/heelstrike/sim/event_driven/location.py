@@ -1,4 +1,4 @@
-"""Steps of the smooth motion, and where in them an event function changes its sign.
+"""Where in a step of the smooth motion an event function changes its sign.
 
 The event functions of a contact point are positive while it keeps its mode: the gap of an open
 point; the normal force of a closed one; the speed of a sliding one; what is left to the friction
@@ -9,34 +9,16 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
-from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.contacts.faces import center_of, nearest_face
-from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.dormand_prince import (
-    NODES,
-    SLOPES,
-    STAGES,
-    error_norm,
-    fit_dense,
-    interpolate,
-    stage_point,
-)
-from heelstrike.sim.event_driven.dynamics import (
-    EXPLAINED,
-    evaluate,
-    explained,
-    look,
-    project,
-)
-from heelstrike.sim.event_driven.faces import has_corners, rate_corners
-from heelstrike.sim.event_driven.phase import Modes, Phase, Samples, Step, Watch
+from heelstrike.sim.event_driven.dormand_prince import interpolate
+from heelstrike.sim.event_driven.phase import Modes, Phase, Samples, Step
+from heelstrike.sim.event_driven.smooth.dynamics import evaluate, look
+from heelstrike.sim.event_driven.smooth.faces import has_corners
 from heelstrike.sim.frame import Scene
-from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Surface
+from heelstrike.sim.memory import Memory
 
 NO_EVENT = 2.0
 """A fraction of a step beyond its end."""
@@ -45,20 +27,23 @@ SAMPLES = 4
 """Places in a step, evenly spaced, at which the event functions are looked at."""
 
 EVENT_TIME = 1e-12
-"""Seconds to which events are located."""
+"""Seconds to which events are located: what 1 m/s is wrong by then is rounding of a robot's metre
+times some thousands, and times of hours have still digits for it."""
 
 TOGETHER = 1e-10
-"""Points nearer to the ground than this (m) share an impact."""
+"""Points nearer to the ground than this (m) share an impact: a hundred times what 1 m/s makes of
+``EVENT_TIME``, and less than the tolerance of a step."""
 
 # How far an event function must be below zero to count: m, m/s, and a fraction of the weight.
 GAP_NOISE = 1e-13
 CORNER_NOISE = 1e-11
 SPEED_NOISE = 1e-12
 FORCE_NOISE = 1e-10
-# An event function that is nearer to zero than this part of its noise is zero.
-NEAR_ENOUGH = 0.1
-# How often a step is looked through for its first event.
-ATTEMPTS = 3
+# A root is kept off the ends of its interval by this part of what it is located to, so that both
+# ends move; one that is followed back from where it is negative is located to this part of that.
+INSIDE, FINER = 0.4, 0.1
+# A rate takes 4/27 of itself away from a cubic at the most; this is a little more.
+TAKEN_AWAY = 0.15
 # Where a point that has just left the ground is looked for: at this part of the way to the first
 # sample, and so on, until that is less than this (s); and one that rises no further from it than
 # this (m), until that is less than this (s).
@@ -70,20 +55,6 @@ LOW, SOON = 1e-5, 1e-6
 MOST_FACES = 64
 AT_ONCE = 1e-3
 A_DISC = 1.0
-# How much a step is shortened whose end does not fit its constraints.
-SHORTENED = 0.25
-# Angle (rad) by which links may turn in a step. What turns freely makes no error however long the
-# step is, and its points would be in the ground and out of it between two samples.
-TURN = 4.0
-
-# Shortest step as a multiple of the rounding of time.
-SHORTEST_STEP = 8.0
-
-
-@kernel
-def shortest_step(time: float) -> float:
-    """Length below which a step would not move time on by a meaningful number."""
-    return SHORTEST_STEP * 2.2e-16 * max(abs(time), 1e-3)
 
 
 @kernel
@@ -111,40 +82,6 @@ def evaluate_within(
             memory.equations.tree, memory.contacts, memory.surface, memory.seconds, phase.faces,
             phase.watch,
         )  # fmt: skip
-
-
-@kernel
-def take_step(
-    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase, step: Step
-) -> float:
-    """Try a step of the given length from ``step.begin``; return its error over the tolerance.
-
-    ``step.slopes[0]`` must be the slope at the start. A step that is good enough gets its dense
-    output; event functions and forces are left as they are at its end.
-    """
-    watch, forces = phase.watch, phase.forces
-    samples = step.samples
-    error = 0.0
-    for stage in range(1, SLOPES):
-        at_end = stage == STAGES
-        state = step.end if at_end else step.point
-        stage_point(stage, length, step.begin, step.slopes, state)
-        time = step.time + NODES[stage] * length
-        evaluate(scene, time, state, control, memory, phase, step.slopes[stage])
-        if at_end:
-            error = error_norm(
-                length, step.begin, step.end, step.slopes, step.relative, step.absolute
-            )
-            if not error <= 1.0:
-                return error
-            copy_events(watch.value, watch.rate, samples.end_value, samples.end_rate)
-            for contact in range(phase.modes.watched):
-                step.end_force[contact, 0] = forces.force[contact, 0]
-                step.end_force[contact, 1] = forces.force[contact, 1]
-            for i in range(memory.torque.shape[0]):
-                step.torque[i] = memory.torque[i]
-    fit_dense(length, step.begin, step.end, step.slopes, step.dense)
-    return error
 
 
 @kernel
@@ -187,12 +124,12 @@ def find_root(
     width = EVENT_TIME / length
     going_back = low_value <= 0.0
     for attempt in range(200):
-        if high - low <= (0.1 * width if going_back else width):
+        if high - low <= (FINER * width if going_back else width):
             break
         part = low + 0.5 * (high - low)
         if attempt % 3 != 2 and not going_back:
             part = high - high_value * (high - low) / (high_value - low_value)
-            part = min(max(part, low + 0.4 * width), high - 0.4 * width)
+            part = min(max(part, low + INSIDE * width), high - INSIDE * width)
         evaluate_within(scene, part, length, with_forces, control, memory, phase, step)
         value = turn * watch.rate[function] if turn != 0.0 else watch.value[function]
         if value > 0.0:
@@ -267,7 +204,7 @@ def lowest_place(before: float, rate: float, value: float, later_rate: float) ->
     Rates are per interval. Returns ``NO_EVENT`` where it stays above zero.
     """
     down = max(-rate, 0.0) + max(later_rate, 0.0)
-    if min(before, value) > 0.15 * down:  # 4/27 is the most that a rate takes away
+    if min(before, value) > TAKEN_AWAY * down:
         return NO_EVENT
     third = rate + later_rate - 2.0 * (value - before)
     second = value - before - rate - third
@@ -495,169 +432,3 @@ def first_event(
         copy_events(sample, sample_rate, samples.before, samples.before_rate)
         low = high
     return NO_EVENT
-
-
-@kernel
-def longest_good_step(
-    scene: Scene, length: float, stop: float, control: Control, memory: Memory, phase: Phase,
-    step: Step,
-) -> tuple[float, float, bool]:  # fmt: skip
-    """Take a step of some length or, if it is not good enough, a shorter one.
-
-    Returns its length, zero if it would have to be too short; how much longer the next may be; and
-    whether any was rejected.
-    """
-    rejected = False
-    while True:
-        if step.time + 1.0001 * length >= stop:
-            length = stop - step.time
-        if length < shortest_step(step.time):
-            return 0.0, 1.0, rejected
-        error = take_step(scene, length, control, memory, phase, step)
-        factor = 10.0 if error == 0.0 else min(10.0, 0.9 * error**-0.125)
-        if error <= 1.0:
-            return length, factor, rejected
-        length *= max(0.2, factor) if error < np.inf else 0.1
-        rejected = True
-
-
-@kernel
-def settle(
-    scene: Scene, rows: Rows, equations: Equations, contacts: Contacts, surface: Surface,
-    assembly: Assembly, loops: Loops, seconds: Contacts, phase: Phase, step: Step,
-) -> bool:  # fmt: skip
-    """Put the end of the step on its constraints; return whether its error explains how far."""
-    end, before = step.end, step.unsettled
-    for i in range(end.shape[0]):
-        before[i] = end[i]
-    left, _, _ = project(
-        scene.model, scene.ground, rows, equations, contacts, surface, assembly, loops, seconds,
-        phase, end,
-    )  # fmt: skip
-    return left <= max(TOGETHER, 2.0 * step.left) and explained(before, end, EXPLAINED, step)
-
-
-@kernel
-def end_at_event(
-    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase, step: Step
-) -> tuple[float, bool, bool]:
-    """Repeat the step to end at the event, and correct its length by what is left there.
-
-    Returns the length, whether the step is good enough, and whether its end fits its constraints.
-    """
-    watch = phase.watch
-    for attempt in range(4):
-        if not take_step(scene, length, control, memory, phase, step) <= 1.0:
-            return length, False, True
-        if not settle(
-            scene, memory.rows, memory.equations, memory.contacts, memory.surface, memory.assembly,
-            memory.loops, memory.seconds, phase, step,
-        ):  # fmt: skip
-            return length, True, False
-        look(
-            scene.model, scene.ground, step.end, memory.rows, phase.modes, memory.equations.tree,
-            memory.contacts, memory.surface, memory.seconds, phase.faces, watch,
-        )  # fmt: skip
-        if has_corners(scene.ground):
-            rate_corners(
-                scene.model, scene.ground, memory.equations.tree, memory.contacts, memory.rows,
-                phase.modes, phase.faces, watch,
-            )  # fmt: skip
-        value, rate = watch.value, watch.rate
-        change = 0.0
-        for i in range(watch.fired.shape[0]):
-            passes = watch.fired[i] == 1 and is_geometric(i, phase.modes) and rate[i] < 0.0
-            if passes and abs(value[i]) > NEAR_ENOUGH * noise(
-                i, phase.modes, watch.weight, step.samples
-            ):
-                change = -value[i] / rate[i]
-        # Where it turns round rather than passes zero, its rate does not tell where zero is.
-        if attempt == 3 or change == 0.0 or abs(change) > 0.5 * length:
-            break
-        length += change
-    return length, True, True
-
-
-@kernel
-def missed(modes: Modes, watch: Watch) -> bool:
-    """Whether a point is in the ground at the end of a step that ends with another's event.
-
-    The step is not the one on whose dense output that was found first.
-    """
-    for contact in range(modes.watched):
-        gap = watch.value[2 * contact]
-        if modes.closed[contact] == 0 and watch.fired[2 * contact] == 0 and gap < -TOGETHER:
-            return True
-    return False
-
-
-@kernel
-def look_back(scene: Scene, control: Control, memory: Memory, phase: Phase, step: Step) -> None:
-    """Evaluate the beginning of the step again."""
-    watch = phase.watch
-    samples = step.samples
-    evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
-    copy_events(watch.value, watch.rate, samples.before, samples.before_rate)
-
-
-@kernel
-def longest_turn(model: Model, motion: Floats, state: Floats) -> float:
-    """Length (s) of a step in which no link turns by more than is looked at."""
-    speed = 0.0
-    for i in range(model.nv):
-        speed += abs(motion[i, 0] * state[model.nq + i])
-    return TURN / speed if speed > 0.0 else np.inf
-
-
-@kernel
-def integrate(
-    scene: Scene, stop: float, control: Control, memory: Memory, phase: Phase, step: Step
-) -> bool:
-    """Take one good step that ends at its first event, or at `stop` at the latest.
-
-    ``step.slopes[0]`` must be the slope now, and the event functions those of now. Returns false
-    if the step would have to be too short.
-    """
-    watch = phase.watch
-    samples = step.samples
-    copy_events(watch.value, watch.rate, samples.before, samples.before_rate)
-    wish = min(step.next_length, step.longest)
-    length = wish
-    rejected = False
-    while True:
-        length, factor, shortened = longest_good_step(
-            scene, length, stop, control, memory, phase, step
-        )
-        if length == 0.0:
-            return False
-        rejected = rejected or shortened
-        if rejected:
-            step.next_length = length * min(factor, 1.0)
-        else:  # a step cut short by a stop says little about how long the next may be
-            step.next_length = max(min(wish, 10.0 * length), length * factor)
-        part = first_event(scene, length, control, memory, phase, step)
-        step.has_fired = 0 if part == NO_EVENT else 1
-        good, fits = True, True
-        for _ in range(ATTEMPTS):
-            if part == NO_EVENT:
-                break
-            length, good, fits = end_at_event(scene, length * part, control, memory, phase, step)
-            if not (good and fits and missed(phase.modes, watch)):
-                break
-            look_back(scene, control, memory, phase, step)
-            part = first_event(scene, length, control, memory, phase, step)
-            step.has_fired = 0 if part == NO_EVENT else 1
-        if step.has_fired == 0:
-            fits = settle(
-                scene, memory.rows, memory.equations, memory.contacts, memory.surface,
-                memory.assembly, memory.loops, memory.seconds, phase, step,
-            )  # fmt: skip
-        if good and fits:
-            break
-        # Where a torque saturates the shorter step can be the worse one: take less of it.
-        length *= SHORTENED if good else 0.5
-        rejected = True
-        look_back(scene, control, memory, phase, step)
-    step.length = length
-    step.finished = 1
-    return True

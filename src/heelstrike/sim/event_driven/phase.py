@@ -81,9 +81,9 @@ class Faces(Bundle):
     paired : int
         Whether the ground has concave corners, where points have second faces.
     place : (3,) float
-        Scratch of :func:`~heelstrike.sim.event_driven.faces.choose_faces`.
+        Scratch of :func:`~heelstrike.sim.event_driven.smooth.faces.choose_faces`.
     center, acceleration : (3,) float
-        Scratch of :func:`~heelstrike.sim.event_driven.gaps.free_gap_acceleration`.
+        Scratch of :func:`~heelstrike.sim.event_driven.smooth.gaps.free_gap_acceleration`.
     """
 
     face: Integers = array("contacts", of=int)
@@ -108,7 +108,7 @@ class Watch(Bundle):
     weight : float
         Of the robot, or its mass where there is no gravity: what forces are small or large beside.
     center : (3,) float
-        Scratch of :func:`~heelstrike.sim.event_driven.faces.rate_corners`.
+        Scratch of :func:`~heelstrike.sim.event_driven.smooth.faces.rate_corners`.
     """
 
     value: Floats = array("functions")
@@ -204,7 +204,7 @@ class SaddlePoint(Bundle):
     bias : (2 capacity,) float
         Known force, and acceleration of the rows of the candidates without any of the coordinates.
     rate : (nv,) float
-        Scratch of :func:`~heelstrike.sim.event_driven.saddle_point.state_accelerations`.
+        Scratch of :func:`~heelstrike.sim.event_driven.smooth.saddle_point.state_accelerations`.
     mode : (capacity,) int
     impulse, velocity : (2 capacity,) float
     residual : (3,) float

@@ -11,7 +11,6 @@ from heelstrike.sim.contacts.loops import note_loops, rows_of
 from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.candidates import slides
 from heelstrike.sim.event_driven.continuous_extension import (
     BETWEEN,
     PLACES,
@@ -19,24 +18,20 @@ from heelstrike.sim.event_driven.continuous_extension import (
     interpolate_corrected,
     move_places,
 )
-from heelstrike.sim.event_driven.corners import record_corner
 from heelstrike.sim.event_driven.dormand_prince import interpolate
-from heelstrike.sim.event_driven.dynamics import (
+from heelstrike.sim.event_driven.location import EVENT_TIME, TOGETHER
+from heelstrike.sim.event_driven.phase import Impact, Output, Phase, Samples, Step
+from heelstrike.sim.event_driven.smooth.candidates import slides
+from heelstrike.sim.event_driven.smooth.corners import record_corner
+from heelstrike.sim.event_driven.smooth.dynamics import evaluate
+from heelstrike.sim.event_driven.smooth.projection import (
     INTERPOLATED,
-    evaluate,
     explained,
     is_in_place,
     project,
 )
-from heelstrike.sim.event_driven.location import TOGETHER, shortest_step
-from heelstrike.sim.event_driven.phase import (
-    Impact,
-    Output,
-    Phase,
-    Samples,
-    Step,
-)
-from heelstrike.sim.event_driven.saddle_point import solve_accelerations
+from heelstrike.sim.event_driven.smooth.saddle_point import solve_accelerations
+from heelstrike.sim.event_driven.steps import shortest_step
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Surface
 from heelstrike.sim.record.record import Record
@@ -190,7 +185,7 @@ def write_right(
         )  # fmt: skip
     output.last_row = time
     period = output.period * output.every
-    if period > 0.0 and abs(output.next_row * period - time) <= 1e-12:
+    if period > 0.0 and abs(output.next_row * period - time) <= EVENT_TIME:
         output.next_row += 1
 
 
@@ -254,7 +249,7 @@ def write_rows_within(
     first, next_row, last_row = record.rows, output.next_row, output.last_row
     touch, is_extended = False, False
     if step.has_fired == 1:
-        last -= 1e-12
+        last -= EVENT_TIME
         for contact in range(modes.watched):
             touch = touch or (
                 modes.closed[contact] == 0 and comes_down(contact, watch.fired, step.samples)

@@ -31,7 +31,7 @@ from heelstrike.contact.modes import (
     STICK,
 )
 from heelstrike.contact.sets import INTERVAL, LINE
-from heelstrike.contact.workspace import ContactAnswer
+from heelstrike.contact.workspace import ContactAnswer, Tally
 from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import mass_matrix
 from heelstrike.robot.model import Floats, Model
@@ -39,10 +39,14 @@ from heelstrike.sim.contacts.geometry import add_impulse, row_product
 from heelstrike.sim.contacts.loops import rows_of
 from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.candidates import known_force, pose_problem, solve_candidates
-from heelstrike.sim.event_driven.gaps import free_gap_acceleration
 from heelstrike.sim.event_driven.phase import HeldRows, Modes, Phase, SaddlePoint
-from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Tally
+from heelstrike.sim.event_driven.smooth.candidates import (
+    known_force,
+    pose_problem,
+    solve_candidates,
+)
+from heelstrike.sim.event_driven.smooth.gaps import free_gap_acceleration
+from heelstrike.sim.memory import Assembly, Equations, Loops, Memory
 from heelstrike.sim.push import Pushes
 
 SMALL_PIVOT = 1e-6
@@ -471,8 +475,8 @@ def solve_accelerations(
     """Solve the contact problem of the candidates, from the full equations where its matrix fails.
 
     The equations of the state have been evaluated. Otherwise this is
-    :func:`~heelstrike.sim.event_driven.candidates.solve_candidates`, of whose certificate nothing
-    is left where rounding of the matrix counts.
+    :func:`~heelstrike.sim.event_driven.smooth.candidates.solve_candidates`, of whose certificate
+    nothing is left where rounding of the matrix counts.
     """
     saddle = phase.saddle
     assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode

@@ -17,8 +17,8 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.rows import SECOND_FACE, Rows, second_of
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.location import shortest_step
 from heelstrike.sim.event_driven.phase import Impact
+from heelstrike.sim.event_driven.steps import shortest_step
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import log_event
 

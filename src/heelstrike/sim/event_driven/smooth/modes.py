@@ -8,8 +8,8 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.dynamics import tangential_place
 from heelstrike.sim.event_driven.phase import Modes
+from heelstrike.sim.event_driven.smooth.projection import tangential_place
 from heelstrike.sim.memory import Assembly, Reported
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import (

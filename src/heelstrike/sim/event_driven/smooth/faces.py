@@ -267,12 +267,10 @@ def rate_corners(
         center[0], center[1] = x, z
         link, radius = model.contact_link[contact], model.contact_radius[contact]
         along_x, along_z = velocity_at(tree.velocity, link, place_of(tree, center))
-        later = way_left(
-            ground, contact, x + SOON * along_x, z + SOON * along_z, radius, rows, modes.closed, faces
-        )  # fmt: skip
-        watch.rate[corner] = (
-            later - way_left(ground, contact, x, z, radius, rows, modes.closed, faces)
-        ) / SOON
+        soon_x, soon_z = x + SOON * along_x, z + SOON * along_z
+        here = way_left(ground, contact, x, z, radius, rows, modes.closed, faces)
+        later = way_left(ground, contact, soon_x, soon_z, radius, rows, modes.closed, faces)
+        watch.rate[corner] = (later - here) / SOON
 
 
 @kernel

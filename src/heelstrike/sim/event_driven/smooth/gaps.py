@@ -16,8 +16,8 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.geometry import contact_rows, contact_velocity, write_unit_row
 from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.faces import face_curvature
 from heelstrike.sim.event_driven.phase import Faces
+from heelstrike.sim.event_driven.smooth.faces import face_curvature
 from heelstrike.sim.memory import Assembly, Equations
 
 
