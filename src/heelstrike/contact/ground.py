@@ -28,21 +28,21 @@ class GroundModel(Bundle):
 
     Attributes
     ----------
-    vertices : (ns + 1, 2) float
+    vertices : (segments + 1, 2) float
         Corners of the profile (x, z) in metres, x never decreasing; the end segments go on for
         ever.
-    normal : (ns, 2) float
+    normal : (segments, 2) float
         Upward unit normal of each segment.
-    friction, restitution : (ns,) float
+    friction, restitution : (segments,) float
         Coefficients of each segment.
     concave : int
         Whether there is a corner in which a point can touch two faces.
     """
 
-    vertices: Floats = array("ns + 1", "axes")
-    normal: Floats = array("ns", "axes")
-    friction: Floats = array("ns")
-    restitution: Floats = array("ns")
+    vertices: Floats = array("segments + 1", "axes")
+    normal: Floats = array("segments", "axes")
+    friction: Floats = array("segments")
+    restitution: Floats = array("segments")
     concave: int = number(int)
 
 

@@ -63,6 +63,9 @@ class Method(ABC):
     work: ClassVar[Any]
     """Its own bundle: settings that kernels read, and all that it remembers."""
 
+    usual_numbers: ClassVar[Mapping[str, int]] = {}
+    """Whole numbers of its bundle as they mostly are: with these, loops have no code for others."""
+
     impulses_in_events: ClassVar[bool] = False
     """Whether impulses of impacts are in the events of a run, not in the forces of its rows."""
 
