@@ -191,7 +191,7 @@ def _is_any(value: object, kinds: Sequence[str]) -> bool:
 
 
 @functools.lru_cache
-def _names(kind: type) -> frozenset[str]:
+def _names(kind: Any) -> frozenset[str]:
     """Names of a class and of all that it is one of."""
     return frozenset(each.__name__ for each in kind.__mro__)
 
