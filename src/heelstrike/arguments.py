@@ -186,7 +186,8 @@ def refusal(name: str, value: object, kinds: Sequence[str]) -> str:
 
 
 def _is_any(value: object, kinds: Sequence[str]) -> bool:
-    names = _names(type(value))
+    own: Any = type(value)
+    names = _names(own)
     return any(_KINDS[kind][1](value) if kind in _KINDS else kind in names for kind in kinds)
 
 

@@ -271,7 +271,8 @@ class Method(ABC):
 
 def work_of(method: Method, robot: Robot) -> Any:
     """Return a new bundle of a method for a robot, cast if it had one before."""
-    if not isinstance(method, Hashable):
+    settings: Any = method
+    if not isinstance(settings, Hashable):
         return method.new_work(robot)
     molds = _MOLDS.setdefault(robot, {})
     if method not in molds:
