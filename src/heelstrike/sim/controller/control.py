@@ -221,8 +221,8 @@ def _laid_out(law: Law, robot: Robot, log: Bundle) -> _Laid:
     both = _kept(*kinds)(memory=memory, log=log)
     kept, kept_words, between_kept = in_one_block(both)
     spare, spare_words, _ = in_one_block(both)
-    kinds = type(parameters), type(kept)
-    own = _own(*kinds)(
+    owned: tuple[Any, Any] = type(parameters), type(kept)
+    own = _own(*owned)(
         parameters=parameters, kept=kept, spare=spare, parameter_words=parameter_words,
         kept_words=kept_words, spare_words=spare_words,
     )  # fmt: skip
