@@ -186,12 +186,13 @@ def refusal(name: str, value: object, kinds: Sequence[str]) -> str:
 
 
 def _is_any(value: object, kinds: Sequence[str]) -> bool:
-    names = _names(type(value))
+    own: Any = type(value)
+    names = _names(own)
     return any(_KINDS[kind][1](value) if kind in _KINDS else kind in names for kind in kinds)
 
 
 @functools.lru_cache
-def _names(kind: type) -> frozenset[str]:
+def _names(kind: Any) -> frozenset[str]:
     """Names of a class and of all that it is one of."""
     return frozenset(each.__name__ for each in kind.__mro__)
 

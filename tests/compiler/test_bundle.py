@@ -9,9 +9,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from numba import types
 
 from heelstrike.compiler.bundle import Bundle, array, cell, extent, number, part
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import kernel, loop_for
 
 
 class Inner(Bundle):
@@ -228,3 +229,30 @@ def test_a_class_keeps_its_type_however_many_there_are() -> None:
     for k in range(300):
         made(f"Other{k}").compiled_type()
     assert first.compiled_type() is kind
+
+
+class Chain(Bundle):
+    links: int = extent()
+    mode: int = number(int)
+    angle: np.ndarray = array("links")
+    loose: np.ndarray = array("2 ends + 1")
+
+
+class Yard(Bundle):
+    chain: Chain = part(Chain)
+    ends: int = cell(int)  # a cell of the name of an extent is no extent
+
+
+def test_code_may_take_extents_and_numbers_for_granted() -> None:
+    def describe(yard):  # type: ignore[no-untyped-def]
+        chain = yard.chain
+        return 1000 * yard.ends + 100 * chain.mode + 10 * chain.links + chain.loose.shape[0]
+
+    chain = Chain(mode=2, angle=np.zeros(3), loose=np.zeros(5))
+    yard = Yard(chain=chain)
+    yard.ends = 4
+    kinds = Yard.compiled_type(), Yard.compiled_type((("links", 7), ("mode", 9), ("ends", 1)))
+    usual, fixed = (loop_for(types.int64(kind), describe) for kind in kinds)
+    assert usual(yard) == 4000 + 200 + 30 + 5
+    assert fixed(yard) == 4000 + 900 + 70 + 3  # made for others than this one
+    assert Yard.compiled_type((("strange", 1),)) is kinds[0]

@@ -27,6 +27,9 @@ from heelstrike.compiler.compilation import numba_in_use
 WORD_BYTES = 8
 _WORD = ir.IntType(64)
 
+Fixed = tuple[tuple[str, int], ...]
+"""Extents and whole numbers by name that compiled code takes for granted: it is made for them."""
+
 
 class BundleType(types.Type):
     """Type of a bundle; each class of bundles has a class of types of its own.
@@ -41,11 +44,13 @@ class BundleType(types.Type):
         Members that can be set.
     places : dict of str to int
         Where in the table a member begins.
+    fixed : dict of str to int
+        Extents and numbers that are constants of the code.
     """
 
-    def __init__(self, cls: Any) -> None:
-        self.cls = cls
-        self.members = {name: _member_type(member) for name, member in cls.declared.items()}
+    def __init__(self, cls: Any, fixed: Fixed = ()) -> None:
+        self.cls, self.fixed = cls, dict(fixed)
+        self.members = {name: _member_type(each, fixed) for name, each in cls.declared.items()}
         self.cells = {name for name, member in cls.declared.items() if member.role == "cell"}
         self.extents: dict[str, tuple[str, int]] = {}
         self.places: dict[str, int] = {}
@@ -56,7 +61,7 @@ class BundleType(types.Type):
             for dimension, extent in enumerate(member.shape):
                 if extent in cls.named:
                     self.extents[extent] = (name, dimension)
-        described = repr((self.members, sorted(self.cells), self.extents))
+        described = repr((self.members, sorted(self.cells), self.extents, *fixed))
         # The name goes into every symbol of the machine code: short, but never that of another.
         digest = hashlib.sha256(described.encode()).hexdigest()[:12]
         super().__init__(name=f"{cls.__name__}_{digest}")
@@ -83,6 +88,9 @@ class BundleType(types.Type):
         """Read a member or an extent. Arrays carry no reference count."""
         if name in self.cells:
             return builder.load(self.cell(context, builder, table, name))
+        is_number = name in self.extents or self.cls.declared[name].role == "number"
+        if is_number and name in self.fixed:
+            return ir.Constant(_WORD, self.fixed[name])
         if name in self.extents:
             member, dimension = self.extents[name]
             return _word(builder, table, self.places[member] + 1 + dimension)
@@ -94,7 +102,12 @@ class BundleType(types.Type):
             return builder.bitcast(word, ir.DoubleType())
         if not isinstance(member, types.Array):
             return word
-        shape = [_word(builder, table, place + 1 + i) for i in range(member.ndim)]
+        shape = [
+            ir.Constant(_WORD, factor * self.fixed[extent] + more)
+            if extent in self.fixed
+            else _word(builder, table, place + 1 + i)
+            for i, (factor, extent, more) in enumerate(self.cls.declared[name].extents)
+        ]
         strides = [ir.Constant(_WORD, WORD_BYTES)]
         for extent in reversed(shape[1:]):
             strides.insert(0, builder.mul(strides[0], extent))
@@ -112,12 +125,28 @@ class BundleType(types.Type):
         return made._getvalue()
 
 
+def bundle_type(cls: Any, fixed: Fixed = ()) -> BundleType:
+    """Return the type of a class of bundles, of those alone that have what is fixed."""
+    return _bundle_type(cls, tuple((name, value) for name, value in fixed if name in _sizes(cls)))
+
+
+@cache
+def _sizes(cls: Any) -> frozenset[str]:
+    """Names of the extents and whole numbers of a class and of its parts."""
+    names = set(cls.extent_names)
+    for name, member in cls.declared.items():
+        if member.role == "part":
+            names |= _sizes(member.kind)
+        elif member.role == "number" and member.kind is int:
+            names.add(name)
+    return frozenset(names)
+
+
 @cache  # for good: a type made anew would be another, and machine code for it compiled again
-def bundle_type(cls: Any) -> BundleType:
-    """Return the type of a class of bundles."""
+def _bundle_type(cls: Any, fixed: Fixed) -> BundleType:
     kind: type[BundleType] = type(cls.__name__, (BundleType,), {})
     register_model(kind)(_BundleModel)
-    made = kind(cls)
+    made = kind(cls, fixed)
     _made.append(made)
     numba_in_use().declare(made)
     return made
@@ -132,9 +161,9 @@ def _named(name: str) -> Any:
     return next((each for each in reversed(_made) if each.name == name), types.Opaque(name))
 
 
-def _member_type(member: Any) -> Any:
+def _member_type(member: Any, fixed: Fixed) -> Any:
     if member.role == "part":
-        return bundle_type(member.kind)
+        return bundle_type(member.kind, fixed)
     scalar = types.float64 if member.kind is float else types.int64
     return types.Array(scalar, len(member.shape), "C") if member.role == "array" else scalar
 

@@ -34,13 +34,13 @@ AT_THE_CORNER = 1e-12
 class GroundModel(Bundle):
     """The ground as the kernels see it."""
 
-    vertices: Floats = array("ns + 1", "axes")
+    vertices: Floats = array("segments + 1", "axes")
     """Corners of the profile (x, z) in metres, x never decreasing; the end segments go on for
     ever."""
-    normal: Floats = array("ns", "axes")
+    normal: Floats = array("segments", "axes")
     """Upward unit normal of each segment."""
-    friction: Floats = array("ns")
-    restitution: Floats = array("ns")
+    friction: Floats = array("segments")
+    restitution: Floats = array("segments")
     """friction, restitution: Coefficients of each segment."""
     concave: int = number(int)
     """Whether there is a corner in which a point can touch two faces."""

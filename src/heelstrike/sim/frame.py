@@ -16,13 +16,15 @@ acts at once and a simulation can be stopped, kept and taken up again at any ste
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from time import perf_counter
 from typing import Any, NamedTuple
 
+import numpy as np
 from numba import types
 
+from heelstrike.compiler.bundle_type import Fixed
 from heelstrike.compiler.compilation import dissolved_kernel, loop_for
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.solvers.certified_solve import try_solvers
@@ -196,12 +198,35 @@ def frame(kernels: Kernels) -> Callable[..., int]:
     return advance
 
 
+PLAIN: Fixed = (
+    ("loops", 0), ("couplings", 0), ("latches", 0), ("brakes", 0), ("loop_rows", 0), ("nd", 0),
+    ("segments", 1), ("concave", 0),
+)  # fmt: skip
+"""What a robot and a ground without rarer features have none of.
+
+A loop that is made for these has no code for closed loops, latches, brakes, dry friction, profiles.
+"""
+
+
+def fixed_for(model: Model, ground: GroundModel, work: Any, usual: Mapping[str, int]) -> Fixed:
+    """Return what the loop of a simulation can take for granted: all that is rare, or nothing.
+
+    Two loops a method are enough: each is compiled when it is first needed.
+    """
+    dry = model.dry_friction.any() or np.isfinite(model.brake_limit).any()
+    rare = dry or model.loops or model.couplings or model.latches or model.brakes
+    plain = not rare and ground.friction.size == 1
+    if not (plain and all(getattr(work, name) == value for name, value in usual.items())):
+        return ()
+    return PLAIN + tuple(usual.items())
+
+
 @lru_cache
-def compiled_loop(kernels: Kernels, work: Any) -> tuple[Any, float]:
+def compiled_loop(kernels: Kernels, work: Any, fixed: Fixed = ()) -> tuple[Any, float]:
     """Compile the loop of a method, or load it; return it with the seconds that took."""
     begin = perf_counter()
     kinds = (Model, GroundModel, Control, Memory, work, Record, Clock)
-    signature = types.int64(*(kind.compiled_type() for kind in kinds))
+    signature = types.int64(*(kind.compiled_type(fixed) for kind in kinds))
     try_solvers.begin()
     compiled = loop_for(signature, frame(kernels))
     try_solvers.finish()

@@ -64,6 +64,9 @@ class Method(ABC):
     work: ClassVar[Any]
     """Its own bundle: settings that kernels read, and all that it remembers."""
 
+    usual_numbers: ClassVar[Mapping[str, int]] = {}
+    """Whole numbers of its bundle as they mostly are: with these, loops have no code for others."""
+
     impulses_in_events: ClassVar[bool] = False
     """Whether impulses of impacts are in the events of a run, not in the forces of its rows."""
 
@@ -288,7 +291,8 @@ class Method(ABC):
 
 def work_of(method: Method, robot: Robot) -> Any:
     """Return a new bundle of a method for a robot, cast if it had one before."""
-    if not isinstance(method, Hashable):
+    settings: Any = method
+    if not isinstance(settings, Hashable):
         return method.new_work(robot)
     molds = _MOLDS.setdefault(robot, {})
     if method not in molds:

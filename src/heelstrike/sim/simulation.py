@@ -36,7 +36,7 @@ from heelstrike.sim.controller.law import Law, commands_voltage, law_of, no_torq
 from heelstrike.sim.controller.raised import EndOfRun, tell
 from heelstrike.sim.controller.robot import NO_ENDING
 from heelstrike.sim.controller.watch import Watch
-from heelstrike.sim.frame import Outcome, compiled_loop
+from heelstrike.sim.frame import Outcome, compiled_loop, fixed_for
 from heelstrike.sim.image import Camera
 from heelstrike.sim.look import Look
 from heelstrike.sim.memory import Memory, allocate_memory
@@ -234,8 +234,7 @@ class Simulation:
         method.set_clock(setting, self._clock)
         for bundle in (self._memory, self._work, self._clock, setting.ground.model()):
             _ = bundle.address  # laid out now, not while the loop is timed
-        self._loop, compile_s = compiled_loop(method.kernels, method.work)
-        self._timing = Timing(compile_s, 0.0)
+        self._timing = Timing(self._choose_loop(), 0.0)
         self._fork: Snapshot | None = None
         self._cameras: tuple[tuple[Any, Any], Any] = ((None, None), None)
         self._around: tuple[tuple[Any, Any], dict[str, Any]] = ((None, None), {})
@@ -249,6 +248,13 @@ class Simulation:
         self.status = RunStatus.COMPLETED
         self.message = "not begun"
         self.error: BaseException | None = None
+
+    def _choose_loop(self) -> float:
+        """Take the loop that is made for what this robot, ground and method do not have."""
+        model, method = self.robot.model, self.method
+        fixed = fixed_for(model, self._ground.model(), self._work, method.usual_numbers)
+        self._loop, compile_s = compiled_loop(method.kernels, method.work, fixed)
+        return compile_s
 
     @property
     def time(self) -> float:
@@ -310,6 +316,7 @@ class Simulation:
             self.method.forget_ground(self.robot, self._work, self._clock)
             self._clock.moving = 0
         self._ground = ground
+        self._choose_loop()
 
     def _check(self, setting: Setting) -> None:
         """Refuse what the method cannot simulate, and warn of what it can hardly, once."""
@@ -846,7 +853,10 @@ class Simulation:
         except (KeyError, ValueError) as error:
             raise SimulationError(f"the snapshot is damaged: {error}") from error
         camera.put_back(image)
-        self._memory, self._pushes, self._ground = memory, pushes, ground
+        self._memory, self._pushes = memory, pushes
+        if ground is not self._ground:
+            self._ground = ground
+            self._choose_loop()
         self._why_stopped = ""
         self._clock.finishing = 0  # of one that its controller has ended
         for numbers in (self._control, self._numbers.control):

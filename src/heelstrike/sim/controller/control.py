@@ -187,9 +187,11 @@ def _numbers_of(law: Law, robot: Robot, log: Bundle | None) -> tuple[Any, _Laid]
     if log is not None or not plain:
         laid = _laid_out(law, robot, law.new_log(robot) if log is None else log)
         return laid.mold.cast(), laid
-    laid = _LAID.get(law)
+    known = _LAID.get(law)
     wanted = robot, law.parameters, law.memory
-    if laid is None or (laid.robot, laid.parameters, laid.memory) != wanted:
+    if known is not None and (known.robot, known.parameters, known.memory) == wanted:
+        laid = known
+    else:
         laid = _LAID[law] = _laid_out(law, robot, law.new_log(robot))
     own = laid.mold.cast()
     places = {name: values for name, _, values in own.parameters.views()}
@@ -201,10 +203,12 @@ def _numbers_of(law: Law, robot: Robot, log: Bundle | None) -> tuple[Any, _Laid]
 def _laid_out(law: Law, robot: Robot, log: Bundle) -> _Laid:
     numbers, memory = law.numbers(robot)
     parameters, parameter_words, between_parameters = in_one_block(numbers)
-    both = _kept(type(memory), type(log))(memory=memory, log=log)
+    kinds: tuple[Any, Any] = type(memory), type(log)
+    both = _kept(*kinds)(memory=memory, log=log)
     kept, kept_words, between_kept = in_one_block(both)
     spare, spare_words, _ = in_one_block(both)
-    own = _own(type(parameters), type(kept))(
+    owned: tuple[Any, Any] = type(parameters), type(kept)
+    own = _own(*owned)(
         parameters=parameters, kept=kept, spare=spare, parameter_words=parameter_words,
         kept_words=kept_words, spare_words=spare_words,
     )  # fmt: skip

@@ -918,4 +918,5 @@ def move(
 
 
 TimeStepping.work = Stepping
+TimeStepping.usual_numbers = {"scheme": IMPACT_RESOLVED}
 TimeStepping.kernels = Kernels(begin, prepare, decide, report, move)
