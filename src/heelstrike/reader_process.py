@@ -10,6 +10,7 @@ The module is also the program of that process, which imports nothing of heelstr
 
 from __future__ import annotations
 
+import atexit
 import faulthandler
 import importlib
 import math
@@ -91,7 +92,7 @@ class ReaderProcess:
     def end(self) -> None:
         """End the process; the next order starts another."""
         process, self._process = self._process, None
-        if process is not None:
+        if process is not None and self._owner == os.getpid():
             process.kill()
             process.communicate()
 
@@ -221,6 +222,7 @@ def _follow(orders: IO[bytes], answers: IO[bytes]) -> None:
 
 READER = ReaderProcess()
 """The process that reads the files of this one."""
+atexit.register(READER.end)
 
 if __name__ == "__main__":
     # What a parser prints is no answer.

@@ -615,14 +615,14 @@ def many(**numbers: int) -> Files:
 @pytest.mark.usefixtures("bounded")
 def test_geoms_that_never_touch_the_ground_are_not_compared_one_by_one(tmp_path: Path) -> None:
     with pytest.warns(RobotWarning, match="fixed geoms"):
-        robot = load_robot(write(many(moving=3000, ground=3000), tmp_path))
+        robot = planar_robot(write(many(moving=3000, ground=3000), tmp_path), Options())
     assert robot.nc == 0
 
 
 @pytest.mark.usefixtures("bounded")
 def test_contact_points_are_not_compared_one_by_one(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match="5000 contact points, and heelstrike takes up to 2000"):
-        load_robot(write(many(moving=5000), tmp_path))
+        planar_robot(write(many(moving=5000), tmp_path), Options())
 
 
 # On the command line
