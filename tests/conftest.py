@@ -45,3 +45,6 @@ def pytest_configure(config: pytest.Config) -> None:
         kept = tempfile.TemporaryDirectory(prefix="gaits-", ignore_cleanup_errors=True)
         config.add_cleanup(kept.cleanup)
         os.environ["HEELSTRIKE_KEEP_GAITS"] = "0" if size else kept.name
+        robots = tempfile.TemporaryDirectory(prefix="robots-", ignore_cleanup_errors=True)
+        config.add_cleanup(robots.cleanup)
+        os.environ["HEELSTRIKE_KEEP_ROBOTS"] = robots.name

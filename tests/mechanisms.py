@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.robot import Robot, RobotBuilder
-from heelstrike.robot.files.mjcf import read_mjcf
+from heelstrike.robot.files.reading import read_mjcf
 
 PLANAR = """
   <joint name="x" type="slide" axis="1 0 0"/>

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import walking
 from typer.testing import CliRunner
 
 import heelstrike as hs
@@ -133,6 +134,17 @@ def test_a_fall_is_kept_and_told(walk: Callable[..., Any], tmp_path: Path) -> No
     assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["status"] == "fell"
     assert hs.load_run(out / "run.nc").time[-1] > 0.0
     assert (out / "tracking.png").exists()
+
+
+@pytest.mark.parametrize("command", ["walk", "compare"])
+def test_a_robot_that_goes_down_has_not_walked(command: str, tmp_path: Path) -> None:
+    """Moreau-Jean at 1 ms sinks into the ground, and its run ends when its time is up."""
+    gait, out = str(tmp_path / "gait.json"), str(tmp_path / "out")
+    walking.gait().save(gait)
+    options = ["--method", "moreau-jean", "--steps", "1", "--step", "1e-3", "--gait", gait]
+    result = CliRunner().invoke(app, [command, "bravo7", *options, "--out", out])
+    assert result.exit_code == 1
+    assert "the robot goes down: torque limit" in " ".join(result.stderr.split())
 
 
 def test_a_fall_on_point_feet_is_explained(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import built_falls as falls
+import numpy as np
 import pytest
 import walking
 from synthetic_runs import make_run, pendulum
@@ -13,7 +14,7 @@ import heelstrike as hs
 from heelstrike.analysis import first_cause
 from heelstrike.analysis.diagnosis.changes import Change, Lever, changes
 from heelstrike.experiments import what_if
-from heelstrike.experiments.laws import law_called
+from heelstrike.experiments.laws import bent_knees, gait_for, law_called
 
 FIRST = {
     "ice": Lever.FRICTION,
@@ -39,6 +40,37 @@ def test_what_to_change_works_when_it_is_done(name: str) -> None:
     (tried,) = what_if.try_changes(case, asked)  # the first one does
     assert tried.lasted
     assert tried.change == asked[0]
+
+
+def test_knees_that_a_gait_keeps_bent_stay_so() -> None:
+    """On point feet a gait is designed with bent knees, and designed again with them."""
+    robot = hs.load_robot("rabbit")
+    gait = gait_for(robot)
+    ranges = bent_knees(robot, gait)
+    assert sorted(ranges) == ["left_knee", "right_knee"]
+    case = what_if.Case(robot=robot, gait=gait)
+    other = what_if.changed(case, Change(Lever.GAIT_CLEARANCE, 1.2 * gait.clearance)).gait
+    assert other.clearance == pytest.approx(1.2 * gait.clearance)
+    assert bent_knees(robot, other) == ranges
+    assert bent_knees(walking.bravo7(), walking.gait()) == {}
+
+
+@pytest.mark.filterwarnings("error::heelstrike.ControllerWarning")
+def test_a_law_that_raises_is_not_told_of_at_every_trial() -> None:
+    class Raises:
+        def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+            if t >= 0.05:
+                raise ValueError("as always")
+            return np.zeros(6)
+
+    law = dataclasses.replace(
+        what_if.PAPER, trial=lambda robot, gait: dataclasses.replace(
+            what_if.PAPER.trial(robot, gait), controller=Raises()
+        ),
+    )  # fmt: skip
+    case = falls.walk(law=law)
+    assert case.run().status is hs.sim.RunStatus.CONTROLLER_FAILED
+    assert "not tried" in next(iter(what_if.try_disturbances(case))).outcome
 
 
 def test_a_gait_that_lifts_the_foot_over_the_bar() -> None:

@@ -6,13 +6,12 @@ import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.gait import kept_gait
 
 
 @pytest.fixture(autouse=True)
 def _nothing_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is asked of the design of gaits is asked of a design, and not of a file."""
-    monkeypatch.setenv(kept_gait.SWITCH, "0")
+    monkeypatch.setenv("HEELSTRIKE_KEEP_GAITS", "0")
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ import pytest
 import walking
 
 import heelstrike as hs
+from heelstrike import kept_files
 from heelstrike.gait import design, kept_gait
 from heelstrike.robot.model import Model
 
@@ -20,7 +21,7 @@ ASKED: dict[str, Any] = {"step_length": 0.3, "step_duration": 0.7, "intervals": 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     walking.gait()  # not into this folder
-    monkeypatch.setenv(kept_gait.SWITCH, str(tmp_path / "gaits"))
+    monkeypatch.setenv("HEELSTRIKE_KEEP_GAITS", str(tmp_path / "gaits"))
     return tmp_path / "gaits"
 
 
@@ -86,7 +87,7 @@ def test_another_program_designs_anew(
     folder: Path, designs: list[object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hs.optimize_gait(walking.bravo7(), **ASKED)
-    monkeypatch.setattr(kept_gait, "_program", lambda: b"another")
+    monkeypatch.setattr(kept_gait, "program_digest", lambda *_: b"another")
     hs.optimize_gait(walking.bravo7(), **ASKED)
     assert len(designs) == 2
 
@@ -107,7 +108,7 @@ def test_what_cannot_be_kept_is_designed_all_the_same(
     no_folder = tmp_path / "file"
     no_folder.write_text("a file")
     for switch in ("0", str(no_folder / "below")):
-        monkeypatch.setenv(kept_gait.SWITCH, switch)
+        monkeypatch.setenv("HEELSTRIKE_KEEP_GAITS", switch)
         hs.optimize_gait(walking.bravo7(), **ASKED)
         hs.optimize_gait(walking.bravo7(), **ASKED)
     assert len(designs) == 4
@@ -116,7 +117,7 @@ def test_what_cannot_be_kept_is_designed_all_the_same(
 def test_the_older_half_goes(
     folder: Path, designs: list[object], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(kept_gait, "MOST", 4)
+    monkeypatch.setattr(kept_files, "MOST", 4)
     for friction in (0.5, 0.6, 0.7, 0.8, 0.9):
         hs.optimize_gait(walking.bravo7(), **ASKED, friction=friction)
     assert len(list(folder.iterdir())) == 3

@@ -10,7 +10,7 @@ import pytest
 
 from heelstrike.errors import RobotError
 from heelstrike.robot import BodyTable, Robot, RobotBuilder, RobotWarning, human, load_robot
-from heelstrike.robot.files.mjcf import read_mjcf
+from heelstrike.robot.files.reading import read_mjcf
 
 
 def built_bravo7() -> Robot:

@@ -25,7 +25,16 @@ from heelstrike.cli.options import (
     reads_robots,
 )
 from heelstrike.cli.planning import law_asked, planned_walk
-from heelstrike.cli.terminal import FAILED, output, spoken, stage, tell, tell_interruption, wrote
+from heelstrike.cli.terminal import (
+    FAILED,
+    complain,
+    output,
+    spoken,
+    stage,
+    tell,
+    tell_interruption,
+    wrote,
+)
 from heelstrike.cli.values import ground_called, pushes_called
 
 USUAL = (
@@ -73,7 +82,9 @@ def compare(
 ) -> None:
     """Walk the same steps by several methods and tell how far they differ."""
     import heelstrike as hs
+    from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
     from heelstrike.experiments.walk import beginning
+    from heelstrike.gait import Gait
     from heelstrike.view.style import save_figure
     from heelstrike.whole_file import write_whole
 
@@ -85,7 +96,8 @@ def compare(
     law = law_asked(controller, machine)
     ways = method or USUAL
     methods = {way.value: method_called(way, step, passive=not machine.nu) for way in ways}
-    start = beginning(machine, planned_walk(machine, gait, surface, law), surface, law)
+    planned = planned_walk(machine, gait, surface, law)
+    start = beginning(machine, planned, surface, law)
     doing = f"walking {steps} steps by {len(methods)} methods"
     with stage(doing, when_slow="(compiling each of them, once: about a minute)"):
         comparison = hs.compare(
@@ -109,5 +121,13 @@ def compare(
         raise typer.Exit(INTERRUPTED)
     save_figure(comparison.plot(), out / "compare.png")
     tell(f"in {out}: compare.json, compare.png")
-    if not all(run.completed for run in comparison.runs.values()):
+    followed = planned if isinstance(planned, Gait) else None
+    falls = {  # who stands, or walks without motors, is judged by the end of its run
+        name: first_cause(run, followed) if followed else None
+        for name, run in comparison.runs.items()
+    }
+    for name, fall in falls.items():
+        if fall is not None and comparison.runs[name].completed:
+            complain(f"{name}: the robot goes down: {fall}")
+    if not all(walked_on(run, falls[name]) for name, run in comparison.runs.items()):
         raise typer.Exit(FAILED)

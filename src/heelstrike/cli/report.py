@@ -200,6 +200,7 @@ def _tell(
     *,
     as_json: bool,
 ) -> None:
+    from heelstrike.analysis.diagnosis.falls import walked_on
     from heelstrike.analysis.summary import plain
     from heelstrike.view.page import judge
 
@@ -212,5 +213,5 @@ def _tell(
             label = f"{name}: " if len(verdicts) > 1 else ""
             output().print(f"{label}{verdict.headline}", markup=False, soft_wrap=True)
     tell(f"{out}: the report, for any browser, which prints it to PDF")
-    if not all(run.completed and verdicts[name].fall is None for name, run in runs.items()):
+    if not all(walked_on(run, verdicts[name].fall) for name, run in runs.items()):
         raise typer.Exit(FAILED)

@@ -201,6 +201,7 @@ def _tell_outcome(
     as_json: bool,
 ) -> None:
     """Show the figures of a walk and say how it went, by the exit status, too."""
+    from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
     from heelstrike.experiments.walk import steps_taken, why_unstable
     from heelstrike.gait import Gait
     from heelstrike.sim import EventDriven, RunStatus
@@ -219,9 +220,12 @@ def _tell_outcome(
         tell_interruption(f"walking, at t = {run.time[-1]:.3g} s" if len(run.time) else "walking")
         raise typer.Exit(INTERRUPTED)
     taken = steps_taken(run, planned)
-    walked = run.completed and (planned is None or taken >= steps)
+    fall = None if gait is None else first_cause(run, gait)
+    walked = walked_on(run, fall) and (planned is None or taken >= steps)
     if not run.completed:
         complain(run.message)
+    elif fall is not None:
+        complain(f"the robot goes down: {fall}")
     elif not walked:
         complain(f"the robot took {taken} of {steps} steps in {run.time[-1]:.3g} s")
     exact = isinstance(run.method, EventDriven)

@@ -53,6 +53,9 @@ BRAVO7_WEIGHT, BRAVO7_STEP = 75.0, 0.30
 POINT_FEET_STEP = StepSize(2.4, 0.86, 2.4)
 """Steps on point feet, in those that suit flat feet: a slow step lets the weight tip the robot."""
 
+SAMPLES = np.linspace(0.0, 1.0, 20)
+"""Instants of a step, in its durations, at which knees are looked at."""
+ON_IT = 1e-3  # rad, by which a gait may leave a range between its nodes
 BENT, OTHER_WAY = (0.2, 2.6), (-2.6, -0.2)
 """Angles of knees on point feet, in rad: straight legs have nothing to give."""
 
@@ -345,15 +348,37 @@ def gait_for(robot: Robot) -> Gait:
     try:
         return optimize_gait(
             robot, step_length=size.length, step_duration=size.duration, clearance=size.clearance,
-            friction=gait.friction, joint_ranges=_bent_knees(robot, gait),
+            friction=gait.friction, joint_ranges=_knee_ranges(robot, gait),
         )  # fmt: skip
     except GaitError:  # a zero of the knees that is not straight, say
         return gait
 
 
-def _bent_knees(robot: Robot, gait: Gait) -> dict[str, tuple[float, float]]:
+def bent_knees(robot: Robot, gait: Gait) -> dict[str, tuple[float, float]]:
+    """Ranges (rad) that a gait keeps its knees bent in, by their names; none if it straightens one.
+
+    Parameters
+    ----------
+    robot : Robot
+        A robot.
+    gait : Gait
+        Its gait.
+    """
+    if not gait.point_feet:
+        return {}
+    ranges = _knee_ranges(robot, gait)
+    knees = [robot.joint_index(name) for name in ranges]
+    columns = [robot.model.actuator_joint.tolist().index(knee) for knee in knees]
+    course = gait.in_step(SAMPLES * gait.step_duration)
+    both = np.concatenate((course, gait.mirrored(course)))[:, columns]
+    low, high = np.transpose(list(ranges.values())) if ranges else np.zeros((2, 0))
+    within = np.all((both >= low - ON_IT) & (both <= high + ON_IT))
+    return ranges if within else {}
+
+
+def _knee_ranges(robot: Robot, gait: Gait) -> dict[str, tuple[float, float]]:
     """Ranges in which the knees stay bent as they are in a gait, in rad; zero is straight."""
-    course = gait.in_step(np.linspace(0.0, gait.step_duration, 20))
+    course = gait.in_step(SAMPLES * gait.step_duration)
     either = 0.5 * (course + gait.mirrored(course)).mean(axis=0)
     actuators = robot.model.actuator_joint.tolist()
     knees = [leg[1] for leg in leg_joints(robot) if len(leg) > 1]

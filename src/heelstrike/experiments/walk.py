@@ -17,6 +17,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State
 from heelstrike.sim import Controller, Push, Run, simulate
+from heelstrike.sim.closed_sets import OnError
 from heelstrike.sim.controller.law import Law
 from heelstrike.sim.method import Method
 
@@ -207,6 +208,7 @@ def walk(
     ground: Ground | None = None,
     pushes: Sequence[Push] = (),
     progress: Callable[[float], None] | None = None,
+    on_error: OnError | str = OnError.WARN,
 ) -> Run:
     """Walk a gait, or on from a limit cycle.
 
@@ -229,6 +231,8 @@ def walk(
         Forces that somebody else applies.
     progress : callable, optional
         Called now and then with the fraction of the walk that is done.
+    on_error : OnError or str
+        What to do when the law raises, as of :func:`~heelstrike.simulate`.
 
     Raises
     ------
@@ -253,6 +257,7 @@ def walk(
         ground=ground,
         pushes=pushes,
         progress=report,
+        on_error=on_error,
     )
 
 

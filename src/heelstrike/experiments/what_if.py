@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field, replace
+from typing import Any
 
 import numpy as np
 
 from heelstrike.analysis.diagnosis.changes import Change, Lever, Tried, changes
-from heelstrike.analysis.diagnosis.falls import first_cause
+from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
 from heelstrike.analysis.support import walking_steps
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import HeelstrikeError
-from heelstrike.experiments.laws import Entry, law_called
+from heelstrike.experiments.laws import Entry, bent_knees, law_called
 from heelstrike.experiments.walk import walk
 from heelstrike.experiments.zoo.disturbances import DISTURBANCES, Chance, Effort
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot
 from heelstrike.sim import Push, Run, RunStatus
+from heelstrike.sim.closed_sets import OnError
 from heelstrike.sim.method import Method
 from heelstrike.sim.time_stepping.method import TimeStepping
 from heelstrike.sim.whole_run import whole
@@ -68,10 +70,10 @@ class Case:
     """Steps that it is to take."""
 
     def run(self, progress: Callable[[float], None] | None = None) -> Run:
-        """Walk."""
+        """Walk. What the law raises was told by the walk itself, and is not told again."""
         return walk(
             self.robot, self.gait, steps=self.steps, law=self.law, method=self.method,
-            ground=self.ground, pushes=self.pushes, progress=progress,
+            ground=self.ground, pushes=self.pushes, progress=progress, on_error=OnError.STOP,
         )  # fmt: skip
 
 
@@ -116,15 +118,22 @@ def changed(case: Case, change: Change) -> Case:
             return replace(case, method=replace(case.method, step=float(value)))  # type: ignore[type-var]
 
 
-def _designed(case: Case, **asked: object) -> Gait:
+def _designed(case: Case, **asked: Any) -> Gait:
+    """Design the gait of a walk with something else asked; knees that it keeps bent stay so."""
     gait = case.gait
-    given: dict[str, object] = {
+    ranges = bent_knees(case.robot, gait)
+    for joint, (low, high) in asked.pop("joint_ranges", {}).items():
+        kept = ranges.get(joint, (low, high))
+        ranges[joint] = (max(low, kept[0]), min(high, kept[1]))
+    if ranges:
+        asked["joint_ranges"] = ranges
+    given: dict[str, Any] = {
         "step_length": gait.step_length,
         "step_duration": gait.step_duration,
         "friction": gait.friction,
         "clearance": gait.clearance,
     }
-    return optimize_gait(case.robot, **(given | asked))  # type: ignore[arg-type]
+    return optimize_gait(case.robot, **(given | asked))
 
 
 def tried_beside(case: Case | None, run: Run) -> tuple[Tried, ...]:
@@ -147,7 +156,7 @@ def tried_beside(case: Case | None, run: Run) -> tuple[Tried, ...]:
     KeyboardInterrupt
         If Ctrl-C ended a walk.
     """
-    if run.status is RunStatus.INTERRUPTED:
+    if run.status is RunStatus.INTERRUPTED or not len(run.time):  # it did not begin
         return ()
     if case is None:
         return (NO_GAIT,)
@@ -167,7 +176,7 @@ def try_changes(case: Case, asked: Sequence[Change]) -> Iterator[Tried]:
             yield Tried(what, str(error), None, change)
             continue
         fall = first_cause(run, other.gait)
-        lasted = run.completed and fall is None
+        lasted = walked_on(run, fall)
         steps = f"{len(walking_steps(run))} steps in {float(run.time[-1]):.3g} s"
         yield Tried(what, steps if fall is None else f"{steps}, then {fall}", lasted, change)
         if lasted:
@@ -182,8 +191,9 @@ def try_disturbances(case: Case) -> Iterator[Tried]:
     """
     friction = float(case.ground.model().friction.min())
     trial = replace(
-        case.law.trial(case.robot, case.gait), method=BY, ground=Ground(friction=friction)
-    )
+        case.law.trial(case.robot, case.gait), method=BY, ground=Ground(friction=friction),
+        on_error=OnError.STOP,
+    )  # fmt: skip
     for disturbance in DISTURBANCES:
         if disturbance.name not in TOLD:
             continue

@@ -7,26 +7,17 @@ program that designs it. Its file is that of any saved gait, and is believed onl
 from __future__ import annotations
 
 import hashlib
-import os
 from contextlib import suppress
 from dataclasses import fields
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 import numpy as np
 
-from heelstrike.cache_folder import cache_folder
 from heelstrike.errors import GaitError
 from heelstrike.gait.file import load_gait, save_gait
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.request import Request
+from heelstrike.kept_files import kept_file, make_room, program_digest
 from heelstrike.robot.robot import Robot
-
-SWITCH = "HEELSTRIKE_KEEP_GAITS"
-"""Environment variable: 0 keeps none, a folder keeps them there, 1 is as usual."""
-MOST = 1000
-"""Files that are kept, of some 10 kB each; the older half goes when there are more."""
 
 _ROOMS = ("gait", "contact", "dynamics", "robot")
 """Packages whose text decides what gait is found."""
@@ -43,8 +34,7 @@ class KeptGait:
 
     def __init__(self, request: Request) -> None:
         self._robot = request.robot
-        folder = _folder()
-        self._file = None if folder is None else folder / f"{_fingerprint(request)}.json"
+        self._file = kept_file("gaits", _fingerprint(request))
 
     def load(self) -> Gait | None:
         """Return the gait, or None if it is not there or its file is damaged."""
@@ -58,28 +48,13 @@ class KeptGait:
         """Keep a gait if its folder can be written to, and return it."""
         if self._file is not None:
             with suppress(GaitError, OSError):
-                self._file.parent.mkdir(parents=True, exist_ok=True)
-                _make_room(self._file.parent)
+                make_room(self._file)
                 save_gait(gait, self._file)
         return gait
 
 
-def _folder() -> Path | None:
-    named = os.environ.get(SWITCH, "")
-    if named == "0":
-        return None
-    return cache_folder() / "gaits" if named in ("", "1") else Path(named)
-
-
-def _make_room(folder: Path) -> None:
-    files = sorted(folder.glob("*.json"), key=lambda file: file.stat().st_mtime)
-    if len(files) >= MOST:
-        for file in files[: MOST // 2]:
-            file.unlink(missing_ok=True)
-
-
 def _fingerprint(request: Request) -> str:
-    digest = hashlib.sha256(_program())
+    digest = hashlib.sha256(program_digest(_ROOMS, "casadi"))
     _add_robot(digest, request.robot)
     for field in fields(request):
         if field.name != "robot":
@@ -106,18 +81,3 @@ def _plain(value: object) -> object:
     if hasattr(value, "items"):
         return sorted((name, tuple(map(float, ends))) for name, ends in value.items())
     return value
-
-
-@cache
-def _program() -> bytes:
-    """Digest of the program that designs gaits: its text, and what solves for it."""
-    try:
-        solver = version("casadi")  # which is not imported for it: that takes longer than the rest
-    except PackageNotFoundError:  # installed without a word about itself
-        solver = "of unknown version"
-    digest = hashlib.sha256(f"{solver} {np.__version__}".encode())
-    package = Path(__file__).parent.parent
-    for room in _ROOMS:
-        for file in sorted((package / room).rglob("*.py")):
-            digest.update(file.read_bytes())
-    return digest.digest()

@@ -1,8 +1,8 @@
 """What a robot is, the readers of robot files, and the built-in robots."""
 
 from heelstrike.robot.builder import RobotBuilder
-from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.files.options import LoadOptions
+from heelstrike.robot.files.reading import read_mjcf
 from heelstrike.robot.human import BodyTable, human
 from heelstrike.robot.inspection import Inspection, inspect_robot
 from heelstrike.robot.library import builtin_robots, load_robot

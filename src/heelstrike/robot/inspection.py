@@ -17,10 +17,10 @@ from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.assembly import DIFFERENT, UNLIKELY, link_origins
 from heelstrike.robot.files.inertias import MASSLESS
-from heelstrike.robot.files.mjcf import read_mjcf
+from heelstrike.robot.files.looks import is_file
 from heelstrike.robot.files.options import LoadOptions, Options
+from heelstrike.robot.files.reading import read_bodies, read_mjcf
 from heelstrike.robot.files.saving.mjcf import body_links
-from heelstrike.robot.files.screening.inclusion import is_readable
 from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS, builtin_robots, load_robot
 from heelstrike.robot.loops import coupling_words, latch_words
 from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats, label
@@ -148,15 +148,12 @@ def _file(robot: str | os.PathLike[str]) -> Path | None:
     if not isinstance(robot, str | os.PathLike) or robot in builtin_robots():
         return None
     path = Path(os.fspath(robot))
-    return path if is_readable(path) else None
+    return path if is_file(path) else None
 
 
 def _of_inertias(path: Path, how: LoadOptions) -> Iterator[Finding]:
     """Inertias that the file states in three dimensions and no body can have; masses of zero."""
-    from heelstrike.robot.files.mujoco_file import parsed_bodies
-    from heelstrike.robot.files.options import Options
-
-    for name, mass, tensor in parsed_bodies(path, Options(**how)):
+    for name, mass, tensor in read_bodies(path, Options(**how)):
         if not mass >= MASSLESS:
             yield Finding(FindingKind.MASS, f"body {name!r} has the mass {mass:g} kg.")
         # Who states no other moment than one means a planar robot.

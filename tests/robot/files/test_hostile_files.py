@@ -9,12 +9,13 @@ replicas and millions of keyframes never end, textures take any memory.
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -23,10 +24,13 @@ from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
 from heelstrike.errors import RobotError
-from heelstrike.robot import Robot, RobotWarning, builtin_robots, load_robot
+from heelstrike.reader_process import READER
+from heelstrike.robot import RobotWarning, builtin_robots, load_robot
+from heelstrike.robot.files import reading
+from heelstrike.robot.files.mjcf import planar_robot
 from heelstrike.robot.files.mujoco_file import parse
-from heelstrike.robot.files.screening import trial
-from heelstrike.robot.files.screening.trial import try_apart
+from heelstrike.robot.files.options import Options
+from heelstrike.robot.files.robot_json import robot_entries
 
 MOST_CALLS = 1_000_000  # of Python functions; a robot of the library takes 5000
 WORLD = (
@@ -152,13 +156,6 @@ REFUSED: dict[str, tuple[Files, str]] = {
         },
         "two.xml: line 1: a document type",
     ),
-    "replica of thousands in an included file": (
-        {
-            **mjcf("", world(replicas(99, '<include file="a.xml"/>'))),
-            "a.xml": f"<mujoco>{replicas(99, BALL)}</mujoco>",
-        },
-        "Lower the count of <replicate>",
-    ),
     "includes what is not there": (mjcf('<include file="gone.xml"/>'), "'gone.xml', which is not"),
     "includes nothing": (mjcf("<include/>"), "must name a file"),
     "includes with content": (mjcf('<include file="x.xml"><option/></include>'), "hold nothing"),
@@ -173,25 +170,24 @@ REFUSED: dict[str, tuple[Files, str]] = {
     "joins itself": (mjcf('<asset><model name="m" file="robot.xml"/></asset>'), "includes itself"),
     "each joins two": (
         chain(19, lambda k: MODELS.format(k, k + 1), PLAIN),
-        "Lower the count",
-    ),
-    "joins deep models": (
-        chain(
-            10,
-            lambda k: (
-                f'<mujoco><asset><model name="m" file="c{k + 1}.xml"/></asset>'
-                + bodies(100, f'<attach model="m" prefix="p{k}"/>')
-                + "</mujoco>"
-            ),
-            PLAIN,
-        ),
-        "more than 400 elements inside",
+        "made of more than 500 files",
     ),
     "joins what is no model": (
         {**mjcf('<asset><model name="m" file="a.urdf"/></asset>'), "a.urdf": "<robot name='r'/>"},
         "no MJCF file",
     ),
-    "attaches its own bodies": (mjcf("", self_attached(25)), "<attach>"),
+    "replica of thousands in an included file": (
+        {
+            **mjcf("", world(replicas(999, '<include file="a.xml"/>'))),
+            "a.xml": f"<mujoco>{replicas(99, BALL)}</mujoco>",
+        },
+        "Lower the count of <replicate>",
+    ),
+    "replicas of replicas": (
+        mjcf("", world(replicas(60, replicas(60, replicas(60, BALL))))),
+        "Lower the count of <replicate>",
+    ),
+    "composite": (mjcf("", world('<composite type="cable" count="9999 9 1"/>')), "<composite>"),
     "entities": (
         {"robot.xml": f'<!DOCTYPE r [<!ENTITY e0 "ha">{ENTITIES}]><mujoco model="&e11;"/>'},
         "entity declaration",
@@ -200,50 +196,8 @@ REFUSED: dict[str, tuple[Files, str]] = {
         {"robot.xml": f'<!DOCTYPE r SYSTEM "file:///etc/passwd">{PLAIN}'},
         "document type",
     ),
-    "replicas": (
-        mjcf("", world(replicas(9999, BALL))),
-        "Lower the count of <replicate>",
-    ),
-    "replicas of replicas": (
-        mjcf("", world(replicas(60, replicas(60, replicas(60, BALL))))),
-        "Lower the count of <replicate>",
-    ),
-    "many replicas": (
-        mjcf("", world(replicas(1, BALL) * 2000)),
-        "bodies, copies included",
-    ),
-    "deformable": (
-        mjcf("", world('<flexcomp name="f" count="99 99 99" dim="3"/>')),
-        "<flexcomp>",
-    ),
-    "composite": (
-        mjcf("", world('<composite type="cable" count="9999 1 1"/>')),
-        "<composite>",
-    ),
-    "bodies": (mjcf("", world("<body/>" * 5000)), "more than 4000 bodies"),
-    "classes": (mjcf(f"<default>{CLASS * 5000}</default>"), "4000 bodies"),
     "elements": (mjcf("", world("<site/>" * 30_000)), "20000 elements"),
     "deep": (mjcf("", bodies(5000)), "more than 400 elements inside"),
-    "sum of textures": (
-        mjcf(f"<asset>{TEXTURE * 30}</asset>"),
-        "<texture>s together",
-    ),
-    "sum of height fields": (
-        mjcf(f"<asset>{TERRAIN * 30}</asset>"),
-        "<hfield>s together",
-    ),
-    "keyframes": (mjcf('<size nkey="2000000000"/>'), "'nkey' of <size>"),
-    "user data": (mjcf('<size nuser_body="2000000000"/>'), "'nuser_body' of <size>"),
-    "memory": (mjcf('<size memory="500G"/>'), "'memory' of <size>"),
-    "constraints": (mjcf('<size njmax="1e300"/>'), "'njmax' of <size>"),
-    "activations": (
-        mjcf('<actuator><general joint="j" dyntype="user" actdim="2000000000"/></actuator>'),
-        "'actdim' of <general>",
-    ),
-    "builtin mesh": (
-        mjcf('<asset><mesh name="m" builtin="cone" params="20000 1"/></asset>'),
-        "'params' of <mesh>",
-    ),
     "corners that are no numbers": (
         mjcf("<asset><mesh name='m' vertex='{}'/></asset>".format("nan " * 300_000)),
         "no finite number",
@@ -253,10 +207,6 @@ REFUSED: dict[str, tuple[Files, str]] = {
         "'gone.stl'",
     ),
     "mesh without end": (mjcf('<asset><mesh file="/dev/zero"/></asset>'), "/dev/zero"),
-    "long name": (
-        mjcf("", WORLD.replace('"g"', '"' + "g" * 3_000_000 + '"')),
-        "has 3000000 letters",
-    ),
     "capitals": ({"robot.xml": "<MUJOCO/>"}, "begins with <MUJOCO>"),
     "bytes": ({"robot.xml": "\x01\x02\x03" * 1000}, "not well-formed XML"),
     "zeros": ({"robot.xml": "\0" * 1000}, "not a text file"),
@@ -268,7 +218,6 @@ REFUSED: dict[str, tuple[Files, str]] = {
         urdf(1200, [(k, k + 1) for k in range(1199)]),
         "more than 1000 joints",
     ),
-    "urdf: links": (urdf(0, [], "<link/>" * 5000), "4000 bodies"),
     "urdf: macros": (urdf(1, [], '<xacro:include filename="/dev/zero"/>'), "macro of xacro"),
     "urdf: mesh that is not there": (
         urdf(1, [], mesh_link("package://a/b.stl")),
@@ -324,7 +273,7 @@ def test_what_would_hurt_is_refused_before_it_is_parsed(case: str, tmp_path: Pat
     files, words = REFUSED[case]
     path = write(files, tmp_path)
     with pytest.raises(RobotError) as caught:
-        load_robot(path)
+        planar_robot(path, Options())
     message = str(caught.value)
     assert words in message
     assert str(path) in message
@@ -338,7 +287,7 @@ def test_a_gigantic_file_is_not_read(ending: str, tmp_path: Path) -> None:
     with path.open("wb") as file:
         file.truncate(2**36)  # sparse: takes no place on the disk
     with pytest.raises(RobotError, match="larger than 16 MB"):
-        load_robot(path)
+        planar_robot(path, Options())
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names are a matter of POSIX")
@@ -369,7 +318,7 @@ def test_pipes_and_links_in_circles_do_not_hold_it_up(text: str | None, tmp_path
     if text is not None:
         path.write_text(text)
     with pytest.raises(RobotError, match="folder"):
-        load_robot(path)
+        planar_robot(path, Options())
 
 
 HARMLESS = {
@@ -489,18 +438,19 @@ def test_joined_models_are_what_they_are_to_mujoco(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", builtin_robots())
-def test_no_process_is_started_for_a_plain_file(
+def test_our_own_files_are_read_here(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def start(*_: object, **__: object) -> None:
-        raise AssertionError("a process was started")
-
-    monkeypatch.setattr(subprocess, "run", start)
     robot = load_robot(name)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RobotWarning)
-        assert isinstance(load_robot(robot.save(tmp_path / "robot.xml")), Robot)
-        assert isinstance(load_robot(robot.save(tmp_path / "robot.urdf")), Robot)
+    monkeypatch.setenv("HEELSTRIKE_KEEP_ROBOTS", "0")
+
+    def start(*_: object, **__: object) -> bytes:
+        raise AssertionError("a process was asked")
+
+    monkeypatch.setattr(READER, "ask", start)
+    assert robot_entries(load_robot(name)) == robot_entries(robot)
+    with pytest.raises(AssertionError, match="was asked"):
+        load_robot(robot.save(tmp_path / "robot.xml"))
 
 
 def test_a_line_of_the_parser_is_a_line_of_the_file(tmp_path: Path) -> None:
@@ -530,61 +480,123 @@ def test_a_line_of_the_parser_is_a_line_of_the_file(tmp_path: Path) -> None:
 ENDLESS = '<mujoco model="m"><asset><model name="m" file="model0.xml"/></asset></mujoco>'
 
 
-def test_a_crash_of_the_parser_is_an_error_in_words() -> None:
-    """A model that joins itself, given to the parser behind the back of the screen."""
-    with pytest.raises(RobotError, match=r"robot\.xml: MuJoCo's parser crashes on this file"):
-        try_apart(ENDLESS, {"model0.xml": ENDLESS.encode()}, "robot.xml")
+HEAVY: dict[str, Files] = {
+    # What the parser multiplies out until there is no memory, or no stack, left.
+    "attaches its own bodies": mjcf("", self_attached(40)),
+    "activations": mjcf(
+        '<actuator><general joint="j" dyntype="user" actdim="2000000000"/></actuator>'
+    ),
+}
 
 
-def test_a_parser_that_does_not_end_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trial, "LONGEST_TRIAL", 0.001)  # no Python starts within a millisecond
-    with pytest.raises(RobotError, match=r"robot\.xml: MuJoCo's parser has not finished"):
-        try_apart("<mujoco/>", {}, "robot.xml")
+@pytest.fixture
+def little_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a file have 256 MiB."""
+    ask = READER.ask
+    monkeypatch.setattr(READER, "ask", partial(ask, memory=2**28))
 
 
-@pytest.mark.usefixtures("unasked")
-@pytest.mark.parametrize(
-    "files",
-    [
-        mjcf('<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'),
-        {**mjcf('<asset><model name="m" file="m.xml"/></asset>'), "m.xml": PLAIN},
-        mjcf("", WORLD.replace("</worldbody>", '<attach body="b" prefix="p"/></worldbody>')),
-        mjcf('<extension><plugin plugin="mujoco.pid"/></extension>'),
-        {
-            **urdf(1, [], mesh_link("m.obj")),
-            "m.obj": "solid",
-        },
-    ],
-    ids=["mesh", "model", "attach", "plugin", "URDF mesh"],
-)
-@pytest.mark.parametrize("options", [{}, {"floating": True}, {"projected": True}])
-def test_delicate_files_are_tried_apart_first(
-    files: Files, options: dict[str, bool], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded on Linux only")
+@pytest.mark.usefixtures("little_memory")
+@pytest.mark.parametrize("case", HEAVY)
+def test_what_fills_the_memory_is_an_error_in_words(case: str, tmp_path: Path) -> None:
+    path = write(HEAVY[case], tmp_path)
+    with pytest.raises(
+        RobotError, match=r"more than 0\.25 GiB of memory.*lower the count"
+    ) as caught:
+        load_robot(path)
+    assert str(path) in str(caught.value)
+    assert load_robot(write({"plain.xml": PLAIN}, tmp_path)).nv == 1  # and the next file is read
+
+
+def test_a_crash_of_the_parser_is_an_error_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(*_: object) -> None:
-        raise RobotError("tried apart")
+    monkeypatch.setattr(reading, "_JOB", _job(tmp_path, "import os; os.abort()"))
+    with pytest.raises(RobotError, match=r"robot\.xml: the parser crashes on this file.*or leave"):
+        load_robot(write(mjcf(""), tmp_path))
 
-    monkeypatch.setattr("heelstrike.robot.files.mujoco_file.try_apart", refuse)
+
+def test_a_parser_that_does_not_end_is_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reading, "_JOB", _job(tmp_path, "import time; time.sleep(3600)"))
+    monkeypatch.setattr(reading, "LONGEST", 2.0)
+    with pytest.raises(RobotError, match=r"robot\.xml: the parser has not finished.* after 2 s"):
+        load_robot(write(mjcf(""), tmp_path))
+
+
+def _job(folder: Path, program: str) -> str:
+    """Return a reader that does something else."""
+    path = folder / "reader.py"
+    path.write_text(f"def answer(order):\n    {program}\n")
+    return f"{path}:answer"
+
+
+@pytest.mark.parametrize("case", ["plain", "include", "links"])
+def test_what_was_read_is_kept_until_a_file_changes(
+    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file that is read, one that is included, and one that was sought and was not there."""
+    files = {
+        "plain": mjcf(""),
+        "include": {**mjcf('<include file="part.xml"/>'), "part.xml": "<x><option/></x>"},
+        "links": urdf(2, [(0, 1)]),
+    }[case]
     path = write(files, tmp_path)
+    asked = []
+    ask = READER.ask
+
+    def counted(*order: Any, **how: Any) -> bytes:
+        asked.append(order)
+        return ask(*order, **how)
+
+    monkeypatch.setattr(READER, "ask", counted)
+    with warnings.catch_warnings(record=True) as first:
+        warnings.simplefilter("always")
+        one = load_robot(path, floating=case == "links")
+    with warnings.catch_warnings(record=True) as second:
+        warnings.simplefilter("always")
+        other = load_robot(path, floating=case == "links")
+    assert len(asked) == 1
+    assert list(map(str, map(_message, first))) == list(map(str, map(_message, second)))
+    assert robot_entries(one) == robot_entries(other)
+    changed = tmp_path / list(files)[-1]
+    changed.write_text(changed.read_text() + "\n")
+    load_robot(path, floating=case == "links")
+    assert len(asked) == 2
+
+
+def _message(one: warnings.WarningMessage) -> str:
+    return str(one.message)
+
+
+def test_a_mesh_that_came_later_is_read(tmp_path: Path) -> None:
+    """What was sought and not found counts, too."""
+    shape = '<geometry><mesh filename="foot.obj"/></geometry>'
+    link = f'<link name="x">{INERTIAL}<collision>{shape}</collision></link>'
+    joint = (
+        '<joint name="k" type="continuous"><parent link="l0"/><child link="x"/>'
+        '<axis xyz="0 1 0"/></joint>'
+    )
+    path = write(urdf(1, [], link + joint), tmp_path)
+    with pytest.warns(RobotWarning, match="are not where the file says"):
+        assert load_robot(path, floating=True).nc == 0
+    (tmp_path / "foot.obj").write_text(NESTED["meshes/part.obj"])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RobotWarning)
-        with pytest.raises(RobotError, match="tried apart"):
-            load_robot(path, **options)
+        assert load_robot(path, floating=True).nc > 0
 
 
-def test_a_file_is_tried_apart_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = mjcf('<asset><mesh name="once" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>')["robot.xml"]
-    started = []
-    run = subprocess.run
-
-    def counted(*arguments: object, **options: object) -> object:
-        started.append(arguments)
-        return run(*arguments, **options)  # type: ignore[call-overload]
-
-    monkeypatch.setattr(subprocess, "run", counted)
-    for _ in range(3):
-        try_apart(text, {}, "robot.xml")
-    assert len(started) == 1
+def test_a_damaged_answer_is_asked_for_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HEELSTRIKE_KEEP_ROBOTS", str(tmp_path / "kept"))
+    path = write(mjcf(""), tmp_path)
+    robot = load_robot(path)
+    (kept,) = (tmp_path / "kept").iterdir()
+    kept.write_bytes(kept.read_bytes().replace(b'"mass"', b'"moss"'))
+    assert robot_entries(load_robot(path)) == robot_entries(robot)
 
 
 # Much, but not too much: the work grows no faster than the file.
@@ -603,14 +615,14 @@ def many(**numbers: int) -> Files:
 @pytest.mark.usefixtures("bounded")
 def test_geoms_that_never_touch_the_ground_are_not_compared_one_by_one(tmp_path: Path) -> None:
     with pytest.warns(RobotWarning, match="fixed geoms"):
-        robot = load_robot(write(many(moving=3000, ground=3000), tmp_path))
+        robot = planar_robot(write(many(moving=3000, ground=3000), tmp_path), Options())
     assert robot.nc == 0
 
 
 @pytest.mark.usefixtures("bounded")
 def test_contact_points_are_not_compared_one_by_one(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match="5000 contact points, and heelstrike takes up to 2000"):
-        load_robot(write(many(moving=5000), tmp_path))
+        planar_robot(write(many(moving=5000), tmp_path), Options())
 
 
 # On the command line

@@ -14,9 +14,11 @@ from synthetic_runs import make_run, pendulum, pushes
 
 import heelstrike as hs
 from heelstrike.analysis import Limit, Tried
+from heelstrike.experiments.laws import gait_for, law_called
+from heelstrike.experiments.walk import walk
 from heelstrike.sim import RunStatus, SolverCount
 from heelstrike.view.page import judge
-from heelstrike.view.page.verdict import told
+from heelstrike.view.page.verdict import on_points, told
 
 
 def limits_of(run: hs.Run) -> dict[str, Limit]:
@@ -43,6 +45,28 @@ def test_a_walk_that_reaches_nothing() -> None:
     summary = walking.walk(steps=2).summary()
     friction = max(limit.used for limit in verdict.limits if limit.kind == "friction")
     assert friction == pytest.approx(summary.friction_use_max)
+
+
+def test_a_run_whose_impacts_made_energy_is_not_good() -> None:
+    run = walking.walk(steps=2)
+    made = dataclasses.replace(run.certificates, energy_gain=0.5)
+    verdict = judge(dataclasses.replace(run, certificates=made), walking.gait())
+    assert not verdict.good
+    assert "made 0.5 J in impacts" in verdict.advice[0]
+
+
+@pytest.mark.parametrize(
+    ("law", "named"),
+    [
+        ("ComputedTorque", "walk it by hs.VirtualConstraints, or by hs.SteppingConstraints"),
+        ("VirtualConstraints", "walk it by hs.SteppingConstraints"),
+        ("SteppingConstraints", "the law that it had steps"),
+    ],
+)
+def test_a_law_that_just_fell_is_not_advised(law: str, named: str) -> None:
+    robot = hs.load_robot("rabbit")
+    run = walk(robot, gait_for(robot), steps=1, law=law_called(law))
+    assert on_points(run).startswith(named)
 
 
 def test_torque_is_measured_against_the_limit_of_its_sign() -> None:

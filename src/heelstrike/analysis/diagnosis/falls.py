@@ -104,6 +104,19 @@ def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
     )
 
 
+def walked_on(run: Run, fall: Fall | None) -> bool:
+    """Whether a run lasted as long as it was asked to, and its robot did not go down.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    fall : Fall or None
+        What :func:`first_cause` says of it: a method can sink a robot into the ground, and end.
+    """
+    return run.completed and fall is None
+
+
 def _sinks(walk: Walk) -> bool:
     """Whether a robot on feet is on its way down when its run ends."""
     if not (walk.run.robot.floating and walk.run.robot.feet):

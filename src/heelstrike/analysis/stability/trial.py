@@ -15,6 +15,7 @@ from heelstrike.dynamics import contact_positions
 from heelstrike.errors import SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.sim.closed_sets import OnError
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import Push
@@ -64,6 +65,8 @@ class Trial:
     progress : callable or None
         Called now and then, in every walk, with the simulated time. If it raises, that walk ends
         there as if by Ctrl-C.
+    on_error : OnError
+        What to do when the controller raises, as of :func:`~heelstrike.simulate`.
 
     Raises
     ------
@@ -83,6 +86,7 @@ class Trial:
     pitch: float = 0.6
     control_period: float | None = None
     progress: Callable[[float], None] | None = None
+    on_error: OnError = OnError.WARN
 
     def __post_init__(self) -> None:
         check_fields(self, SimulationError)
@@ -161,6 +165,7 @@ class Trial:
                 record_every=record_every,
                 progress=self.progress,
                 pushes=pushes,
+                on_error=self.on_error,
             )
         )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Unpack
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from heelstrike.robot.files.actuators import read_actuators
 from heelstrike.robot.files.joint_numbers import read_joint_numbers
 from heelstrike.robot.files.links import read_links, read_loops
 from heelstrike.robot.files.mujoco_file import MujocoFile, parse
-from heelstrike.robot.files.options import AVERAGE, LoadOptions, Options
+from heelstrike.robot.files.options import AVERAGE, Options
 from heelstrike.robot.files.posture import BALL
 from heelstrike.robot.files.shapes import read_outlines
 from heelstrike.robot.files.unmodelled import warn_of_unmodelled
@@ -24,48 +23,29 @@ from heelstrike.robot.robot import Robot
 SIDEWAYS = 1e-6  # share of gravity that may act out of the plane
 
 
-def read_mjcf(
-    source: Path | str,
-    *,
-    name: str | None = None,
-    lenient: bool = False,
-    **how: Unpack[LoadOptions],
+def planar_robot(
+    source: Path | str, options: Options, name: str | None = None, text: str | None = None
 ) -> Robot:
-    """Read a planar robot from an MJCF or URDF file, or from a string that holds one.
-
-    Coordinates keep the order of the file, and so do links. The reference configuration is
-    MuJoCo's ``qpos0``. The ground of the file, its cameras, sensors and keyframes are no part of
-    the robot. A robot without contact points loads: it can swing or fly, but not stand.
+    """Read a robot in this process; `heelstrike.robot.files.reading` does so in another.
 
     Parameters
     ----------
     source : Path or str
         Path of the file, or the XML text itself.
-    name : str, optional
-        Name of the robot; by default the model name that the file gives, or the file's own.
-    lenient : bool
-        Let masses pass that MuJoCo refuses, to look at the robot; see `inspect_robot`.
-    **how : LoadOptions
+    options : Options
         How the file is read.
-
-    Returns
-    -------
-    Robot
-        The robot.
+    name : str, optional
+        Name of the robot.
+    text : str, optional
+        What its file expands to.
 
     Raises
     ------
     RobotError
         If the file cannot be read or the robot does not move in the x–z plane.
-
-    Warns
-    -----
-    RobotWarning
-        If the file says something that is not simulated, or left and right differ.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused in the end
-        options = Options(**how, lenient=lenient)
-        file = parse(source, options)
+        file = parse(source, options, text)
         return _robot(file, name or _model_name(file, source), options)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 import warnings
 from collections.abc import Iterator
@@ -19,9 +20,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.flattening import Coordinate, flatten
 from heelstrike.robot.files.inertias import put_back, refuse_missing, stated_tensor, take_out
 from heelstrike.robot.files.options import Options
-from heelstrike.robot.files.ros.xacro import expanded
 from heelstrike.robot.files.screening.screening import Screened, screen
-from heelstrike.robot.files.screening.trial import lift_sizes, try_apart
 from heelstrike.robot.files.screening.urdf_check import (
     check_urdf,
     check_urdf_tree,
@@ -43,6 +42,12 @@ from heelstrike.robot.robot import LockedJoint
 from heelstrike.robot.warning import warn
 
 LONGEST_REASON = 600  # letters of MuJoCo's own words in a message
+
+POINT = 1e-12
+"""Metres; sizes of zero become this, which is nothing to everybody but a parser."""
+
+_SIZES = {2: 1, 3: 2, 4: 3, 5: 2, 6: 3}
+"""How many sizes there are, by MuJoCo's mjtGeom: sphere, capsule, ellipsoid, cylinder, box."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +110,9 @@ class MujocoFile:
         return np.asarray(getattr(self.model, name, np.zeros(0)), dtype=np.float64)
 
 
-def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
+def parse(
+    source: Path | str, options: Options | None = None, text: str | None = None
+) -> MujocoFile:
     """Parse an MJCF or URDF file, or a string that holds one.
 
     Parameters
@@ -114,6 +121,8 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
         Path of a file, or the XML text itself.
     options : Options, optional
         How the file is read; as it is, by default.
+    text : str, optional
+        What stands for the text of the file, as what its macros expand to.
 
     Raises
     ------
@@ -123,7 +132,7 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
     """
     options = options or Options()
     label = str(source) if isinstance(source, Path) else "XML string"
-    file = _screened(source, options, label)
+    file = _screened(source, text, options, label)
     xml = file.xml
     import mujoco
 
@@ -148,7 +157,7 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
             put_back(plane.model, plane.pose, taken, spec.compiler.boundinertia, label)
     except RobotError:
         raise
-    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
         raise _unreadable(label, error) from error
     for remark in (*remarks, *plane.remarks):
         warn(f"{label}: {remark}")
@@ -159,39 +168,29 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
     )
 
 
-def _screened(source: Path | str, options: Options, label: str) -> Screened:
+def _screened(source: Path | str, text: str | None, options: Options, label: str) -> Screened:
     """Return a file that may be parsed, as MJCF or URDF."""
-    written = source
-    if options.arguments is not None and isinstance(source, Path):
-        written = expanded(source, options.arguments, options.packages, label)
-    file = screen(written, label, options.packages)
+    file = screen(source if text is None else text, label, options.packages)
     if file.xml.tag != "sdf":
         return file
     directory = source.parent if isinstance(source, Path) else Path()
     mjcf = as_mjcf(file.xml, directory, options.packages, label)
-    meshes = mjcf.find("asset/mesh") is not None
-    return replace(file, xml=mjcf, text=xml_text(mjcf), delicate=meshes, massless=True)
+    return replace(file, xml=mjcf, text=xml_text(mjcf), massless=True)
 
 
-def parsed_bodies(path: Path, options: Options) -> list[tuple[str, float, NDArray[np.float64]]]:
-    """Name, mass and inertia tensor (about the centre of mass, kg m²) as a file states them.
-
-    Bodies that do not move, and those that leave their inertia to their geoms, are not among them.
-
-    Raises
-    ------
-    RobotError
-        If the file cannot be read.
-    """
+def stated_bodies(
+    path: Path | str, options: Options, text: str | None = None
+) -> list[tuple[str, float, NDArray[np.float64]]]:
+    """Name, mass and inertia tensor of bodies; see `heelstrike.robot.files.reading.read_bodies`."""
     import mujoco
 
     label = str(path)
-    file = _screened(path, options, label)
+    file = _screened(path, text, options, label)
     try:
         with _warnings_into([]), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             spec = _parsed(path, file, label, options.packages)
-    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
         raise _unreadable(label, error) from error
     return _stated(spec)
 
@@ -217,7 +216,13 @@ def _warn_of_mended_inertias(source: Path | str, file: Screened, label: str) -> 
         )
 
 
+_NO_MEMORY = ("Could not allocate memory", "unknown exception")
+"""What MuJoCo says where there is none left."""
+
+
 def _unreadable(label: str, error: Exception) -> RobotError:
+    if any(words in str(error) for words in _NO_MEMORY):
+        raise MemoryError from error
     reason = textwrap.shorten(" ".join(str(error).split()), LONGEST_REASON)
     return RobotError(f"{label}: MuJoCo's parser cannot read this robot: {reason}")
 
@@ -242,8 +247,6 @@ def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path
         directory = source.parent if isinstance(source, Path) else Path()
         text = urdf_text(file.xml, directory, packages, label)
         check_urdf_tree(file.xml, label)
-    if file.delicate:
-        try_apart(text, file.models, label)
     spec = mujoco.MjSpec.from_string(text, include=file.models)
     # Welded bodies are joined by our own reader, which needs to know where each of them is.
     spec.compiler.fusestatic = False
@@ -254,8 +257,19 @@ def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path
         let_thin_meshes_pass(spec)
     if urdf:
         spec.compiler.balanceinertia = False  # which replaces moments that URDF states
-    lift_sizes(spec)
+    _lift_sizes(spec)
     return spec
+
+
+def _lift_sizes(spec: Any) -> None:
+    """Give shapes without extent, such as spheres of radius 0 for points, one that parsers take."""
+    for geom in spec.geoms:
+        sizes = _SIZES.get(int(geom.type), 0)
+        if not math.isnan(geom.fromto[0]):  # the length is told by two points
+            sizes = 1
+        for k in range(sizes):
+            if geom.size[k] == 0.0:
+                geom.size[k] = POINT
 
 
 @contextmanager

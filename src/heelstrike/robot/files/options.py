@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import TypedDict
+from typing import Any, TypedDict
 
 from heelstrike.arguments import check_fields, refusal
 from heelstrike.errors import RobotError
@@ -101,6 +101,15 @@ class Options:
         if isinstance(self.xacro, Mapping):
             return self.xacro
         return {} if self.xacro else None
+
+    def plain(self) -> dict[str, Any]:
+        """What JSON can hold of them; macros are expanded before."""
+        return {
+            **{name: getattr(self, name) for name in ("floating", "projected", "forward")},
+            **{name: getattr(self, name) for name in ("mirror", "lenient")},
+            "pose": self.pose and {joint: float(value) for joint, value in self.pose.items()},
+            "package_path": [str(folder.absolute()) for folder in self.packages],
+        }
 
     @property
     def packages(self) -> tuple[Path, ...]:

@@ -8,6 +8,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from urllib.parse import unquote
 
+from heelstrike.robot.files.looks import folders_in, is_file, is_folder, will_read
+
+FOLDERS = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
+"""Environment variables that name folders of packages."""
+
 DEEPEST_FOLDER = 40  # most folders in the path of a file, and above a robot file
 DEEPEST_PACKAGE = 3  # folders below one of ROS_PACKAGE_PATH in which packages are sought
 MOST_FOLDERS = 2000  # that are looked into for one package
@@ -39,11 +44,11 @@ def find_file(name: str, directory: Path, packages: Sequence[Path]) -> Path | No
         return None
     if scheme in ("package://", "model://"):
         for folder in _package_folders(parts[0], directory, packages):
-            if _is_file(path := folder.joinpath(*parts[1:])):
+            if is_file(path := folder.joinpath(*parts[1:])):
                 return path.resolve()
     # Beside the robot file; packages were often copied without the folders around them.
     for first in range(len(parts)):
-        if _is_file(path := directory.joinpath(*parts[first:])):
+        if is_file(path := directory.joinpath(*parts[first:])):
             return path.resolve()
     return None
 
@@ -60,7 +65,7 @@ def find_package(name: str, directory: Path, packages: Sequence[Path]) -> Path |
     packages : sequence of Path
         Folders of packages, or that hold such, which are sought first.
     """
-    return next((p for p in _package_folders(name, directory, packages) if p.is_dir()), None)
+    return next((p for p in _package_folders(name, directory, packages) if is_folder(p)), None)
 
 
 def find_model(name: str, directory: Path, packages: Sequence[Path]) -> Path | None:
@@ -83,20 +88,20 @@ def find_model(name: str, directory: Path, packages: Sequence[Path]) -> Path | N
     if not plain or "\0" in plain or len(Path(plain).parts) > DEEPEST_FOLDER:
         return None
     folder = directory / plain
-    if not _is_file(folder / "model.sdf") and not _is_file(folder / "model.config"):
+    if not is_file(folder / "model.sdf") and not is_file(folder / "model.config"):
         found = None if "/" in plain else find_package(plain, directory, packages)
         if found is None:
             return None
         folder = found
     named = _SDF_FILE.search(_text(folder / "model.config"))
     path = folder / (named[1] if named else "model.sdf")
-    return path if _is_file(path) else None
+    return path if is_file(path) else None
 
 
 def _text(path: Path) -> str:
     """Beginning of a small file, nothing where there is none."""
     try:
-        with path.open(encoding="utf-8", errors="replace") as file:
+        with will_read(path).open(encoding="utf-8", errors="replace") as file:
             return file.read(LONGEST_CONFIGURATION)
     except (OSError, ValueError):
         return ""
@@ -111,7 +116,7 @@ def _package_folders(name: str, directory: Path, packages: Sequence[Path]) -> It
     except (OSError, RuntimeError):
         here = directory
     for above in (here, *here.parents[:DEEPEST_FOLDER]):
-        if above.name == name or (_is_file(above / "package.xml") and _named(above, name)):
+        if above.name == name or (is_file(above / "package.xml") and _named(above, name)):
             yield above
         yield above / name
     for folder in _folders_of("ROS_PACKAGE_PATH"):
@@ -131,7 +136,7 @@ def _packages_in(folder: Path, name: str) -> Iterator[Path]:
         for each in level:
             yield each / name
             try:
-                inner = sorted(path for path in each.iterdir() if path.is_dir())
+                inner = folders_in(each)
             except OSError:
                 continue
             seen += len(inner)
@@ -146,17 +151,12 @@ def _named(folder: Path, name: str) -> bool:
     """Whether a folder is a package of a name that differs from its own."""
     manifest = folder / "package.xml"
     try:
-        return manifest.is_file() and f"<name>{name}</name>" in manifest.read_text("utf-8")[:10_000]
+        return is_file(manifest) and (
+            f"<name>{name}</name>" in will_read(manifest).read_text("utf-8")[:10_000]
+        )
     except (OSError, ValueError):
         return False
 
 
 def _folders_of(variable: str) -> list[Path]:
     return [Path(text) for text in os.environ.get(variable, "").split(os.pathsep) if text]
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # no possible name of a file
-        return False

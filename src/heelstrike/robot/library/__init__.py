@@ -10,8 +10,8 @@ from typing import Unpack
 
 from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
-from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.files.options import LoadOptions
+from heelstrike.robot.files.reading import read_mjcf, read_own
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import warn
 
@@ -79,7 +79,7 @@ def load_robot(name_or_path: str | os.PathLike[str], **how: Unpack[LoadOptions])
         )
     name = os.fspath(name_or_path)
     if isinstance(name_or_path, str) and name in builtin_robots():
-        return read_mjcf(_HERE / f"{name}.xml", name=name, **how)
+        return read_own(_HERE / f"{name}.xml", **how)
     path = Path(name)
     if path.suffix.lower() in _FILE_TYPES:
         robot = read_mjcf(path, **how)

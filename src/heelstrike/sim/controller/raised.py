@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import inspect
 import traceback
-import warnings
 from pathlib import Path
 
+from heelstrike.robot.warning import is_of_package, warn
 from heelstrike.sim.closed_sets import OnError
 
 
@@ -37,7 +36,6 @@ class EndOfRun(Exception):  # noqa: N818 - no error
     """
 
 
-_PACKAGE = Path(__file__).parents[2]
 _CALLER = str(Path(__file__).parents[1] / "simulation.py")
 
 
@@ -52,12 +50,8 @@ def tell(message: str, error: BaseException, on_error: OnError) -> None:
         raise error
     if on_error is OnError.STOP:
         return
-    frame = inspect.currentframe()
-    while frame and frame.f_back and _is_of_package(frame.f_code.co_filename):
-        frame = frame.f_back
-    place = (frame.f_code.co_filename, frame.f_lineno) if frame else ("<unknown>", 0)
     trace = _traceback_of(error)
-    warnings.warn_explicit(f"{message}\n{trace}" if trace else message, ControllerWarning, *place)
+    warn(f"{message}\n{trace}" if trace else message, ControllerWarning, again=True)
 
 
 def _traceback_of(error: BaseException) -> str:
@@ -69,10 +63,6 @@ def _traceback_of(error: BaseException) -> str:
     whole = traceback.TracebackException.from_exception(error)
     called = [i for i, each in enumerate(whole.stack) if each.filename == _CALLER]
     frames = list(whole.stack)[called[-1] + 1 if called else 0 :]
-    outside = [i for i, each in enumerate(frames) if not _is_of_package(each.filename)]
+    outside = [i for i, each in enumerate(frames) if not is_of_package(each.filename)]
     whole.stack = traceback.StackSummary.from_list(frames[outside[0] if outside else 0 :])
     return "".join(whole.format()).rstrip() if frames else ""
-
-
-def _is_of_package(filename: str) -> bool:
-    return _PACKAGE in Path(filename).parents

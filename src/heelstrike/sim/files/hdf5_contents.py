@@ -1,18 +1,16 @@
 """The arrays and attributes of an HDF5 file, read with suspicion.
 
 Nothing is read before its kind and size are known, and only numbers and texts are. A damaged file
-can still send the HDF5 library astray, into loops without end or worse: then this module is run as
-a program of its own, which hands over what it read (:func:`contents_of_stranger`). It imports
-nothing of heelstrike, so that such a program starts quickly.
+can still send the HDF5 library astray, into loops without end or worse: so this module is read by
+another process, which hands over what it found (:mod:`heelstrike.reader_process`). It imports
+nothing of heelstrike, so that this starts quickly.
 """
 
 from __future__ import annotations
 
 import io
+import json
 import math
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +25,6 @@ theirs, ``/robot/@name``. Numbers are float64 or int64, texts str."""
 LARGEST_RATIO = 1100
 SLACK = 2**20
 """Bytes that the arrays of the smallest file may take."""
-PATIENCE = 20.0
-"""Seconds that a program may take to read a file, and as many again for every so many bytes."""
-PATIENCE_BYTES = 2**28
-
-REFUSED = 3  # how the program ends when it can say what is wrong
 _ZLIB, _SHUFFLE, _CHECKSUM = 1, 2, 3
 
 
@@ -145,50 +138,9 @@ def _plain(value: NDArray[Any]) -> NDArray[Any] | None:
     return value if value.dtype.kind == "U" else None
 
 
-def contents_of_stranger(path: Path, groups: tuple[str, ...]) -> Contents:
-    """Do what :func:`contents` does in another process, which may crash or hang over it.
-
-    Raises
-    ------
-    HostileFileError
-        Whatever happens to the other process.
-    """
-    frozen = getattr(sys, "frozen", False)  # as an application, which is not a Python to start
-    if frozen or not sys.executable or not Path(__file__).is_file():
-        return contents(path, groups)
-    patience = PATIENCE * (1.0 + path.stat().st_size / PATIENCE_BYTES)
-    try:
-        done = subprocess.run(
-            [sys.executable, "-P", __file__, str(path), *groups],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=patience,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise HostileFileError(f"reading it had not ended after {patience:.0f} s") from None
-    if done.returncode == REFUSED:
-        raise HostileFileError(done.stderr.decode("utf-8", "replace").strip())
-    if done.returncode != 0:
-        raise HostileFileError(f"the HDF5 library breaks down over it (exit {done.returncode})")
-    with np.load(io.BytesIO(done.stdout), allow_pickle=False) as handed:
-        return dict(handed)
-
-
-def _main(path: str, *groups: str) -> None:
-    try:
-        handed = io.BytesIO()
-        np.savez(handed, **contents(Path(path), groups))  # type: ignore[arg-type]
-    except Exception as error:
-        words = str(error) if isinstance(error, HostileFileError) else f"{error!r}"
-        sys.stderr.buffer.write(words.encode("utf-8", "backslashreplace"))
-        sys.stderr.flush()
-        os._exit(REFUSED)  # the library may not be in a state to clean up
-    sys.stdout.buffer.write(handed.getbuffer())
-    sys.stdout.flush()
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    _main(*sys.argv[1:])
+def answer(order: bytes) -> bytes:
+    """Hand over the contents of the file and groups that an order names."""
+    path, *groups = json.loads(order)
+    handed = io.BytesIO()
+    np.savez(handed, **contents(Path(path), tuple(groups)))  # type: ignore[arg-type]
+    return handed.getvalue()

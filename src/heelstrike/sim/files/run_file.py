@@ -9,19 +9,20 @@ Its last line is a seal by which damage is seen before the HDF5 library sees the
 from __future__ import annotations
 
 import io
+import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from heelstrike.arguments import takes
 from heelstrike.errors import RunFileError, WriteError
+from heelstrike.reader_process import MOST_MEMORY, READER, ReadingError
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.files import hdf5_contents
 from heelstrike.sim.files.dataset import ROBOT_GROUP, to_dataset
-from heelstrike.sim.files.hdf5_contents import (
-    HostileFileError,
-    contents,
-    contents_of_stranger,
-)
+from heelstrike.sim.files.hdf5_contents import Contents
 from heelstrike.sim.files.robot_dataset import robot_to_dataset
 from heelstrike.sim.files.seal import seal, seal_holds
 from heelstrike.sim.files.settings import unreadable
@@ -29,6 +30,10 @@ from heelstrike.sim.files.stored_run import stored_run
 from heelstrike.sim.files.table import to_csv
 from heelstrike.sim.run import Run
 from heelstrike.whole_file import check_target, write_whole
+
+PATIENCE = 20.0
+"""Seconds that reading a file may take, and as many again for every so many bytes."""
+PATIENCE_BYTES = 2**28
 
 NETCDF, TABLE = ".nc", ".csv"
 KEPT = "the run is still in memory, to be saved elsewhere"
@@ -172,9 +177,8 @@ def load_run(
 
     Notes
     -----
-    A file ends with a checksum of its bytes, and a file that has changed since is refused. One
-    without a checksum, written by an earlier version or changed by another program, is read by
-    another process first, because bytes that are no HDF5 can make the library crash or hang.
+    A file ends with a checksum of its bytes, and a file that has changed since is refused. All are
+    read by another process, because bytes that are no HDF5 can make the library crash or hang.
     """
     source = Path(path)
     try:
@@ -198,12 +202,25 @@ def load_run(
             f"{source}: damaged: its bytes are not those that were written (their checksum differs)"
         )
     try:
-        found = (contents if sealed else contents_of_stranger)(source, (ROBOT_GROUP,))
-        return stored_run(source, found, robot, classes)
+        return stored_run(source, _contents(source), robot, classes)
     except RunFileError:
         raise
     except MemoryError as error:
         raise RunFileError(f"{source}: the run does not fit into memory") from error
     except Exception as error:  # whatever the HDF5 library makes of it
-        told = error if isinstance(error, HostileFileError) else repr(error)
+        told = error if isinstance(error, ReadingError) else repr(error)
         raise RunFileError(f"{source}: not a run of heelstrike, or damaged: {told}") from error
+
+
+def _contents(path: Path) -> Contents:
+    """Return what another process finds in a file."""
+    order = json.dumps([str(path.absolute()), ROBOT_GROUP]).encode("utf-8", "surrogatepass")
+    size = path.stat().st_size
+    handed = READER.ask(
+        f"{hdf5_contents.__file__}:answer",
+        order,
+        patience=PATIENCE * (1.0 + size / PATIENCE_BYTES),
+        memory=MOST_MEMORY + hdf5_contents.LARGEST_RATIO * size,
+    )
+    with np.load(io.BytesIO(handed), allow_pickle=False) as found:
+        return dict(found)

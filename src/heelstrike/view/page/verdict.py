@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from heelstrike.analysis.actuation import distance_travelled
 from heelstrike.analysis.diagnosis.changes import Change, Lever, Tried, changes
-from heelstrike.analysis.diagnosis.falls import Fall, first_cause
+from heelstrike.analysis.diagnosis.falls import Fall, first_cause, walked_on
 from heelstrike.analysis.diagnosis.limits import Limit, limits
 from heelstrike.analysis.diagnosis.symptoms import Cause, Symptom
 from heelstrike.analysis.support import walking_steps
@@ -69,7 +69,12 @@ def judge(run: Run, gait: Gait | None = None, *, tried: Sequence[Tried] = ()) ->
     advice = tuple(_advice(run, fall, asked, gait, tried))
     if fall is None and found and math.isfinite(found[0].reached):
         advice += (_no_reserve(found[0]),)
-    good = run.completed and fall is None and not run.solver.failures and not run.doubt
+    good = (
+        walked_on(run, fall)
+        and not run.solver.failures
+        and not run.doubt
+        and not run.certificates.energy_gain > 0.0
+    )
     parts = [_does(run, fall)]
     if fall is not None:
         parts.append(_why(run, fall))
@@ -225,7 +230,18 @@ def _advice(
         reason = f": {each.reason}" if each.reason else ""
         yield f"{_in_words(each)}{reason}.{seen}"
     if fall is not None and not asked:
-        yield _without_a_change(fall, gait)
+        yield _without_a_change(run, fall, gait)
+
+
+def on_points(run: Run) -> str:
+    """Laws for point feet, without the one that just fell."""
+    law = run.final.identity.get("controller", "") if run.final is not None else ""
+    if law.endswith(".stepping_constraints"):
+        return "the law that it had steps where balance needs it, and was at its end"
+    stepping = "by hs.SteppingConstraints, which steps where balance needs it"
+    if law.endswith(".virtual_constraints"):
+        return f"walk it {stepping}"
+    return f"walk it by hs.VirtualConstraints, or {stepping}"
 
 
 RESERVE = {
@@ -275,7 +291,7 @@ def _in_words(change: Change) -> str:
     return f"optimize_gait(robot, {change.lever.value.removeprefix('gait: ')}={number})"
 
 
-def _without_a_change(fall: Fall, gait: Gait | None) -> str:
+def _without_a_change(run: Run, fall: Fall, gait: Gait | None) -> str:
     if fall.cause is Cause.CONTROLLER:
         at = f" of the {in_words(fall.where)}" if fall.where else ""
         return f"mend the sign, the gain or the number{at} in the controller."
@@ -288,9 +304,8 @@ def _without_a_change(fall: Fall, gait: Gait | None) -> str:
         )
     if gait.point_feet:
         return (
-            "the robot stands on points, and no motor acts on its tipping about them: walk it by "
-            "hs.VirtualConstraints, or by hs.SteppingConstraints, which steps where balance needs "
-            "it."
+            "the robot stands on points, and no motor acts on its tipping about them: "
+            f"{on_points(run)}."
         )
     if fall.cause is Cause.UNKNOWN:
         return "nothing is known that would help."

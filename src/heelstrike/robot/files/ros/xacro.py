@@ -3,21 +3,20 @@
 A xacro file is a program: what stands in ``${…}`` is evaluated by Python. So it is expanded only
 where the user asks for it, in a process of its own that has a time limit and hands over nothing but
 text.
-
-The module is also the program of that process, which imports nothing else of heelstrike.
 """
 
 from __future__ import annotations
 
 import importlib.util
 import json
-import os
-import runpy
-import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
+
+from heelstrike.errors import RobotError
+from heelstrike.reader_process import ReaderProcess, ReadingError
+from heelstrike.robot.files.packages import find_package
 
 LONGEST_EXPANSION = 60.0
 """Seconds after which a file counts as one that never ends."""
@@ -49,8 +48,6 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Sequence[Path],
     RobotError
         If the package xacro is not installed, the file cannot be expanded, or this takes too long.
     """
-    from heelstrike.errors import RobotError
-
     if importlib.util.find_spec("xacro") is None:
         raise RobotError(
             f"{label}: expanding it needs the package xacro: pip install xacro. Or expand it "
@@ -61,38 +58,38 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Sequence[Path],
         "arguments": {str(name): str(value) for name, value in arguments.items()},
         "packages": [str(folder.resolve()) for folder in packages],
     }
+    process = ReaderProcess()  # which no program of a stranger shares with the files after it
     try:
-        done = subprocess.run(
-            [sys.executable, "-P", __file__],
-            input=json.dumps(order).encode(),
-            capture_output=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            timeout=LONGEST_EXPANSION,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise RobotError(
-            f"{label}: xacro has not finished with this file after {LONGEST_EXPANSION:.0f} s."
-        ) from None
-    except OSError as error:
-        raise RobotError(f"{label}: no process can be started to expand it: {error}.") from error
-    if done.returncode:
-        said = done.stderr.decode(errors="replace").strip()
+        done = process.ask(f"{__name__}:expand", json.dumps(order).encode(), patience=LONGEST_EXPANSION)
+    except ReadingError as error:
+        if not error.kind:
+            raise RobotError(f"{label}: xacro {error}.") from error
+        said = f"{error.kind}: {error}" if error.kind != "RobotError" else str(error)
         reason = " ".join(said.split())[-LONGEST_REASON:]
         raise RobotError(
-            f"{label}: xacro cannot expand this file: {reason or 'no reason is given'}. Values of "
+            f"{label}: xacro cannot expand this file: {reason}. Values of "
             'its <xacro:arg> are given as xacro={"name": "value"}, folders of packages that it '
             "finds as package_path=…."
-        )
-    return done.stdout.decode("utf-8", "replace")
+        ) from error
+    finally:
+        process.end()
+    return done.decode("utf-8", "replace")
+
+
+def expand(order: bytes) -> bytes:
+    """Expand a file in this process, whatever it does."""
+    asked = json.loads(order)
+    text = _expand(asked["file"], asked["arguments"], asked["packages"])
+    if len(text) > LARGEST:
+        raise RobotError(f"it expands to more than {LARGEST} letters, which no robot needs")
+    return text.encode("utf-8", "replace")
 
 
 def _expand(file: str, arguments: dict[str, str], packages: list[str]) -> str:
     """Expand a file in this process, with packages found as heelstrike finds them."""
-    find = runpy.run_path(str(Path(__file__).parents[1] / "packages.py"))["find_package"]
 
     def share_directory(name: str) -> str:
-        folder = find(name, Path(file).parent, [Path(each) for each in packages])
+        folder = find_package(name, Path(file).parent, [Path(each) for each in packages])
         if folder is None:
             raise KeyError(f"package {name!r} is not found.")
         return str(folder)
@@ -118,16 +115,3 @@ def _expand(file: str, arguments: dict[str, str], packages: list[str]) -> str:
             root.insertBefore(macro, root.firstChild)
         xacro.process_doc(document, mappings=arguments)
     return str(document.toprettyxml(indent=" "))
-
-
-if __name__ == "__main__":
-    # What a file prints while it is expanded is no part of the robot.
-    out, sys.stdout = sys.stdout, sys.stderr
-    order = json.loads(sys.stdin.buffer.read())
-    try:
-        text = _expand(order["file"], order["arguments"], order["packages"])
-    except Exception as error:  # whatever the file runs into
-        sys.exit(f"{type(error).__name__}: {error}")
-    if len(text) > LARGEST:
-        sys.exit(f"it expands to more than {LARGEST} letters, which no robot needs.")
-    out.buffer.write(text.encode("utf-8", "replace"))

@@ -14,6 +14,7 @@ from xml.etree.ElementTree import Element
 
 from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.files.looks import is_file, is_there, will_read
 from heelstrike.robot.files.packages import find_model
 from heelstrike.robot.files.screening.xml_tree import MOST_ELEMENTS, Node, xml_tree
 
@@ -253,16 +254,16 @@ def _read(path: Path, label: str) -> str:
                 f"{label}: this is a directory and not a regular file; name the .xml or .urdf file "
                 "in it."
             )
-        if not path.exists():
+        if not is_there(path):
             raise RobotError(f"{label}: there is no such file.")
-        if not path.is_file():
+        if not is_file(path):
             raise RobotError(f"{label}: this is not a regular file.")
         size = path.stat().st_size
         if size > LARGEST_FILE:
             raise RobotError(_too_large(label))
         if size == 0:  # and not to be opened: such are the files by which a system speaks
             raise RobotError(f"{label}: the file is empty.")
-        with path.open(encoding="utf-8") as file:
+        with will_read(path).open(encoding="utf-8") as file:
             return file.read(LARGEST_FILE + 1)
     except UnicodeDecodeError as error:
         raise RobotError(f"{label}: this is not a text file in UTF-8.") from error
@@ -270,22 +271,6 @@ def _read(path: Path, label: str) -> str:
         raise
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
         raise RobotError(f"{label}: the file cannot be read: {error}.") from error
-
-
-def is_there(path: Path) -> bool:
-    """Whether there is something; an impossible name (too long, null character) is nothing."""
-    try:
-        return path.exists()
-    except (OSError, ValueError):
-        return False
-
-
-def is_readable(path: Path) -> bool:
-    """Whether there is a regular file."""
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
 
 
 def _too_large(label: str) -> str:

@@ -7,7 +7,8 @@ from pathlib import Path, PurePath
 from xml.etree.ElementTree import Element, SubElement
 
 from heelstrike.errors import RobotError
-from heelstrike.robot.files.screening.inclusion import Place, is_readable, is_there, resolved
+from heelstrike.robot.files.looks import is_file, is_there, will_read
+from heelstrike.robot.files.screening.inclusion import Place, resolved
 from heelstrike.robot.warning import warn
 
 LARGEST_MESHES = 256 * 2**20
@@ -51,10 +52,10 @@ def name_mesh_files(root: Element, label: str, place: Place) -> bool:
         if path is None:
             missing[mesh.get("name") or PurePath(name).stem] = f"{where} names {name[:200]!r}"
             continue
-        if not is_readable(path):
+        if not is_file(path):
             raise RobotError(f"{where} names {str(path)!r}, which is not a regular file.")
         size += path.stat().st_size
-        mesh.set("file", str(resolved(path)))
+        mesh.set("file", str(resolved(will_read(path))))
     refuse_large_meshes(size, label)
     if missing:
         _leave_out(root, missing)
@@ -67,9 +68,9 @@ def is_mesh(file: Path) -> bool:
     """Whether a file is a mesh in a format that MuJoCo reads: .obj, .msh or binary .stl."""
     kind = file.suffix.lower()
     if kind != ".stl":
-        return kind in (".obj", ".msh")
+        return kind in (".obj", ".msh") and is_file(will_read(file))
     try:
-        with file.open("rb") as stream:
+        with will_read(file).open("rb") as stream:
             header = stream.read(84)
         size = file.stat().st_size
     except OSError:

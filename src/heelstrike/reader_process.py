@@ -1,0 +1,232 @@
+"""Another process, in which files from elsewhere are read.
+
+Parsers of foreign formats crash, hang or fill the memory over a file that is damaged, or made to
+hurt. So they run in a process of their own, which has a limit of time everywhere and of memory on
+Linux, and which hands over nothing but bytes. It is started with the first file and reads one after
+another; a file that ends it ends nothing else.
+
+The module is also the program of that process, which imports nothing of heelstrike by itself.
+"""
+
+from __future__ import annotations
+
+import atexit
+import faulthandler
+import importlib
+import math
+import os
+import runpy
+import struct
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import IO
+
+MOST_MEMORY = 4 * 2**30
+"""Bytes that the reading of a file may take."""
+
+_HEAD = struct.Struct("<dQQQ")  # patience, memory, letters of the job's name, bytes of the order
+_ANSWER = struct.Struct("<BQ")  # how it went, bytes of the answer
+_DONE, _RAISED, _FULL = range(3)
+
+
+class ReadingError(Exception):
+    """Nothing came of a file; the message says what became of its reader.
+
+    Attributes
+    ----------
+    kind : str
+        Name of the exception that the reader raised, or the empty string.
+    """
+
+    def __init__(self, message: str, kind: str = "") -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
+class ReaderProcess:
+    """A process that is given orders, one at a time, and is started when it is needed."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._owner = os.getpid()
+        self._lock = threading.Lock()
+
+    def ask(self, job: str, order: bytes, *, patience: float, memory: int = MOST_MEMORY) -> bytes:
+        """Have a function of bytes called in the process, and return the bytes that it returns.
+
+        Where no process can be started it is called here: Python may be part of another program.
+
+        Parameters
+        ----------
+        job : str
+            The function as ``module:name``. A module that is a path is read alone, without the
+            packages around it.
+        order : bytes
+            Its argument.
+        patience : float
+            Seconds that it may take.
+        memory : int
+            Bytes that it may take beyond what the process has; heeded on Linux.
+
+        Raises
+        ------
+        ReadingError
+            If the function raised, or its process did not survive it.
+        """
+        if self._owner != os.getpid():  # a fork, to which the other's process does not answer
+            self.__init__()  # type: ignore[misc]
+        with self._lock:
+            used = self._process is not None
+            try:
+                return self._asked(job, order, patience, memory)
+            except _GoneError:
+                if not used:
+                    raise
+            return self._asked(job, order, patience, memory)  # was it this file, or one before?
+
+    def end(self) -> None:
+        """End the process; the next order starts another."""
+        process, self._process = self._process, None
+        if process is not None and self._owner == os.getpid():
+            process.kill()
+            process.communicate()
+
+    def _asked(self, job: str, order: bytes, patience: float, memory: int) -> bytes:
+        if self._process is None and not self._start():
+            try:
+                return _function(job)(order)
+            except Exception as error:
+                raise ReadingError(str(error), type(error).__name__) from error
+        process = self._process
+        assert process is not None
+        assert process.stdin is not None
+        assert process.stdout is not None
+        name, late = job.encode(), threading.Event()
+
+        def stop() -> None:
+            late.set()
+            process.kill()
+
+        timer = threading.Timer(patience, stop)
+        timer.start()
+        try:
+            head = _HEAD.pack(patience, memory, len(name), len(order))
+            process.stdin.write(head + name + order)
+            process.stdin.flush()
+            how, length = _ANSWER.unpack(_exactly(process.stdout, _ANSWER.size))
+            answer = _exactly(process.stdout, length)
+        except BaseException as error:  # Ctrl-C, too: what it would answer is not waited for
+            self.end()
+            if late.is_set():
+                raise ReadingError(
+                    f"has not finished with this file after {patience:.0f} s"
+                ) from None
+            if isinstance(error, OSError | EOFError):
+                raise _GoneError(f"crashes on this file (exit {process.returncode})") from None
+            raise
+        finally:
+            timer.cancel()
+        if how == _DONE:
+            return answer
+        self.end()  # who knows in what state it is
+        if how == _FULL:
+            raise ReadingError(f"asks for more than {memory / 2**30:.3g} GiB of memory")
+        kind, _, words = answer.decode("utf-8", "replace").partition("\n")
+        raise ReadingError(words, kind)
+
+    def _start(self) -> bool:
+        """Start the process; return whether there is one."""
+        if getattr(sys, "frozen", False) or not sys.executable:
+            return False
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", __file__],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+            )
+        except OSError:
+            return False
+        return True
+
+
+class _GoneError(ReadingError):
+    """The process ended by itself."""
+
+
+def _exactly(stream: IO[bytes], length: int) -> bytes:
+    data = stream.read(length)
+    if len(data) < length:
+        raise EOFError
+    return data
+
+
+@cache
+def _function(job: str) -> Callable[[bytes], bytes]:
+    module, _, name = job.rpartition(":")
+    if module.endswith(".py"):
+        found: Callable[[bytes], bytes] = runpy.run_path(module)[name]
+        return found
+    found = getattr(importlib.import_module(module), name)
+    return found
+
+
+def _bound_memory(most: int) -> None:
+    """Bound what the process may take from now on, where the system does that."""
+    try:
+        import resource
+
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+    except (ImportError, OSError):
+        return
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    soft = pages * resource.getpagesize() + most
+    resource.setrlimit(resource.RLIMIT_AS, (soft if hard < 0 else min(soft, hard), hard))
+
+
+def _done(job: str, order: bytes, memory: int) -> tuple[int, bytes]:
+    """Follow an order; return how it went, and the answer."""
+    try:
+        function = _function(job)
+        _bound_memory(memory)
+        return _DONE, function(order)
+    except MemoryError:
+        return _FULL, b""
+    except BaseException as error:  # whatever a file makes of its reader
+        return _RAISED, f"{type(error).__name__}\n{error}".encode("utf-8", "replace")
+
+
+def _follow(orders: IO[bytes], answers: IO[bytes]) -> None:
+    """Follow orders until there are no more."""
+    nowhere = Path(os.devnull).open("w")  # noqa: SIM115 - for as long as the process lives
+    while True:
+        with suppress(EOFError):
+            patience, memory, *lengths = _HEAD.unpack(_exactly(orders, _HEAD.size))
+            # Should nobody be left to end it.
+            faulthandler.dump_traceback_later(math.ceil(patience) + 5, exit=True, file=nowhere)
+            name, order = (_exactly(orders, length) for length in lengths)
+            how, answer = _done(name.decode(), order, memory)
+            faulthandler.cancel_dump_traceback_later()
+            answers.write(_ANSWER.pack(how, len(answer)) + answer)
+            answers.flush()
+            continue
+        return
+
+
+READER = ReaderProcess()
+"""The process that reads the files of this one."""
+atexit.register(READER.end)
+
+if __name__ == "__main__":
+    # What a parser prints is no answer.
+    written = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    _follow(sys.stdin.buffer, written)
+    os._exit(0)  # a parser may not be in a state to clean up

@@ -1,0 +1,70 @@
+"""A robot as JSON, every digit of it, as it goes from the process that reads files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from heelstrike.robot.model import Model
+from heelstrike.robot.robot import Foot, LockedJoint, Robot
+from heelstrike.robot.shapes.outlines import Outline
+from heelstrike.robot.sides.mirror import Mirror
+
+_PLAIN = (
+    *("name", "joint_names", "link_names", "actuator_names", "contact_names"),
+    *("floating", "contact_friction", "source"),
+)
+
+
+def robot_entries(robot: Robot) -> dict[str, Any]:
+    """Return a robot as what JSON holds."""
+    parts = {
+        "model": robot.model.members(),
+        "mirror": robot.mirror and asdict(robot.mirror),
+        "feet": [asdict(foot) for foot in robot.feet],
+        "locked": [asdict(joint) for joint in robot.locked],
+        "outlines": [asdict(outline) for outline in robot.outlines],
+    }
+    whole = {name: getattr(robot, name) for name in _PLAIN} | parts
+    entries: dict[str, Any] = json.loads(json.dumps(whole, default=_entry))
+    return entries
+
+
+def robot_of_entries(entries: dict[str, Any]) -> Robot:
+    """Return the robot that :func:`robot_entries` told."""
+    plain = {name: _tuples(entries[name]) for name in _PLAIN}
+    return Robot(
+        **plain,
+        model=Model(**_arrays(entries["model"])),
+        mirror=entries["mirror"] and Mirror(**_arrays(entries["mirror"])),
+        feet=tuple(Foot(**_each_tuple(foot)) for foot in entries["feet"]),
+        locked=tuple(LockedJoint(**_each_tuple(joint)) for joint in entries["locked"]),
+        outlines=tuple(Outline(**_arrays(outline)) for outline in entries["outlines"]),
+    )
+
+
+def _entry(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return {"kind": value.dtype.str, "shape": value.shape, "values": value.ravel().tolist()}
+    return value.item()  # a number of NumPy
+
+
+def _arrays(entries: dict[str, Any]) -> dict[str, Any]:
+    return {
+        name: _array(each) if isinstance(each, dict) else each for name, each in entries.items()
+    }
+
+
+def _array(entry: dict[str, Any]) -> np.ndarray[Any, Any]:
+    return np.array(entry["values"], dtype=entry["kind"]).reshape(entry["shape"])
+
+
+def _each_tuple(entries: dict[str, Any]) -> dict[str, Any]:
+    return {name: _tuples(value) for name, value in entries.items()}
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
