@@ -30,14 +30,13 @@ from heelstrike.sim.linearized.step import SAME_INSTANT
 from heelstrike.sim.run import Run
 from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.whole_run import whole
+from heelstrike.tolerances import CLOSED_GAP
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 # A state this deep (m) in the ground is lifted out of it: penetration of other methods.
 SHALLOW = 1e-4
-# A contact point is on the ground up to this gap (m), and at rest up to this speed (m/s).
-ON_THE_GROUND = 1e-9
 AT_REST = 1e-8
 # Steps of a walk differ by less than this factor in time: what is simulated beyond a touchdown.
 SLACK = 1.2
@@ -58,7 +57,7 @@ class Section:
     def standing(self, state: State) -> tuple[Flags, Flags]:
         """Which points are on the ground, (nc,), and along which directions at rest, (nc, 2)."""
         _, gap, velocity = self.contacts(state)
-        touching = np.abs(gap) <= ON_THE_GROUND
+        touching = np.abs(gap) <= CLOSED_GAP
         at_rest = np.abs(velocity) <= AT_REST
         at_rest[:, 0] &= touching
         at_rest[:, 1] &= at_rest[:, 0]
@@ -69,7 +68,7 @@ class Section:
         model = self.robot.model
         joint, above = model.latch_joint, model.latch_side > 0
         way = np.where(above, model.upper[joint], model.lower[joint]) - state.q[joint]
-        there = (np.abs(way) <= ON_THE_GROUND) & (np.abs(state.v[joint]) <= AT_REST)
+        there = (np.abs(way) <= CLOSED_GAP) & (np.abs(state.v[joint]) <= AT_REST)
         return np.asarray(joint[there])
 
     def chart(self, state: State) -> Chart:

@@ -12,27 +12,18 @@ from heelstrike.robot.model import Floats
 
 
 class FollowedGait(Bundle):
-    """Numbers of a law that follows a gait.
-
-    Attributes
-    ----------
-    breakpoints : (pieces + 1,) float
-        Times in a step between which one polynomial holds (s).
-    coefficients : (2, pieces, terms, nu) float
-        For either stance foot the joints' polynomials, lowest power first.
-    earliest : float
-        A touchdown counts only after this time in a step (s).
-    latest : float
-        The reference goes on along its polynomials until this time in a step (s).
-    landing : float
-        A foot that touches without coming flat counts as landed after this time (s).
-    """
+    """Numbers of a law that follows a gait."""
 
     breakpoints: Floats = array("pieces + 1")
+    """Times in a step between which one polynomial holds (s)."""
     coefficients: Floats = array(2, "pieces", "terms", "nu")
+    """For either stance foot the joints' polynomials, lowest power first."""
     earliest: float = number(float)
+    """A touchdown counts only after this time in a step (s)."""
     latest: float = number(float)
+    """The reference goes on along its polynomials until this time in a step (s)."""
     landing: float = number(float)
+    """A foot that touches without coming flat counts as landed after this time (s)."""
 
 
 def followed(gait: Gait) -> dict[str, Any]:

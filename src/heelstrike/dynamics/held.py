@@ -26,72 +26,53 @@ from __future__ import annotations
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.compilation import kernel
-from heelstrike.dynamics.dense import NO_PIVOT, solve_positive
+from heelstrike.dynamics.dense import solve_positive
 from heelstrike.dynamics.kernels import factorize, mass_matrix, solve_factorized
 from heelstrike.dynamics.loops import LoopRows, find_rows
 from heelstrike.dynamics.places import bias_at, place_of, velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.tolerances import NO_PIVOT
 
 FREE = -1
 """What stands for the row of a coordinate that is independent, and the coordinate of no row."""
 
 
 class HeldRows(Bundle):
-    """What holds of the rates x of a robot, (nv,): C x = target.
-
-    Attributes
-    ----------
-    count : int
-        Rows so far.
-    rows : (held, nv) float
-        C.
-    solved : (held, nv) float
-        R: what a dependent coordinate takes of the independent ones; zero in rows that say nothing
-        new.
-    target : (held,) float
-        Rates of the rows: zero of velocities, −Ċ v of accelerations.
-    mix : (held, held) float
-        E: what of C each row of R is made of. Of rows that say nothing new, an orthonormal basis of
-        forces that nothing feels.
-    coordinate : (held,) int
-        The one that each row was solved for, ``FREE`` if it says nothing new.
-    row : (nv,) int
-        Row of each dependent coordinate, ``FREE`` for the others.
-    loops : LoopRows
-        Equations of closed loops and couplings.
-    """
+    """What holds of the rates x of a robot, (nv,): C x = target."""
 
     count: int = cell(int)
+    """Rows so far."""
     rows: Floats = array("held", "nv")
+    """C."""
     solved: Floats = array("held", "nv")
+    """R: what a dependent coordinate takes of the independent ones; zero in rows that say nothing
+    new."""
     target: Floats = array("held")
+    """Rates of the rows: zero of velocities, −Ċ v of accelerations."""
     mix: Floats = array("held", "held")
+    """E: what of C each row of R is made of. Of rows that say nothing new, an orthonormal basis of
+    forces that nothing feels."""
     coordinate: Integers = array("held", of=int)
+    """The one that each row was solved for, ``FREE`` if it says nothing new."""
     row: Integers = array("nv", of=int)
+    """Row of each dependent coordinate, ``FREE`` for the others."""
     loops: LoopRows = part(LoopRows)
+    """Equations of closed loops and couplings."""
 
 
 class Reaction(Bundle):
-    """How a robot answers the forces of its :class:`HeldRows`.
-
-    Attributes
-    ----------
-    matrix, factor : (nv, nv) float
-        A, and its factorisation.
-    response : (held, nv) float
-        A⁻¹ Cᵀ, row by row.
-    delassus : (held, held) float
-        C A⁻¹ Cᵀ; used up.
-    force : (held,) float
-        Forces, or impulses, along the rows of C, the shortest there are.
-    """
+    """How a robot answers the forces of its :class:`HeldRows`."""
 
     matrix: Floats = array("nv", "nv")
     factor: Floats = array("nv", "nv")
+    """matrix, factor: A, and its factorisation."""
     response: Floats = array("held", "nv")
+    """A⁻¹ Cᵀ, row by row."""
     delassus: Floats = array("held", "held")
+    """C A⁻¹ Cᵀ; used up."""
     force: Floats = array("held")
+    """Forces, or impulses, along the rows of C, the shortest there are."""
 
 
 @kernel

@@ -36,33 +36,23 @@ Integers = NDArray[np.int64]
 
 
 class Tally(Bundle):
-    """Counts and worst values of a simulation, over every step, recorded or not.
-
-    Attributes
-    ----------
-    steps, saturations : int
-        Steps taken; commands that motors or their limits did not let through.
-    bad_torque : int
-        Actuator whose torque was not finite.
-    bad_trial : int
-        One more than the actuator whose torque was not finite when asked for within a step.
-    penetration : float
-        Deepest penetration of a contact point (m).
-    complementarity, cone, non_penetration : float
-        Largest residuals of the contact problems.
-    energy_gain : float
-        Kinetic energy that restitution made (J).
-    """
+    """Counts and worst values of a simulation, over every step, recorded or not."""
 
     steps: int = cell(int)
     saturations: int = cell(int)
+    """steps, saturations: Steps taken; commands that motors or their limits did not let through."""
     bad_torque: int = cell(int)
+    """Actuator whose torque was not finite."""
     bad_trial: int = cell(int)
+    """One more than the actuator whose torque was not finite when asked for within a step."""
     penetration: float = cell(float)
+    """Deepest penetration of a contact point (m)."""
     complementarity: float = cell(float)
     cone: float = cell(float)
     non_penetration: float = cell(float)
+    """complementarity, cone, non_penetration: Largest residuals of the contact problems."""
     energy_gain: float = cell(float)
+    """Kinetic energy that restitution made (J)."""
 
 
 class Equations(Bundle):
@@ -70,181 +60,118 @@ class Equations(Bundle):
 
     A short robot's programs leave a factor of the mass matrix behind, a long one's loops
     articulated bodies; see :mod:`heelstrike.sim.contacts.straight_line`.
-
-    Attributes
-    ----------
-    tree : Workspace
-        Kinematics.
-    bias : (nv,) float
-        Bias force H.
-    mass_matrix, factor : (nv, nv) float
-        Mass matrix and its factor.
-    added : (nv,) float
-        What an implicit scheme adds to the diagonal of the mass matrix.
-    bodies : ArticulatedBodies
-        What the loops solve with instead of the factor.
-    programs : (5,) int
-        Addresses of straight-line code, zero for none.
-    force, rate : (nv,) float
-        Generalised force without contact, and what it comes to; scratch.
     """
 
     tree: Workspace = part(Workspace)
+    """Kinematics."""
     bias: Floats = array("nv")
+    """Bias force H."""
     mass_matrix: Floats = array("nv", "nv")
     factor: Floats = array("nv", "nv")
+    """mass_matrix, factor: Mass matrix and its factor."""
     added: Floats = array("nv")
+    """What an implicit scheme adds to the diagonal of the mass matrix."""
     bodies: ArticulatedBodies = part(ArticulatedBodies)
+    """What the loops solve with instead of the factor."""
     programs: Integers = array("programs", of=int, address=True)
+    """Addresses of straight-line code, zero for none."""
     force: Floats = array("nv")
     rate: Floats = array("nv")
+    """force, rate: Generalised force without contact, and what it comes to; scratch."""
 
 
 class Surface(Bundle):
-    """What the ground is like under each contact.
-
-    Attributes
-    ----------
-    friction, restitution : (capacity,) float
-        Of contact points and their second faces; of joint stops zero, and friction 1 of dry joints.
-        Numbered by the table of rows.
-    """
+    """What the ground is like under each contact."""
 
     friction: Floats = array("capacity")
     restitution: Floats = array("capacity")
+    """friction, restitution: Of contact points and their second faces; of joint stops zero, and
+    friction 1 of dry joints. Numbered by the table of rows."""
 
 
 class Assembly(Bundle):
-    """The contact problem of an instant, how it is put together, and its answer.
-
-    Attributes
-    ----------
-    candidate : (capacity,) int
-        Entries of the table of rows that take part, kind by kind. The capacity has room for all.
-    begin, until : (kinds,) int
-        Places of the first candidate of each kind, and of the one after its last.
-    jacobian : (2 capacity, nv) float
-        Contact Jacobian of the candidates.
-    leaf : (capacity,) int
-        Link that each candidate acts on: only its joint and those before have a part in its rows;
-        ``EVERYWHERE`` for one that acts on several.
-    root : (nv,) float
-    half : (nv, 2 capacity) float
-        D^(-1/2) and D^(-1/2) L⁻ᵀ Jᵀ, with A = Lᵀ D L.
-    problem : ContactProblem
-        The contact problem of the candidates.
-    answer : ContactAnswer
-        Its solution.
-    """
+    """The contact problem of an instant, how it is put together, and its answer."""
 
     candidate: Integers = array("capacity", of=int)
+    """Entries of the table of rows that take part, kind by kind. The capacity has room for all."""
     begin: Integers = array("kinds", of=int)
     until: Integers = array("kinds", of=int)
+    """begin, until: Places of the first candidate of each kind, and of the one after its last."""
     jacobian: Floats = array("2 capacity", "nv")
+    """Contact Jacobian of the candidates."""
     leaf: Integers = array("capacity", of=int)
+    """Link that each candidate acts on: only its joint and those before have a part in its rows;
+    ``EVERYWHERE`` for one that acts on several."""
     root: Floats = array("nv")
     half: Floats = array("nv", "2 capacity")
+    """D^(-1/2) and D^(-1/2) L⁻ᵀ Jᵀ, with A = Lᵀ D L."""
     problem: ContactProblem = part(ContactProblem)
+    """The contact problem of the candidates."""
     answer: ContactAnswer = part(ContactAnswer)
+    """Its solution."""
 
 
 class UsualPoints(Bundle):
-    """The contact points that straight-line programs are for, and what these work on.
-
-    Attributes
-    ----------
-    usual_problem : ContactProblem
-        The contact problem with the matrix of these points.
-    usual_points : (k,) int
-        Which they are.
-    usual_place : (nc,) int
-        Place of each contact point among them, -1 for none.
-    every_point : (nc,) int
-        All contact points.
-    point_rows : (2 k, nv) float
-        Scratch of the Delassus matrix.
-    point_velocity, point_impulse : (nc, 2) float
-        Velocities and impulses of contact points.
-    programs : (5,) int
-        Addresses of straight-line code, those of the equations of motion.
-    """
+    """The contact points that straight-line programs are for, and what these work on."""
 
     usual_problem: ContactProblem = part(ContactProblem)
+    """The contact problem with the matrix of these points."""
     usual_points: Integers = array("points", of=int)
+    """Which they are."""
     usual_place: Integers = array("nc", of=int)
+    """Place of each contact point among them, -1 for none."""
     every_point: Integers = array("nc", of=int)
+    """All contact points."""
     point_rows: Floats = array("2 points", "nv")
+    """Scratch of the Delassus matrix."""
     point_velocity: Floats = array("nc", "components")
     point_impulse: Floats = array("nc", "components")
+    """point_velocity, point_impulse: Velocities and impulses of contact points."""
     programs: Integers = array("programs", of=int, address=True)
+    """Addresses of straight-line code, those of the equations of motion."""
 
 
 class Reaction(Bundle):
-    """What contacts and joints did in the last solve, beside the contact forces.
-
-    Attributes
-    ----------
-    slip : (nc,) float
-        Tangential velocity of each contact point at the end of the step.
-    mode : (capacity,) int
-        Contact mode, the guess of the next solve; numbered by the table of rows.
-    stop_torque, friction_torque : (nv,) float
-        Generalised forces of joint stops and of dry joint friction.
-    """
+    """What contacts and joints did in the last solve, beside the contact forces."""
 
     slip: Floats = array("nc")
+    """Tangential velocity of each contact point at the end of the step."""
     mode: Integers = array("capacity", of=int)
+    """Contact mode, the guess of the next solve; numbered by the table of rows."""
     stop_torque: Floats = array("nv")
     friction_torque: Floats = array("nv")
+    """stop_torque, friction_torque: Generalised forces of joint stops and of dry joint friction."""
 
 
 class Loops(Bundle):
-    """What holds besides the joints: closed loops, coupled joints, latches and brakes.
-
-    Attributes
-    ----------
-    rows : LoopRows
-        Their equations in the state now.
-    response : (loop_rows, nv) float
-        What a unit force of each does to the coordinates.
-    system : (loop_rows, loop_rows + 1) float
-    unknown : (loop_rows,) float
-    order : (loop_rows,) int
-        Equations of the forces where there is no contact problem, their solution, and its order.
-    loop_force : (loops, axes) float
-    coupling_force : (couplings,) float
-        Forces of the last solve.
-    lean : (loops, axes) float
-        What a row of each loop is of the other, where both say the same; see
-        :func:`heelstrike.sim.contacts.loops.leave_one`.
-    entry : (loop_rows,) int
-        Which entry of the table of rows each row is now.
-    held : (latches,) int
-        Whether each latch is engaged.
-    braked : (brakes,) int
-        Whether each brake is on; see :mod:`heelstrike.sim.contacts.brakes`.
-    brake_entry : (brakes,) int
-        Which entry of the table of rows each brake is.
-    brake_position : (brakes,) float
-        Where those that are on hold their joints (rad, m).
-    brake_force : (brakes,) float
-        What they held them with in the last solve.
-    """
+    """What holds besides the joints: closed loops, coupled joints, latches and brakes."""
 
     rows: LoopRows = part(LoopRows)
+    """Their equations in the state now."""
     response: Floats = array("loop_rows", "nv")
+    """What a unit force of each does to the coordinates."""
     system: Floats = array("loop_rows", "loop_rows + 1")
     unknown: Floats = array("loop_rows")
     order: Integers = array("loop_rows", of=int)
+    """Equations of the forces where there is no contact problem, their solution, and its order."""
     loop_force: Floats = array("loops", "axes")
     coupling_force: Floats = array("couplings")
+    """Forces of the last solve."""
     lean: Floats = array("loops", "axes")
+    """What a row of each loop is of the other, where both say the same; see
+    :func:`heelstrike.sim.contacts.loops.leave_one`."""
     entry: Integers = array("loop_rows", of=int)
+    """Which entry of the table of rows each row is now."""
     held: Integers = array("latches", of=int)
+    """Whether each latch is engaged."""
     braked: Integers = array("brakes", of=int)
+    """Whether each brake is on; see :mod:`heelstrike.sim.contacts.brakes`."""
     brake_entry: Integers = array("brakes", of=int)
+    """Which entry of the table of rows each brake is."""
     brake_position: Floats = array("brakes")
+    """Where those that are on hold their joints (rad, m)."""
     brake_force: Floats = array("brakes")
+    """What they held them with in the last solve."""
 
 
 class Reported(Bundle):
@@ -252,20 +179,16 @@ class Reported(Bundle):
 
     Attributes
     ----------
-    closed, slipping : (capacity,) int
-        Whether each contact point is on the ground, and whether it slips.
-    stopped : (nv,) int
-        Whether each joint pressed against a stop.
-    resting : (capacity,) int
-        Whether each dry joint was at rest, -1 before the first report.
-
     Those of (capacity,) are numbered by the table of rows.
     """
 
     closed: Integers = array("capacity", of=int)
     slipping: Integers = array("capacity", of=int)
+    """closed, slipping: Whether each contact point is on the ground, and whether it slips."""
     stopped: Integers = array("nv", of=int)
+    """Whether each joint pressed against a stop."""
     resting: Integers = array("capacity", of=int)
+    """Whether each dry joint was at rest, -1 before the first report."""
 
     def forget(self) -> None:
         """Be as at the beginning."""
@@ -278,71 +201,49 @@ class Memory(Bundle):
     """State of a simulation and all that its kernels write to, in the bundles that they receive.
 
     Flat parts are stored under the names of their members: files do not know of the bundles.
-
-    Attributes
-    ----------
-    q, v : (nv,) float
-        Position and velocity now.
-    next_v : (nv,) float
-        Velocity at the end of the step.
-    command : (nu,) float
-        What the controller asks for: torques, or voltages as parts of the full one.
-    torque : (nu,) float
-        What acts of it; see :mod:`heelstrike.sim.controller.motors`.
-    stiffness, damping : (nv,) float
-        Gains of joint springs, dampers and controller that an implicit scheme takes at the end of
-        the step (N m, N m s).
-    breakaway : (nv,) float
-        The most that dry friction is of each joint now (N m, N).
-    rows : Rows
-        The table of all that may hold the robot.
-    equations : Equations
-        Equations of motion of the state now.
-    contacts : Contacts
-        Contact points now; their forces are those of the last solve.
-    seconds : Contacts
-        The same points on their second faces, in concave corners.
-    surface : Surface
-        The ground under them.
-    assembly : Assembly
-        The contact problem.
-    solver : ContactWorkspace
-        Memory of the contact solvers.
-    usual : UsualPoints
-        What straight-line programs make it of.
-    reaction : Reaction
-        What else came of it.
-    loops : Loops
-        What holds between coordinates.
-    reported : Reported
-        What events have told of it.
-    pushes : Pushes
-        Forces from outside.
-    tally : Tally
-        Counts and worst values of the run.
     """
 
     q: Floats = array("nq")
     v: Floats = array("nv")
+    """q, v: Position and velocity now."""
     next_v: Floats = array("nv")
+    """Velocity at the end of the step."""
     command: Floats = array("nu")
+    """What the controller asks for: torques, or voltages as parts of the full one."""
     torque: Floats = array("nu")
+    """What acts of it; see :mod:`heelstrike.sim.controller.motors`."""
     stiffness: Floats = array("nv")
     damping: Floats = array("nv")
+    """stiffness, damping: Gains of joint springs, dampers and controller that an implicit scheme
+    takes at the end of the step (N m, N m s)."""
     breakaway: Floats = array("nv")
+    """The most that dry friction is of each joint now (N m, N)."""
     rows: Rows = part(Rows, address=True)
+    """The table of all that may hold the robot."""
     equations: Equations = part(Equations, flat=True)
+    """Equations of motion of the state now."""
     contacts: Contacts = part(Contacts)
+    """Contact points now; their forces are those of the last solve."""
     seconds: Contacts = part(Contacts)
+    """The same points on their second faces, in concave corners."""
     surface: Surface = part(Surface, flat=True)
+    """The ground under them."""
     assembly: Assembly = part(Assembly, flat=True)
+    """The contact problem."""
     solver: ContactWorkspace = part(ContactWorkspace)
+    """Memory of the contact solvers."""
     usual: UsualPoints = part(UsualPoints, flat=True)
+    """What straight-line programs make it of."""
     reaction: Reaction = part(Reaction, flat=True)
+    """What else came of it."""
     loops: Loops = part(Loops)
+    """What holds between coordinates."""
     reported: Reported = part(Reported, flat=True)
+    """What events have told of it."""
     pushes: Pushes = part(Pushes)
+    """Forces from outside."""
     tally: Tally = part(Tally)
+    """Counts and worst values of the run."""
 
 
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:

@@ -12,13 +12,12 @@ otherwise in every return, M u is known to be u⁺ but badly measured; T does no
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from heelstrike.analysis.stability.returns import Disturbed
+from heelstrike.field_texts import dataclass
 
 Floats = NDArray[np.float64]
 
@@ -31,28 +30,22 @@ STAYS = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Across:
-    """Returns of errors, without those that are none.
-
-    Attributes
-    ----------
-    kept, inert : tuple of int
-        Coordinates on which something hangs, and the rest.
-    matrices, across : tuple of float arrays
-        Derivatives of the returns in the coordinates that are kept; the same across the walk, or
-        as they are where being early by less than a sample does not stay.
-    bases : tuple of (n, m) float
-        What the errors across the walk are in these coordinates, at the beginnings of the returns
-        and the end of the last.
-    along : float or None
-        What stays of being early, by a whole number of samples; None of a walk that a clock drives.
-    """
+    """Returns of errors, without those that are none."""
 
     kept: tuple[int, ...]
     inert: tuple[int, ...]
+    """kept, inert: Coordinates on which something hangs, and the rest."""
     matrices: tuple[Floats, ...]
     across: tuple[Floats, ...]
+    """matrices, across: Tuple of float arrays. Derivatives of the returns in the coordinates that
+    are kept; the same across the walk, or as they are where being early by less than a sample does
+    not stay."""
     bases: tuple[Floats, ...]
+    """Tuple of (n, m) float. What the errors across the walk are in these coordinates, at the
+    beginnings of the returns and the end of the last."""
     along: float | None
+    """What stays of being early, by a whole number of samples; None of a walk that a clock
+    drives."""
 
     @classmethod
     def of(

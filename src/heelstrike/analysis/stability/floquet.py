@@ -10,7 +10,6 @@ so that a period that is no whole number of samples does no harm, and no leg has
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +21,7 @@ from heelstrike.analysis.stability.measurement import measure
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
@@ -36,54 +36,40 @@ SURE = 2.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Floquet:
-    """How small errors of a walk, and of what its controller remembers, grow from step to step.
-
-    Attributes
-    ----------
-    matrix : (n, n) float
-        Errors in the middle of a step, as a part of what was disturbed, one return later: the mean
-        over the returns that were looked at.
-    each : tuple of (n, n) float
-        Those of the returns.
-    coordinates : tuple of str
-        What the rows and columns are: errors of the robot, combined so that its feet stay where
-        they stand, and numbers of the controller's memory by name.
-    directions : (nq + nv, m) float
-        The combinations: the first m coordinates.
-    steps : int
-        Steps of a return: two, of a robot with two legs.
-    period, step_length : float
-        Mean duration and length of a step in s and m.
-    along : float or None
-        What the returns leave of being early by a 250th of one: all, but for errors of samples and
-        of integration, of a walk that no clock drives. None of one that a clock drives.
-    multipliers : (n,) complex
-        Those of a return, largest first, without the one that is one.
-    disturbance, residual : float
-        Size of the disturbances, and the largest difference between two returns of the walk itself,
-        but for being early or late if no clock drives it (m, rad, velocities by the length they
-        make in half a step).
-    neutral, one_sided, switched : tuple of str
-        Numbers of the memory whose errors do nothing, which are left out; coordinates whose errors
-        of either sign do different things, of which the mean counts: there the loop has a kink, and
-        multipliers are those of a mean of its sides; whole numbers of the memory that came out
-        otherwise for some disturbance.
-    """
+    """How small errors of a walk, and of what its controller remembers, grow from step to step."""
 
     matrix: Floats
+    """(n, n) Errors in the middle of a step, as a part of what was disturbed, one return later: the
+    mean over the returns that were looked at."""
     each: tuple[Floats, ...]
+    """Tuple of (n, n) float. Those of the returns."""
     coordinates: tuple[str, ...]
+    """What the rows and columns are: errors of the robot, combined so that its feet stay where they
+    stand, and numbers of the controller's memory by name."""
     directions: Floats
+    """(nq + nv, m) The combinations: the first m coordinates."""
     steps: int
+    """Steps of a return: two, of a robot with two legs."""
     period: float
     step_length: float
+    """period, step_length: Mean duration and length of a step in s and m."""
     along: float | None
+    """What the returns leave of being early by a 250th of one: all, but for errors of samples and
+    of integration, of a walk that no clock drives. None of one that a clock drives."""
     multipliers: NDArray[np.complex128]
+    """(n,) Those of a return, largest first, without the one that is one."""
     disturbance: float
     residual: float
+    """disturbance, residual: Size of the disturbances, and the largest difference between two
+    returns of the walk itself, but for being early or late if no clock drives it (m, rad,
+    velocities by the length they make in half a step)."""
     neutral: tuple[str, ...]
     one_sided: tuple[str, ...]
     switched: tuple[str, ...]
+    """neutral, one_sided, switched: Numbers of the memory whose errors do nothing, which are left
+    out; coordinates whose errors of either sign do different things, of which the mean counts:
+    there the loop has a kink, and multipliers are those of a mean of its sides; whole numbers of
+    the memory that came out otherwise for some disturbance."""
 
     @property
     def largest(self) -> float:

@@ -8,7 +8,6 @@ not: sizes are tried upwards in equal strides, then the last stride is halved un
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from heelstrike.analysis.stability.trial import Trial
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.push import Push
 
 FAR = 1000.0
@@ -24,24 +24,16 @@ FAR = 1000.0
 
 @dataclass(frozen=True, kw_only=True)
 class Largest:
-    """The largest disturbance of a kind.
-
-    Attributes
-    ----------
-    recovered : float
-        Largest size from which the walk recovers, as it does from all smaller ones tried.
-    failed : float
-        Smallest size tried from which it does not; infinite if it recovers from the largest.
-    trials : int
-        Walks simulated.
-    unit : str
-        Of the sizes.
-    """
+    """The largest disturbance of a kind."""
 
     recovered: float
+    """Largest size from which the walk recovers, as it does from all smaller ones tried."""
     failed: float
+    """Smallest size tried from which it does not; infinite if it recovers from the largest."""
     trials: int
+    """Walks simulated."""
     unit: str
+    """Of the sizes."""
 
     def __str__(self) -> str:
         if np.isinf(self.failed):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.contact.linearized.slopes import along_the_ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
@@ -23,6 +23,7 @@ from heelstrike.sim.run import Event
 from heelstrike.sim.simulation import CAN_GO_ON, Simulation
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.whole_run import whole
+from heelstrike.tolerances import SAME_ROW
 
 Floats = NDArray[np.float64]
 
@@ -39,8 +40,6 @@ SMOOTH, ROUGH = 1e-5, 0.05
 REBOUND = 0.3
 """Touchdowns that follow a step sooner than this part of the longest are of the same step."""
 
-SAME = 1e-9
-"""Times (s) that differ by less are one."""
 
 STANDS = 1e-4
 """A foot that is lifted by less than this (m) stands."""
@@ -50,22 +49,15 @@ FEW_ROWS = 10**9
 
 @dataclass(frozen=True)
 class Walk:
-    """A walk, kept in the middle of every so many steps.
-
-    Attributes
-    ----------
-    begins : tuple of Snapshot
-        One more than there are returns.
-    steps : int
-        Steps from one to the next.
-    duration, length : float
-        Of a return, in s and m.
-    """
+    """A walk, kept in the middle of every so many steps."""
 
     begins: tuple[Snapshot, ...]
+    """One more than there are returns."""
     steps: int
+    """Steps from one to the next."""
     duration: float
     length: float
+    """duration, length: Of a return, in s and m."""
 
 
 class ClosedLoop:
@@ -147,7 +139,7 @@ class ClosedLoop:
         have been asked.
         """
         sample = self.sampled(until)
-        simulation.advance(sample if abs(sample - until) <= SAME else until)
+        simulation.advance(sample if abs(sample - until) <= SAME_ROW else until)
         if simulation.status not in CAN_GO_ON:
             raise LimitCycleError(f"{doing}: {simulation.message}")
         if simulation.status is not CAN_GO_ON[0]:

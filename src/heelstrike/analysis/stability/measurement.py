@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +18,7 @@ from heelstrike.analysis.stability.returns import (
 )
 from heelstrike.analysis.stability.section import Section
 from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
 
 Floats = NDArray[np.float64]
@@ -33,27 +33,18 @@ does, to this part of it."""
 
 @dataclass(frozen=True)
 class Measurement:
-    """Returns of a walk, disturbed.
-
-    Attributes
-    ----------
-    size : float
-        Of the disturbances.
-    section : Section
-        Their coordinates.
-    found : list of Disturbed
-        The returns.
-    early : float
-        What is left of being early.
-    in_step : bool
-        Whether samples take away what is less than one of it.
-    """
+    """Returns of a walk, disturbed."""
 
     size: float
+    """Of the disturbances."""
     section: Section
+    """Their coordinates."""
     found: list[Disturbed]
+    """The returns."""
     early: float
+    """What is left of being early."""
     in_step: bool
+    """Whether samples take away what is less than one of it."""
 
     @cached_property
     def errors(self) -> Across:

@@ -7,7 +7,6 @@ legs exchanged: the derivative of the map from touchdown to touchdown.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +18,7 @@ from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.linearized.slopes import along_the_ground, contact_slopes
 from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
@@ -38,47 +38,33 @@ REPEATS = 1e-5
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StepHeight:
-    """What the height of the next foothold does to a step.
-
-    Attributes
-    ----------
-    state : (nq + nv,) float
-        Errors (δq, δv) at the next touchdown for a metre of height, seen from the new foothold. The
-        foot behind is not level with it then: they are none of those that `tangent` spans.
-    duration_state : (nq + nv,) float
-        Change of the step's duration by errors at its beginning (s/m, s/rad, s²/m, s²/rad).
-    duration : float
-        Change of its duration by the height (s/m).
-    """
+    """What the height of the next foothold does to a step."""
 
     state: Floats
+    """(nq + nv,) Errors (δq, δv) at the next touchdown for a metre of height, seen from the new
+    foothold. The foot behind is not level with it then: they are none of those that `tangent`
+    spans."""
     duration_state: Floats
+    """(nq + nv,) Change of the step's duration by errors at its beginning (s/m, s/rad, s²/m,
+    s²/rad)."""
     duration: float
+    """Change of its duration by the height (s/m)."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Monodromy:
-    """The linearisation of a step that repeats.
-
-    Attributes
-    ----------
-    period : float
-        Duration of the step in s.
-    motion : Motion
-        Its linearisation, until the touchdown that ends it.
-    relabelling : (nq + nv, nq + nv) float
-        Exchange of the legs and the way back along the ground.
-    tangent : (nq + nv, m) float
-        Orthonormal basis of the errors that the feet on the ground allow.
-    normal : (nq + nv,) float
-        What the ground's rise by a metre does to a state that is seen from it.
-    """
+    """The linearisation of a step that repeats."""
 
     period: float
+    """Duration of the step in s."""
     motion: Motion
+    """Its linearisation, until the touchdown that ends it."""
     relabelling: Floats
+    """(nq + nv, nq + nv) Exchange of the legs and the way back along the ground."""
     tangent: Floats
+    """(nq + nv, m) Orthonormal basis of the errors that the feet on the ground allow."""
     normal: Floats
+    """(nq + nv,) What the ground's rise by a metre does to a state that is seen from it."""
 
     @property
     def flows(self) -> tuple[Floats, ...]:

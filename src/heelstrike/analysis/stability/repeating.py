@@ -10,7 +10,7 @@ it ended, so that what is no coordinate, such as the force of the last step, is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk
 from heelstrike.analysis.stability.returns import Disturbed, returned, stays_early
 from heelstrike.analysis.stability.section import Section
 from heelstrike.errors import LimitCycleError
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.snapshot import Snapshot
 
 Floats = NDArray[np.float64]
@@ -43,24 +44,16 @@ PATIENCE = 3
 
 @dataclass(frozen=True)
 class Repeating:
-    """A walk that repeats itself.
-
-    Attributes
-    ----------
-    walk : Walk
-        Its one return.
-    errors : Across
-        What errors do in it.
-    residual : float
-        By how much it does not.
-    iterations : int
-        Newton steps taken.
-    """
+    """A walk that repeats itself."""
 
     walk: Walk
+    """Its one return."""
     errors: Across
+    """What errors do in it."""
     residual: float
+    """By how much it does not."""
     iterations: int
+    """Newton steps taken."""
 
 
 def repeating_walk(

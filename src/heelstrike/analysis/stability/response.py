@@ -12,7 +12,7 @@ with disturbances e, from return to return.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -27,6 +27,7 @@ from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
@@ -93,49 +94,36 @@ class _Response:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DisturbanceResponse:
-    """How a walk responds to disturbances, from return to return.
-
-    Attributes
-    ----------
-    A : (m, m) float
-        Errors one return later of errors across the walk.
-    B : (m, k) float
-        The same of disturbances of size one that last a return.
-    C : (l, m) float
-        Changes of the indicators in the return by errors at its beginning.
-    D : (l, k) float
-        The same by the disturbances.
-    disturbances : tuple of k str
-        Their names.
-    steps : int
-        Steps of a return.
-    doubts : dict of str to float
-        What it makes to each of `norms`, in the first return, if errors and disturbances are half
-        as large. Of differences that are smooth it is three quarters of what these are wrong by;
-        much more where thresholds, samples or rounding make them uneven.
-    disturbance, residual : float
-        Size of the errors that were put in, and the largest difference between two returns of the
-        walk itself, but for being early or late if no clock drives it, as of
-        :class:`~heelstrike.analysis.stability.floquet.Floquet`.
-    along : float or None
-        What the returns leave of being early; None of a walk that a clock drives.
-    one_sided, switched : tuple of str
-        Errors, or disturbances, that do different things either way, of which the mean counts;
-        whole numbers of the controller's memory that came out otherwise for some error.
-    """
+    """How a walk responds to disturbances, from return to return."""
 
     A: Floats
+    """(m, m) Errors one return later of errors across the walk."""
     B: Floats
+    """(m, k) The same of disturbances of size one that last a return."""
     C: Floats
+    """(l, m) Changes of the indicators in the return by errors at its beginning."""
     D: Floats
+    """(l, k) The same by the disturbances."""
     disturbances: tuple[str, ...]
+    """Tuple of k str. Their names."""
     steps: int
+    """Steps of a return."""
     doubts: dict[str, float]
+    """What it makes to each of `norms`, in the first return, if errors and disturbances are half as
+    large. Of differences that are smooth it is three quarters of what these are wrong by; much more
+    where thresholds, samples or rounding make them uneven."""
     disturbance: float
     residual: float
+    """disturbance, residual: Size of the errors that were put in, and the largest difference
+    between two returns of the walk itself, but for being early or late if no clock drives it, as of
+    :class:`~heelstrike.analysis.stability.floquet.Floquet`."""
     along: float | None
+    """What the returns leave of being early; None of a walk that a clock drives."""
     one_sided: tuple[str, ...]
     switched: tuple[str, ...]
+    """one_sided, switched: Errors, or disturbances, that do different things either way, of which
+    the mean counts; whole numbers of the controller's memory that came out otherwise for some
+    error."""
 
     _each: tuple[_Response, ...]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from heelstrike.analysis.stability.loop import ClosedLoop, Walk
 from heelstrike.analysis.stability.section import Section
 from heelstrike.errors import LimitCycleError
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.whole_run import whole
@@ -35,32 +35,24 @@ not too small to matter."""
 
 @dataclass(frozen=True)
 class Disturbed:
-    """Derivative of a return by differences.
-
-    Attributes
-    ----------
-    matrix : (n, n) float
-        Columns by coordinate disturbed.
-    seen : (l, n) float
-        The same of indicators.
-    residual, residual_but_late : float
-        How far the undisturbed walk is from where it was one return before (m, rad, velocities by
-        the length they make in half a step), and apart from being early or late.
-    begins, ends : (n,) float
-        Rates of the walk at its beginning and end.
-    one_sided, switched : frozenset of str
-        Coordinates whose errors of either sign do different things; whole numbers of the memory
-        that came out otherwise.
-    """
+    """Derivative of a return by differences."""
 
     matrix: Floats
+    """(n, n) Columns by coordinate disturbed."""
     seen: Floats
+    """(l, n) The same of indicators."""
     residual: float
     residual_but_late: float
+    """residual, residual_but_late: How far the undisturbed walk is from where it was one return
+    before (m, rad, velocities by the length they make in half a step), and apart from being early
+    or late."""
     begins: Floats
     ends: Floats
+    """begins, ends: (n,) Rates of the walk at its beginning and end."""
     one_sided: frozenset[str]
     switched: frozenset[str]
+    """one_sided, switched: Coordinates whose errors of either sign do different things; whole
+    numbers of the memory that came out otherwise."""
 
 
 def returned(

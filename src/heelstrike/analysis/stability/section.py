@@ -18,11 +18,9 @@ from heelstrike.sim.compliant.method import Compliant
 from heelstrike.sim.controller.law import law_of
 from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.snapshot import Snapshot
+from heelstrike.tolerances import STANDING_GAP, STANDING_SPEED
 
 Floats = NDArray[np.float64]
-
-TOUCHING, AT_REST = 1e-6, 1e-6
-"""Gap (m) and speed (m/s) of a contact point that stands."""
 
 TURNED = 10.0
 """m/s²: over a fixed step a standing point's Jacobian turns, and by so much of it its speed with
@@ -103,8 +101,8 @@ class Section:
             return np.zeros(nc, bool), np.zeros((nc, 2), bool)
         seen = contact_kinematics(self._loop.robot, at.state.q, at.state.v, self._loop.ground)
         step = self._loop.simulation.method.step_length or 0.0
-        touching = np.abs(seen.gap) <= TOUCHING + TURNED * step * step
-        at_rest = (np.abs(seen.velocity) <= AT_REST + TURNED * step) & touching[:, None]
+        touching = np.abs(seen.gap) <= STANDING_GAP + TURNED * step * step
+        at_rest = (np.abs(seen.velocity) <= STANDING_SPEED + TURNED * step) & touching[:, None]
         at_rest[:, 1] &= at_rest[:, 0]
         return touching, at_rest
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.control import Law
 from heelstrike.dynamics import contact_positions
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import OnError
@@ -39,35 +40,6 @@ GETS_ON = 0.7
 class Trial:
     """A walk to be disturbed.
 
-    Attributes
-    ----------
-    robot : Robot
-        A floating robot.
-    controller : object with ``torque(t, state, contacts)``, or None
-        What makes it walk. One in Python that remembers must forget at time 0.
-    state : State
-        Where it begins, on a walk that repeats.
-    step_length, step_duration : float
-        Of a step of that walk, in m and s. Of a robot that stands the length is zero; the duration
-        then counts the time before a disturbance, and its phase.
-    method : Method
-        Way through time; ``TimeStepping(step=1e-3)`` by default.
-    ground : Ground
-        The ground it walks on undisturbed, level.
-    undisturbed : int
-        Steps before a disturbance.
-    settling : float
-        How long after a disturbance the walk has to be normal again, in s.
-    pitch : float
-        Largest angle of the trunk from the upright, in rad.
-    control_period : float or None
-        As of :func:`~heelstrike.simulate`.
-    progress : callable or None
-        Called now and then, in every walk, with the simulated time. If it raises, that walk ends
-        there as if by Ctrl-C.
-    on_error : OnError
-        What to do when the controller raises, as of :func:`~heelstrike.simulate`.
-
     Raises
     ------
     SimulationError
@@ -75,18 +47,33 @@ class Trial:
     """
 
     robot: Robot
+    """A floating robot."""
     controller: Controller | Law | None
+    """Object with ``torque(t, state, contacts)``,. What makes it walk. One in Python that remembers
+    must forget at time 0."""
     state: State
+    """Where it begins, on a walk that repeats."""
     step_length: float
     step_duration: float
+    """step_length, step_duration: Of a step of that walk, in m and s. Of a robot that stands the
+    length is zero; the duration then counts the time before a disturbance, and its phase."""
     method: Method = field(default_factory=lambda: TimeStepping(step=1e-3))
+    """Way through time; ``TimeStepping(step=1e-3)`` by default."""
     ground: Ground = field(default_factory=Ground)
+    """The ground it walks on undisturbed, level."""
     undisturbed: int = 2
+    """Steps before a disturbance."""
     settling: float = 7.0
+    """How long after a disturbance the walk has to be normal again, in s."""
     pitch: float = 0.6
+    """Largest angle of the trunk from the upright, in rad."""
     control_period: float | None = None
+    """As of :func:`~heelstrike.simulate`."""
     progress: Callable[[float], None] | None = None
+    """Called now and then, in every walk, with the simulated time. If it raises, that walk ends
+    there as if by Ctrl-C."""
     on_error: OnError = OnError.WARN
+    """What to do when the controller raises, as of :func:`~heelstrike.simulate`."""
 
     def __post_init__(self) -> None:
         check_fields(self, SimulationError)

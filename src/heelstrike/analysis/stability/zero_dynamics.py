@@ -10,7 +10,6 @@ Control 48(1), section V).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import GaitError, LimitCycleError
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.gait.phased.surface import Surface, Touchdown
 from heelstrike.gait.polynomials import gauss
@@ -33,36 +33,26 @@ POINTS = 64
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ZeroDynamics:
-    """What a gait over its phase does by itself, once the joints obey it.
-
-    Attributes
-    ----------
-    gait : PhasedGait
-        The gait.
-    ground : Ground
-        Level or sloping ground.
-    touchdown : Touchdown
-        Where its steps end, and what the impact does.
-    contraction : float
-        δ²_zero, the nontrivial Floquet multiplier of a walk that obeys the gait: below 1, speed
-        comes back.
-    gain : float
-        What gravity adds to ζ = σ²/2 over a step, in (kg m²/s)².
-    barrier : float
-        ζ⁺ that a step needs to come over its highest point, in (kg m²/s)².
-    position_defect, velocity_defect : float
-        Invariance under the impact: largest difference between the joints after touchdown and the
-        gait there (rad), and between their rates, as a part of that of the phase.
-    """
+    """What a gait over its phase does by itself, once the joints obey it."""
 
     gait: PhasedGait
+    """The gait."""
     ground: Ground
+    """Level or sloping ground."""
     touchdown: Touchdown
+    """Where its steps end, and what the impact does."""
     contraction: float
+    """δ²_zero, the nontrivial Floquet multiplier of a walk that obeys the gait: below 1, speed
+    comes back."""
     gain: float
+    """What gravity adds to ζ = σ²/2 over a step, in (kg m²/s)²."""
     barrier: float
+    """ζ⁺ that a step needs to come over its highest point, in (kg m²/s)²."""
     position_defect: float
     velocity_defect: float
+    """position_defect, velocity_defect: Invariance under the impact: largest difference between the
+    joints after touchdown and the gait there (rad), and between their rates, as a part of that of
+    the phase."""
 
     @property
     def invariant(self) -> bool:

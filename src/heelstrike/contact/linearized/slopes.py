@@ -7,7 +7,6 @@ the equations that a standing robot obeys.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -20,6 +19,7 @@ from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.places import write_point_rows
 from heelstrike.dynamics.queries.evaluation import joint_vector
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Integers
 from heelstrike.robot.robot import Robot
 
@@ -29,25 +29,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ContactSlopes:
-    """Derivatives by the state (q, v), each over nq + nv columns.
-
-    Attributes
-    ----------
-    place : (nc, nq + nv) float
-        Of where along the ground the contact points are. A disc's does not roll with it.
-    gap : (nc, nq + nv) float
-        Of their gaps.
-    velocity : (nc, 2, nq + nv) float
-        Of their velocities (normal, tangent), those of discs with the turning.
-    loop, loop_velocity : (k, nq + nv) float
-        Of what closed loops lack, and of its rate.
-    """
+    """Derivatives by the state (q, v), each over nq + nv columns."""
 
     place: Floats
+    """(nc, nq + nv) Of where along the ground the contact points are. A disc's does not roll with
+    it."""
     gap: Floats
+    """(nc, nq + nv) Of their gaps."""
     velocity: Floats
+    """(nc, 2, nq + nv) Of their velocities (normal, tangent), those of discs with the turning."""
     loop: Floats
     loop_velocity: Floats
+    """loop, loop_velocity: (k, nq + nv) Of what closed loops lack, and of its rate."""
 
 
 def contact_slopes(

@@ -7,8 +7,6 @@ where latches have them. A :class:`Chart` numbers what these leave free.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
@@ -18,6 +16,7 @@ from heelstrike.contact.linearized.slopes import along_the_ground, contact_slope
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics import loop_displacement, loop_jacobian
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Integers
 from heelstrike.robot.robot import Robot
 
@@ -33,29 +32,19 @@ NEAREST, MOST = 1e-15, 20
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """Equations of a robot that stands.
-
-    Attributes
-    ----------
-    robot : Robot
-    ground : Ground
-        Level or sloping.
-    touching : (nc,) bool
-        Which points are on the ground.
-    at_rest : (nc, 2) bool
-        Along which directions (normal, tangent) they are at rest.
-    foothold : int
-        The point that keeps its place.
-    held : (k,) int
-        Joints that latches hold.
-    """
+    """Equations of a robot that stands."""
 
     robot: Robot
     ground: Ground
+    """Level or sloping."""
     touching: NDArray[np.bool_]
+    """(nc,) Which points are on the ground."""
     at_rest: NDArray[np.bool_]
+    """(nc, 2) Along which directions (normal, tangent) they are at rest."""
     foothold: int
+    """The point that keeps its place."""
     held: Integers
+    """(k,) Joints that latches hold."""
 
     def equations(self, x: Floats) -> Floats:
         """What errors of a state (q, v) do not change, (k,)."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,27 +15,22 @@ from heelstrike.contact.linearized.motion import (
     saltation_matrix,
 )
 from heelstrike.contact.workspace import Floats
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
 class Strike:
-    """One of them.
-
-    Attributes
-    ----------
-    gradient : (nq + nv,) float
-        Derivative of the gap that closes.
-    before, after : (nq + nv,) float
-        Rates of the state: after those that came down before it, and after it.
-    impact : ImpactLinearization
-        Its impact.
-    """
+    """One of them."""
 
     gradient: Floats
+    """(nq + nv,) Derivative of the gap that closes."""
     before: Floats
     after: Floats
+    """before, after: (nq + nv,) Rates of the state: after those that came down before it, and after
+    it."""
     impact: ImpactLinearization
+    """Its impact."""
 
     def saltation(self, after: Floats | None = None) -> Floats:
         """Saltation matrix, under the rate after it or another."""

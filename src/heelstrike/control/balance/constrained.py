@@ -24,34 +24,26 @@ from heelstrike.sim.controller.stance import hold_sole
 
 
 class Constrained(Bundle):
-    """The robot on its stance foot: what depends on joint accelerations a, and how.
-
-    Attributes
-    ----------
-    motion, drift : (nv, nu) and (nv,) float
-        v̇ = motion a + drift.
-    wrench, load : (3, nu) and (3,) float
-        Force (x, z) and moment about +y of the ground on the foot, at the middle of the sole:
-        wrench a + load.
-    torque, hold : (nu, nu) and (nu,) float
-        Torques of the actuators: torque a + hold.
-    rows, shift : (3, nu) and (3,) float
-        Acceleration of a point (x, z, rotation): rows a + shift; see :func:`point_task`.
-    mass, force, columns : float
-        Scratch.
-    """
+    """The robot on its stance foot: what depends on joint accelerations a, and how."""
 
     motion: Floats = array("nv", "nu")
     drift: Floats = array("nv")
+    """motion, drift: v̇ = motion a + drift."""
     wrench: Floats = array(3, "nu")
     load: Floats = array(3)
+    """wrench, load: Force (x, z) and moment about +y of the ground on the foot, at the middle of
+    the sole: wrench a + load."""
     torque: Floats = array("nu", "nu")
     hold: Floats = array("nu")
+    """torque, hold: Torques of the actuators: torque a + hold."""
     rows: Floats = array(3, "nu")
     shift: Floats = array(3)
+    """rows, shift: Acceleration of a point (x, z, rotation): rows a + shift; see
+    :func:`point_task`."""
     mass: Floats = array("nv", "nv")
     force: Floats = array("nv")
     columns: Floats = array("nv", 3)
+    """mass, force, columns: Scratch."""
 
 
 @kernel

@@ -36,45 +36,29 @@ FEWEST = 20
 
 
 class Parameters(FollowedGait):
-    """Numbers of the law.
-
-    Attributes
-    ----------
-    first : int
-        The foot that stands as torques and gains are given.
-    actuator, actuator_sign : (nu,) int and float
-        The mirror of the joints.
-    duration : float
-        Of a step (s).
-    torque : (places, nu) float
-    gains : (places, nu, 2 nu) float
-        Torques of the gait, and K, evenly over the step; between them they are linear.
-    """
+    """Numbers of the law."""
 
     first: int = number(int)
+    """The foot that stands as torques and gains are given."""
     actuator: Integers = array("nu", of=int)
     actuator_sign: Floats = array("nu")
+    """actuator, actuator_sign: The mirror of the joints."""
     duration: float = number(float)
+    """Of a step (s)."""
     torque: Floats = array("places", "nu")
     gains: Floats = array("places", "nu", "2 nu")
+    """Torques of the gait, and K, evenly over the step; between them they are linear."""
 
 
 class Memory(StanceClock):
-    """What the law remembers; the rest is scratch.
-
-    Attributes
-    ----------
-    away : (2 nu,) float
-        Errors as on the first foot.
-    asked : (nu,) float
-        Torques as on the first foot.
-    error : (2 nu,) float
-        Errors.
-    """
+    """What the law remembers; the rest is scratch."""
 
     away: Floats = array("2 nu")
+    """Errors as on the first foot."""
     asked: Floats = array("nu")
+    """Torques as on the first foot."""
     error: Floats = array("2 nu")
+    """Errors."""
 
 
 @kernel

@@ -32,70 +32,46 @@ BEYOND = 0.01
 
 
 class Parameters(Bundle):
-    """Numbers of the law.
-
-    Attributes
-    ----------
-    stance : int
-        The foot that stands as the walk is given.
-    joint, sign, offset : (nv,) int, (nv,) and (nq,) float
-        The mirror: q[j] of the image is sign[j] q[joint[j]] + offset[j].
-    actuator, actuator_sign : (nu,) int and float
-        That of the torques.
-    phase : (nv,) float
-        Factors of the coordinates in θ.
-    first, width : float
-        Where θ begins, and how far it goes (rad).
-    walk : (2 nv, terms) float
-        Coordinates and velocities of the walk, as Chebyshev series over the range of θ.
-    torque : (nu, terms) float
-    gains : (nu, 2 nv, terms) float
-        Torques of the walk, and K, likewise.
-    """
+    """Numbers of the law."""
 
     stance: int = number(int)
+    """The foot that stands as the walk is given."""
     joint: Integers = array("nv", of=int)
     sign: Floats = array("nv")
     offset: Floats = array("nq")
+    """joint, sign, offset: The mirror: q[j] of the image is sign[j] q[joint[j]] + offset[j]."""
     actuator: Integers = array("nu", of=int)
     actuator_sign: Floats = array("nu")
+    """actuator, actuator_sign: That of the torques."""
     phase: Floats = array("nv")
+    """Factors of the coordinates in θ."""
     first: float = number(float)
     width: float = number(float)
+    """first, width: Where θ begins, and how far it goes (rad)."""
     walk: Floats = array("2 nv", "terms")
+    """Coordinates and velocities of the walk, as Chebyshev series over the range of θ."""
     torque: Floats = array("nu", "terms")
     gains: Floats = array("nu", "2 nv", "terms")
+    """Torques of the walk, and K, likewise."""
 
 
 class Memory(StanceClock):
-    """What the law remembers: the foot that stands. The rest is scratch.
-
-    Attributes
-    ----------
-    x, away : (2 nv,) float
-        State as in the walk, and how far from it.
-    asked : (nu,) float
-        Torques as in the walk.
-    polynomial : (terms,) float
-        Chebyshev polynomials at the phase.
-    """
+    """What the law remembers: the foot that stands. The rest is scratch."""
 
     x: Floats = array("2 nv")
     away: Floats = array("2 nv")
+    """x, away: State as in the walk, and how far from it."""
     asked: Floats = array("nu")
+    """Torques as in the walk."""
     polynomial: Floats = array("terms")
+    """Chebyshev polynomials at the phase."""
 
 
 class Log(Bundle):
-    """What the law tells of itself.
-
-    Attributes
-    ----------
-    phase : float
-        θ as a part of its range, from 0 to 1.
-    """
+    """What the law tells of itself."""
 
     phase: float = cell(float, label="Phase of the step")
+    """θ as a part of its range, from 0 to 1."""
 
 
 @kernel

@@ -7,8 +7,6 @@ is (δp, δṗ), p all coordinates but the trunk's x and z.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.polynomial.chebyshev import chebder, chebpts1, chebvander
@@ -17,6 +15,7 @@ from numpy.typing import ArrayLike
 from heelstrike.contact import ActiveContacts, contact_inverse_dynamics, linearize_contact
 from heelstrike.contact.linearized.slopes import both, following
 from heelstrike.errors import ControllerError
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.gait.phased.surface import Surface, Touchdown
 from heelstrike.robot.model import Floats
@@ -29,18 +28,13 @@ INVARIANT = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A quantity over the phase, as Chebyshev series of its entries.
-
-    Attributes
-    ----------
-    first, last : float
-        Ends of the phase (rad).
-    coefficients : (NODES, ...) float
-    """
+    """A quantity over the phase, as Chebyshev series of its entries."""
 
     first: float
     last: float
+    """first, last: Ends of the phase (rad)."""
     coefficients: Floats
+    """(NODES, ...)"""
 
     @classmethod
     def through(cls, first: float, last: float, values: Floats) -> Course:
@@ -66,29 +60,21 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """The walk that repeats, from just after one touchdown to just before the next.
-
-    Attributes
-    ----------
-    gait : PhasedGait
-    touchdown : Touchdown
-        Its end.
-    q, v, torque : Course of (nq,), (nv,) and (nu,)
-        The walk.
-    rate : Course of ()
-        θ̇ (rad/s).
-    A, B : Course of (2 p, 2 p) and (2 p, nu)
-        d/dt (δp, δṗ) = A (δp, δṗ) + B δτ while the stance foot stays in place.
-    """
+    """The walk that repeats, from just after one touchdown to just before the next."""
 
     gait: PhasedGait
     touchdown: Touchdown
+    """Its end."""
     q: Course
     v: Course
     torque: Course
+    """q, v, torque: Course of (nq,), (nv,) and (nu,). The walk."""
     rate: Course
+    """Course of (). θ̇ (rad/s)."""
     A: Course
     B: Course
+    """A, B: Course of (2 p, 2 p) and (2 p, nu). d/dt (δp, δṗ) = A (δp, δṗ) + B δτ while the stance
+    foot stays in place."""
 
     @property
     def flow(self) -> Course:

@@ -19,8 +19,6 @@ solution the jump takes from the beginning of a step to the end of the one befor
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
@@ -31,6 +29,7 @@ from heelstrike.contact.linearized.slopes import both, contact_slopes, exchanged
 from heelstrike.contact.linearized.strikes import strikes
 from heelstrike.control.gait_lqr.orbit import Orbit, contacts_of
 from heelstrike.control.gait_lqr.riccati import over_all_steps
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 
 STEPS, FINE = 256, 2048
@@ -39,28 +38,19 @@ STEPS, FINE = 256, 2048
 
 @dataclass(frozen=True, eq=False)
 class Transverse:
-    """The linear equations across a walk, at the ends and the middles of even steps.
-
-    Attributes
-    ----------
-    theta : (2 steps + 1,) float
-        Phases, evenly spaced (rad).
-    basis : (2 p, 2 p - 1) float
-        E.
-    A, B : (2 steps + 1, ...) float
-        dw/dθ = A w + B δτ.
-    pace : (2 steps + 1,) float
-        dt/dθ.
-    jump : (2 p - 1, 2 p - 1) float
-        w⁺ = jump w⁻.
-    """
+    """The linear equations across a walk, at the ends and the middles of even steps."""
 
     theta: Floats
+    """(2 steps + 1,) Phases, evenly spaced (rad)."""
     basis: Floats
+    """(2 p, 2 p - 1) float. E."""
     A: Floats
     B: Floats
+    """A, B: (2 steps + 1, ...) dw/dθ = A w + B δτ."""
     pace: Floats
+    """(2 steps + 1,) dt/dθ."""
     jump: Floats
+    """(2 p - 1, 2 p - 1) float. w⁺ = jump w⁻."""
 
     @classmethod
     def of(cls, orbit: Orbit, steps: int = STEPS) -> Transverse:

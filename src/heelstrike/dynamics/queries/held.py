@@ -6,7 +6,6 @@ The kernels of :mod:`heelstrike.dynamics.held` over the numbers or the symbols o
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from heelstrike.dynamics import held as kernels
 from heelstrike.dynamics.kernels import solve_factorized
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.field_texts import dataclass
 
 Array = NDArray[Any]
 """Of numbers, or of symbols."""
@@ -23,24 +23,16 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A place of a robot that is held.
-
-    Attributes
-    ----------
-    link : int
-        Its link.
-    position : (2,) array
-        World position (m): of a disc its lowest point.
-    center : (2,) array
-        What moves on evenly while a disc rolls: its centre; of others the same.
-    components : int
-        Two, x and z; or three, the link's rotation too.
-    """
+    """A place of a robot that is held."""
 
     link: int
+    """Its link."""
     position: Array
+    """(2,) array. World position (m): of a disc its lowest point."""
     center: Array
+    """(2,) array. What moves on evenly while a disc rolls: its centre; of others the same."""
     components: int
+    """Two, x and z; or three, the link's rotation too."""
 
 
 class HeldRobot:

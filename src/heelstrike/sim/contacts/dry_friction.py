@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.sim.contacts.rows import DRY_JOINT, Rows
 
 
 @kernel

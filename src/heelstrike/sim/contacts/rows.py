@@ -21,14 +21,13 @@ in ``Contacts``. A latch is no kind of its own: while it holds, the set of its s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import dissolved_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Model
 
 Floats = NDArray[np.float64]
@@ -39,20 +38,13 @@ POINT, STOP, DRY_JOINT, SECOND_FACE, LOOP, COUPLING, BRAKE = range(7)
 
 @dataclass(frozen=True)
 class Kind:
-    """What entries of a kind have in common.
-
-    Attributes
-    ----------
-    name : str
-    set : int
-        Where their impulses lie.
-    components : int
-        How many rows of the contact problem each of them is.
-    """
+    """What entries of a kind have in common."""
 
     name: str
     set: int
+    """Where their impulses lie."""
     components: int
+    """How many rows of the contact problem each of them is."""
 
 
 KINDS = (
@@ -67,40 +59,29 @@ KINDS = (
 
 
 class Rows(Bundle):
-    """The table of rows of a robot.
-
-    Attributes
-    ----------
-    first, end : (kinds,) int
-        The first entry of each kind, and the one after its last.
-    set, components : (kinds,) int
-        Where impulses of each kind lie, and how many rows each entry is.
-    kind, owner : (entries,) int
-        What each entry is, and of what: the contact point, joint, loop, coupling or brake.
-    side : (entries,) float
-        1 for the lower, -1 for the upper end of a joint's range; 1 for all other entries.
-    limit : (entries,) float
-        Position of the joint at that end (rad, m).
-    axis : (entries,) int
-        0 for the row along x, 1 for the row along z of a loop; 0 for all other entries.
-    gap : (entries,) float
-        How far each is from what would hold it (m, rad), infinite if it has no gap: of points and
-        second faces as they were located last, of stops as somebody wrote it.
-    latch_stop : (latches,) int
-        The stop that each latch is.
-    """
+    """The table of rows of a robot."""
 
     first: Integers = array("kinds", of=int)
     end: Integers = array("kinds", of=int)
+    """first, end: The first entry of each kind, and the one after its last."""
     set: Integers = array("kinds", of=int)
     components: Integers = array("kinds", of=int)
+    """set, components: Where impulses of each kind lie, and how many rows each entry is."""
     kind: Integers = array("entries", of=int)
     owner: Integers = array("entries", of=int)
+    """kind, owner: What each entry is, and of what: the contact point, joint, loop, coupling or
+    brake."""
     side: Floats = array("entries")
+    """1 for the lower, -1 for the upper end of a joint's range; 1 for all other entries."""
     limit: Floats = array("entries")
+    """Position of the joint at that end (rad, m)."""
     axis: Integers = array("entries", of=int)
+    """0 for the row along x, 1 for the row along z of a loop; 0 for all other entries."""
     gap: Floats = array("entries")
+    """How far each is from what would hold it (m, rad), infinite if it has no gap: of points and
+    second faces as they were located last, of stops as somebody wrote it."""
     latch_stop: Integers = array("latches", of=int)
+    """The stop that each latch is."""
 
 
 def dry_joints(model: Model) -> Integers:

@@ -21,21 +21,14 @@ LANDED_SPEED = 1e-3
 
 
 class StanceClock(Bundle):
-    """The foot that stands.
-
-    Attributes
-    ----------
-    stance : int
-        Which it is.
-    start : float
-        When its step began (s).
-    landed : int
-        Whether it is past the impact that made it the stance foot.
-    """
+    """The foot that stands."""
 
     stance: int = cell(int)
+    """Which it is."""
     start: float = cell(float)
+    """When its step began (s)."""
     landed: int = cell(int)
+    """Whether it is past the impact that made it the stance foot."""
 
 
 @kernel

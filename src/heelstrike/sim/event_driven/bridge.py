@@ -44,7 +44,7 @@ from heelstrike.sim.contacts.loops import (
 from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
+from heelstrike.sim.event_driven.impact import IMPACT, heading
 from heelstrike.sim.event_driven.phase import Bridge, Faces, Impact, Modes, Motion, Phase, Step
 from heelstrike.sim.event_driven.rows import write_row
 from heelstrike.sim.event_driven.smooth.candidates import free_acceleration, solve_candidates
@@ -61,6 +61,7 @@ from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Reported, Surface
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
+from heelstrike.tolerances import CLOSED_GAP, NOTICEABLE_ENERGY
 
 BRIDGE = int(EventKind.BRIDGE)
 
@@ -70,9 +71,6 @@ SHORTEST_BRIDGE = 1e-6
 LONGER = 4.0
 MOST_BRIDGES = 10
 PROGRESS = 1e-3
-# Gap (m) up to which a contact touches: more than projection leaves, and what the shortest bridge
-# moves at 1 mm/s. Speed (m/s, rad/s) at which another might within a bridge: of a fall from 20 m.
-TOUCHING = 1e-9
 CLOSING_SPEED = 20.0
 # Approach (m/s, rad/s) at the end of a bridge that is no more than the turning of the rows leaves.
 SETTLED = 1e-6
@@ -104,7 +102,7 @@ def write_free(
     )
     for row in range(2 * place, 2 * place + 2):
         free[row] = row_product(jacobian, row, v) + length * free[row]
-    added[place] = gap / length if gap > TOUCHING else 0.0
+    added[place] = gap / length if gap > CLOSED_GAP else 0.0
     free[2 * place] += added[place]
     if rows.kind[contact] == DRY_JOINT:
         assembly.problem.bound[place] *= length
@@ -150,7 +148,7 @@ def gather_near(
             contacts, faces, bridge.added, assembly,
         )  # fmt: skip
         came = row_product(jacobian, 2 * count, state[model.nq :])
-        if bouncing and gap <= TOUCHING and came < -SLOW:
+        if bouncing and gap <= CLOSED_GAP and came < -SLOW:
             bridge.added[count] = restitution[contact] * came
             assembly.problem.free[2 * count] += bridge.added[count]
         count += 1
@@ -195,7 +193,7 @@ def collect_impulses(
         contact = assembly.candidate[place]
         impact.impulse[contact, 0] = impulse[2 * place]
         impact.impulse[contact, 1] = impulse[2 * place + 1]
-        if not velocity[2 * place] - added[place] > TOUCHING:
+        if not velocity[2 * place] - added[place] > CLOSED_GAP:
             mode[contact] = assembly.answer.mode[place]
 
 
@@ -214,7 +212,7 @@ def made_energy(count: int, assembly: Assembly, added: Floats) -> bool:
             after += delassus[row, column] * impulse[column]
         made += impulse[row] * (before + after)
         through += abs(impulse[row]) * (abs(before) + abs(after))
-    return made > NOTICEABLE * through
+    return made > NOTICEABLE_ENERGY * through
 
 
 @kernel
@@ -303,7 +301,7 @@ def put_in_place(
         size = 0
         for place in range(count):
             contact = assembly.candidate[place]
-            leaves = velocity[2 * place] - bridge.added[place] > TOUCHING
+            leaves = velocity[2 * place] - bridge.added[place] > CLOSED_GAP
             if (
                 kept[2 * place] > 0.0
                 and not leaves
@@ -549,7 +547,7 @@ def adopt_end(
         kind = rows.kind[contact]
         if kind == SECOND_FACE:
             point = rows.owner[contact]
-            if contacts.gap[point] <= TOUCHING:
+            if contacts.gap[point] <= CLOSED_GAP:
                 stand_on_face(
                     model, ground, tree, point, contacts, rows, modes.closed, surface, seconds,
                     faces,
@@ -559,7 +557,7 @@ def adopt_end(
                 joint = rows.owner[contact]
                 modes.slide[contact] = heading(begin[model.nq + joint])
             continue
-        touches = gap_now(contact, rows, begin) <= TOUCHING
+        touches = gap_now(contact, rows, begin) <= CLOSED_GAP
         normal, tangent = gap_velocity(contact, model, contacts, tree, rows, seconds, begin)
         # What has come down by the end of the bridge meets the ground there.
         holds = mode[contact] != OPEN and normal >= -SETTLED
@@ -569,7 +567,7 @@ def adopt_end(
 
 
 @kernel
-def cross(
+def cross_bridge(
     scene: Scene, stop: float, control: Control, memory: Memory, work: Motion, record: Record
 ) -> bool:
     """Lay a bridge from now on, to `stop` at the longest; return success.

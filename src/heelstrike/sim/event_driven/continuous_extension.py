@@ -61,22 +61,15 @@ DENSE_SLOPES: Floats = _dense_slopes()
 
 
 class Extension(Bundle):
-    """What makes the dense output of a step more exact.
-
-    Attributes
-    ----------
-    state, slope : (5, 2 nv) float
-        States (q, v) at the places within the step, and the slopes there.
-    correction : (8, 2 nv) float
-        Coefficients of θ, θ², … in what is added to the dense output.
-    point : (2 nv,) float
-        A place as it is corrected; scratch.
-    """
+    """What makes the dense output of a step more exact."""
 
     state: Floats = array(BETWEEN, "2 nv")
     slope: Floats = array(BETWEEN, "2 nv")
+    """state, slope: States (q, v) at the places within the step, and the slopes there."""
     correction: Floats = array(DEGREE, "2 nv")
+    """Coefficients of θ, θ², … in what is added to the dense output."""
     point: Floats = array("2 nv")
+    """A place as it is corrected; scratch."""
 
 
 @kernel

@@ -22,7 +22,6 @@ from heelstrike.sim.contacts.rows import (
     Rows,
 )
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.event_driven.bridge import TOUCHING
 from heelstrike.sim.event_driven.impact import collide
 from heelstrike.sim.event_driven.phase import Impact, Modes, Motion, Phase, Step, Watch
 from heelstrike.sim.event_driven.rows import write_row
@@ -36,6 +35,7 @@ from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Memory
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import JOINT_STOP, log_event, note_residual
+from heelstrike.tolerances import CLOSED_GAP
 
 PAINLEVE = int(EventKind.PAINLEVE)
 # At the start of a run, points nearer to the ground than this (m) and slower (m/s) are on it: no
@@ -200,7 +200,7 @@ def begin_phase(
         model, ground, memory.rows, memory.equations, contacts, memory.surface, assembly,
         memory.loops, memory.seconds, phase, begin,
     )  # fmt: skip
-    closest, slip = (ON_THE_GROUND, FITTING) if decision.started == BEGUN else (TOUCHING, UNSEEN)
+    closest, slip = (ON_THE_GROUND, FITTING) if decision.started == BEGUN else (CLOSED_GAP, UNSEEN)
     if series.last_end == step.time:
         slip += BRIDGED * min(series.length, LONG_BRIDGE)
     fits = step.left <= closest

@@ -32,6 +32,7 @@ from heelstrike.sim.event_driven.smooth.saddle_point import (
 from heelstrike.sim.memory import Memory, Reported
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
+from heelstrike.tolerances import NOTICEABLE_ENERGY
 
 IMPACT = int(EventKind.IMPACT)
 ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
@@ -41,8 +42,6 @@ ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
 REST = 1e-9
 # Velocities (m/s, rad/s) along a loop up to which it has none: rounding of some hundred operations.
 ROUNDING = 1e-13
-# Energy counts as made when it exceeds this part of the energy that went through the contacts.
-NOTICEABLE = 1e-9
 # Bounces shorter than this (s) lose what restitution gave them, and of those shorter than this the
 # rest: what speed is left of them is less than anyone could see. Under gravity the first rises by
 # 1e-12 m, a gap to which events are located, the second by rounding.
@@ -277,7 +276,7 @@ def strike(
         time, contacts, memory.rows, memory.seconds, phase.faces.paired, step, impact, reported,
         record,
     )  # fmt: skip
-    if made > NOTICEABLE * through:
+    if made > NOTICEABLE_ENERGY * through:
         memory.tally.energy_gain += made
         log_impulse(
             ENERGY_GAIN, made_at, contacts, memory.rows, memory.seconds, phase.faces.paired,

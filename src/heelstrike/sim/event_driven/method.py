@@ -9,7 +9,6 @@ next phase; at a touchdown the impact law (eq. 20-22) first decides the velociti
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +19,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
@@ -64,24 +64,6 @@ JUMP = 1e-7
 class EventDriven(Method):
     """Adaptive high-order integration between events, which are found to 1e-12 s.
 
-    Parameters
-    ----------
-    rtol, atol : float
-        Error that a step may make in each coordinate and velocity: ``atol + rtol |y|``.
-    max_step : float
-        Longest step in seconds; an open contact point that would touch the ground and leave it
-        again within a quarter of this may only be seen thanks to its velocity.
-    output_period : float or None
-        Seconds between two rows of the record, which change no step and are about as exact as the
-        ends of steps. None for a row at every step. Events have rows of their own: one, or two if
-        velocities jump.
-    solver : str
-        Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``.
-    swing_feet_pass : bool
-        A rule for passive walkers, whose legs of equal length scuff the ground at mid-stance: a
-        point that reaches the ground beside or behind a point already on it, seen in the direction
-        in which the robot moves, passes below the ground until it comes up again.
-
     Raises
     ------
     SimulationError
@@ -98,10 +80,21 @@ class EventDriven(Method):
 
     rtol: float = 1e-8
     atol: float = 1e-10
+    """rtol, atol: Error that a step may make in each coordinate and velocity: ``atol + rtol
+    |y|``."""
     max_step: float = 0.05
+    """Longest step in seconds; an open contact point that would touch the ground and leave it again
+    within a quarter of this may only be seen thanks to its velocity."""
     output_period: float | None = 1e-3
+    """Seconds between two rows of the record, which change no step and are about as exact as the
+    ends of steps. None for a row at every step. Events have rows of their own: one, or two if
+    velocities jump."""
     solver: str = "lemke"
+    """Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``."""
     swing_feet_pass: bool = False
+    """A rule for passive walkers, whose legs of equal length scuff the ground at mid-stance: a
+    point that reaches the ground beside or behind a point already on it, seen in the direction in
+    which the robot moves, passes below the ground until it comes up again."""
 
     impulses_in_events: ClassVar[bool] = True
     python_period: ClassVar[float | None] = 1e-3

@@ -16,7 +16,7 @@ from heelstrike.sim.contacts.rows import (
 )
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.bridge import SHORTEST_BRIDGE, cross
+from heelstrike.sim.event_driven.bridge import SHORTEST_BRIDGE, cross_bridge
 from heelstrike.sim.event_driven.deciding import INSISTENT
 from heelstrike.sim.event_driven.events import meet_event
 from heelstrike.sim.event_driven.location import EVENT_TIME
@@ -138,7 +138,7 @@ def move_over(
         due = output.next_row * period
         end = min(stop, due if due > step.time + EVENT_TIME else due + period)
     first = record.events
-    if not cross(scene, end, control, memory, work, record):
+    if not cross_bridge(scene, end, control, memory, work, record):
         series.reason = NO_BRIDGE
         return SOLVER_FAILED
     react(scene.model, first, step.begin[: scene.model.nq], record, memory.loops)

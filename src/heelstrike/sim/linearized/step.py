@@ -8,7 +8,6 @@ an event the error goes through its saltation matrix.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise, permutations, product
 
@@ -23,6 +22,7 @@ from heelstrike.contact.linearized.motion import (
 from heelstrike.contact.linearized.slopes import ContactSlopes, contact_slopes
 from heelstrike.contact.linearized.strikes import Strike, strikes
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.linearized.flow import Variation
@@ -56,46 +56,32 @@ SWITCHES = (EventKind.STICK, EventKind.SLIP_REVERSAL)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Saltation:
-    """An event of a step and what it does to small errors.
-
-    Attributes
-    ----------
-    time : float
-        When, in s.
-    kinds : tuple of EventKind
-        What happened then.
-    matrix : (nq + nv, nq + nv) float
-        The saltation matrix: error just after of an error just before. The identity at lift-offs
-        and where slip begins, as forces are continuous there. Of the touchdown that ends a step,
-        that of the error on the section: at touchdown, whenever that is.
-    spread : float
-        Where several points come down in one instant, errors decide in which order; the matrix is
-        then the mean of those of all orders, which differ by so much at most.
-    """
+    """An event of a step and what it does to small errors."""
 
     time: float
+    """When, in s."""
     kinds: tuple[EventKind, ...]
+    """What happened then."""
     matrix: Floats
+    """(nq + nv, nq + nv) The saltation matrix: error just after of an error just before. The
+    identity at lift-offs and where slip begins, as forces are continuous there. Of the touchdown
+    that ends a step, that of the error on the section: at touchdown, whenever that is."""
     spread: float
+    """Where several points come down in one instant, errors decide in which order; the matrix is
+    then the mean of those of all orders, which differ by so much at most."""
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A motion, linearised from its beginning to its last event.
-
-    Attributes
-    ----------
-    flows : tuple of (nq + nv, nq + nv) float
-        What the smooth motion before each event does to errors (δq, δv).
-    saltations : tuple of Saltation
-        What the events do, in their order; the last is a section.
-    arrival : Strike or None
-        The one contact point that comes down in the last, if it is one.
-    """
+    """A motion, linearised from its beginning to its last event."""
 
     flows: tuple[Floats, ...]
+    """Tuple of (nq + nv, nq + nv) float. What the smooth motion before each event does to errors
+    (δq, δv)."""
     saltations: tuple[Saltation, ...]
+    """What the events do, in their order; the last is a section."""
     arrival: Strike | None
+    """The one contact point that comes down in the last, if it is one."""
 
     @property
     def matrix(self) -> Floats:

@@ -27,15 +27,10 @@ from heelstrike.sim.memory import Surface
 
 
 class Corner(Bundle):
-    """How many second faces there are.
-
-    Attributes
-    ----------
-    near : int
-        How many points have one now.
-    """
+    """How many second faces there are."""
 
     near: int = cell(int)
+    """How many points have one now."""
 
 
 @kernel

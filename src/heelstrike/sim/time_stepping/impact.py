@@ -50,12 +50,10 @@ from heelstrike.sim.memory import Assembly, Memory
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import log_event, note_event
 from heelstrike.sim.time_stepping.corners import Corner
+from heelstrike.tolerances import CLOSED_GAP, NOTICEABLE_ENERGY
 
 Floats = NDArray[np.float64]
 
-# A contact touches when its gap is no more than this (m): far above what rounding leaves of a gap
-# that is closed (1e-16), far below what turning makes of one in a step (h² ω² l / 2, 1e-7 at 1 ms).
-TOUCHING = 1e-9
 NEVER = -2
 
 # What is no deeper in the ground or beyond a stop than this (m, rad) may be left there, if there is
@@ -64,64 +62,44 @@ WEDGED_BY = 1e-4
 WEDGED = int(EventKind.WEDGED)
 ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
 
-# Energy counts as made when it exceeds this part of the energy that went through the contacts.
-NOTICEABLE = 1e-9
 # How often the share of restitution that makes no energy is halved in: to a thousandth.
 HALVINGS = 10
 
 
 class Impact(Bundle):
-    """What a step has to know of the contacts that close in it.
-
-    Attributes
-    ----------
-    happens : int
-        Whether an impact falls into this step.
-    touching : (entries,) int
-        The last step at whose end each entry of the table of rows touched.
-    called : (entries,) int
-        What takes part although it seemed too far away; `calls` tells whether there is any.
-    calls : int
-    relaxed, wedged, since : int
-        Whether this step is asked for less than to come out of the ground and to bounce; the last
-        step that was; the first of those without a break.
-    bounded : int
-        Whether restitution that would make energy is scaled back.
-    gains : int
-        Whether restitution made energy in this step, or would have.
-    gain : float
-        The energy it made (J).
-    bounce : (capacity,) float
-        What restitution asks of each member (m/s, rad/s).
-    kept : (capacity,) int
-        Modes of the members in the last answer that made no energy.
-    arriving : (nv,) float
-        Where there is an impact, the velocity that positions move with.
-    member : (capacity,) int
-        The candidates that take part.
-    problem, answer : ContactProblem, ContactAnswer
-        The impact.
-    corner : Corner
-        Second faces of concave corners.
-    """
+    """What a step has to know of the contacts that close in it."""
 
     happens: int = cell(int)
+    """Whether an impact falls into this step."""
     touching: Integers = array("entries", of=int)
+    """The last step at whose end each entry of the table of rows touched."""
     called: Integers = array("entries", of=int)
+    """What takes part although it seemed too far away; `calls` tells whether there is any."""
     calls: int = cell(int)
     relaxed: int = cell(int)
     wedged: int = cell(int)
     since: int = cell(int)
+    """relaxed, wedged, since: Whether this step is asked for less than to come out of the ground
+    and to bounce; the last step that was; the first of those without a break."""
     bounded: int = cell(int)
+    """Whether restitution that would make energy is scaled back."""
     gains: int = cell(int)
+    """Whether restitution made energy in this step, or would have."""
     gain: float = cell(float)
+    """The energy it made (J)."""
     bounce: Floats = array("capacity")
+    """What restitution asks of each member (m/s, rad/s)."""
     kept: Integers = array("capacity", of=int)
+    """Modes of the members in the last answer that made no energy."""
     arriving: Floats = array("nv")
+    """Where there is an impact, the velocity that positions move with."""
     member: Integers = array("capacity", of=int)
+    """The candidates that take part."""
     problem: ContactProblem = part(ContactProblem)
     answer: ContactAnswer = part(ContactAnswer)
+    """problem, answer: The impact."""
     corner: Corner = part(Corner)
+    """Second faces of concave corners."""
 
 
 def allocate_impact(robot: Robot, *, bounded: bool = False) -> Impact:
@@ -237,13 +215,13 @@ def arrives(step: float, place: int, answer: ContactAnswer) -> bool:
 
     With the linearised gap in the free term, velocities are gaps at the end divided by the step.
     """
-    return step * answer.velocity[2 * place] <= TOUCHING
+    return step * answer.velocity[2 * place] <= CLOSED_GAP
 
 
 @dissolved_kernel
 def would_close(step: float, place: int, problem: ContactProblem) -> bool:
     """Whether a candidate would touch at the end of the step if it were free."""
-    return step * problem.free[2 * place] < TOUCHING
+    return step * problem.free[2 * place] < CLOSED_GAP
 
 
 @dissolved_kernel
@@ -264,7 +242,7 @@ def falls_into(step: float, problem: ContactProblem, memory: Memory, impact: Imp
         now = memory.rows.gap[candidate]
         if now < np.inf and arrives(step, place, assembly.answer):
             new = impact.touching[candidate] != before and would_close(step, place, problem)
-            if now < -TOUCHING or (new and now > TOUCHING):
+            if now < -CLOSED_GAP or (new and now > CLOSED_GAP):
                 return True
     return False
 
@@ -281,7 +259,7 @@ def find_members(step: float, problem: ContactProblem, memory: Memory, impact: I
         if not takes_part:
             touched = impact.touching[candidate] == before
             stays = touched or would_close(step, place, problem)
-            takes_part = now <= TOUCHING or (stays and arrives(step, place, assembly.answer))
+            takes_part = now <= CLOSED_GAP or (stays and arrives(step, place, assembly.answer))
         if takes_part:
             impact.member[members] = place
             members += 1
@@ -352,7 +330,7 @@ def energy_made(
             before, after = before - after, 0.0
         made += 0.5 * impulse[row] * (before + after)
         through += abs(impulse[row] * before) + abs(impulse[row] * after)
-    return made if made > NOTICEABLE * through else 0.0
+    return made if made > NOTICEABLE_ENERGY * through else 0.0
 
 
 @kernel

@@ -27,8 +27,6 @@ the work K (q + Δq/2) Δq. The linearly implicit scheme has θ = 1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from heelstrike.arguments import check_fields
@@ -42,6 +40,7 @@ from heelstrike.contact.workspace import ContactProblem
 from heelstrike.dynamics.kernels import integrate, passive_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
@@ -101,7 +100,6 @@ from heelstrike.sim.time_stepping.corners import join_forces, locate_corners
 from heelstrike.sim.time_stepping.doubts import too_light, too_stiff
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
-    TOUCHING,
     Impact,
     allocate_impact,
     call,
@@ -121,6 +119,7 @@ from heelstrike.sim.time_stepping.impact import (
     solve_restitution,
     stays_wedged,
 )
+from heelstrike.tolerances import CLOSED_GAP
 
 GAP_LINEARISED = int(Scheme.GAP_LINEARISED)
 PAPER_EXPLICIT = int(Scheme.PAPER_EXPLICIT)
@@ -143,49 +142,22 @@ PAST = 2e-2
 
 
 class Stepping(Bundle):
-    """What the kernels of time stepping read.
-
-    Attributes
-    ----------
-    step : float
-        Length of a step (s).
-    scheme : int
-    activation : float
-        Gap up to which a contact point takes part, for schemes that decide by it (m).
-    order : (solvers,) int
-        Contact solvers in the order in which they are tried.
-    impact : Impact
-        What closes in a step.
-    """
+    """What the kernels of time stepping read."""
 
     step: float = number(float)
+    """Length of a step (s)."""
     scheme: int = number(int)
     activation: float = number(float)
+    """Gap up to which a contact point takes part, for schemes that decide by it (m)."""
     order: Integers = array("solvers", of=int)
+    """Contact solvers in the order in which they are tried."""
     impact: Impact = part(Impact)
+    """What closes in a step."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TimeStepping(Method):
     """Fixed steps whose contact impulses decide the velocity at the end of the step.
-
-    Parameters
-    ----------
-    step : float
-        Length of the step h in seconds.
-    scheme : Scheme
-        Discretisation; see :class:`~heelstrike.sim.closed_sets.Scheme`.
-    solver : str
-        Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``;
-        the others follow as fallbacks, each use counted in the run.
-    activation : float
-        Gap in metres up to which a contact point takes part, for the schemes that decide by the
-        gap alone (the paper's two and Moreau-Jean). With the literal zero, a foot at rest loses
-        and regains the ground through round-off.
-    bounded_restitution : bool
-        Whether restitution is scaled back in an impact in which it would make energy (with
-        friction it may, Kane's paradox). Such impacts are told of either way, by events
-        ``ENERGY_GAIN``.
 
     Raises
     ------
@@ -199,10 +171,19 @@ class TimeStepping(Method):
     """
 
     step: float = 1e-3
+    """Length of the step h in seconds."""
     scheme: Scheme = Scheme.IMPACT_RESOLVED
+    """Discretisation; see :class:`~heelstrike.sim.closed_sets.Scheme`."""
     solver: str = "lemke"
+    """Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``; the
+    others follow as fallbacks, each use counted in the run."""
     activation: float = 0.0
+    """Gap in metres up to which a contact point takes part, for the schemes that decide by the gap
+    alone (the paper's two and Moreau-Jean). With the literal zero, a foot at rest loses and regains
+    the ground through round-off."""
     bounded_restitution: bool = False
+    """Whether restitution is scaled back in an impact in which it would make energy (with friction
+    it may, Kane's paradox). Such impacts are told of either way, by events ``ENERGY_GAIN``."""
 
     def __post_init__(self) -> None:
         check_fields(self, SimulationError)
@@ -774,7 +755,7 @@ def stays_above(
             return False
         normal += delassus[row, column] * impulse[2 * place]
         normal += delassus[row, column + 1] * impulse[2 * place + 1]
-    return gap + step * normal >= -0.5 * TOUCHING
+    return gap + step * normal >= -0.5 * CLOSED_GAP
 
 
 @kernel
@@ -785,12 +766,12 @@ def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Im
     straight = are_usual(usual.every_point, model.nc, VELOCITIES, usual)
     find_velocities(model, contacts, v, straight, memory.equations.tree, usual)
     for contact in range(model.nc):
-        if contacts.gap[contact] + step * usual.point_velocity[contact, 0] < -TOUCHING:
+        if contacts.gap[contact] + step * usual.point_velocity[contact, 0] < -CLOSED_GAP:
             call(contact, impact)
     rows = memory.rows
     for stop in range(rows.first[STOP], rows.end[STOP]):
         joint, side = rows.owner[stop], rows.side[stop]
-        if side * (memory.q[joint] + step * v[joint]) < side * rows.limit[stop] - TOUCHING:
+        if side * (memory.q[joint] + step * v[joint]) < side * rows.limit[stop] - CLOSED_GAP:
             call(stop, impact)
     return impact.calls > calls
 

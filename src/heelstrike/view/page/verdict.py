@@ -29,8 +29,8 @@ class Verdict:
     """What a run comes to."""
 
     good: bool
-    """Whether it lasted as long as it was asked to, stayed up, every contact problem was certified
-    and nothing puts its numbers in doubt."""
+    """Whether it lasted as long as it was asked to, stayed up, every contact problem was
+    certified, no impact made energy and nothing puts its numbers in doubt."""
     headline: str
     """Does it walk, how close to its limits or why it fell, what to change: in one line."""
     limits: tuple[Limit, ...]

@@ -60,7 +60,9 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Sequence[Path],
     }
     process = ReaderProcess()  # which no program of a stranger shares with the files after it
     try:
-        done = process.ask(f"{__name__}:expand", json.dumps(order).encode(), patience=LONGEST_EXPANSION)
+        done = process.ask(
+            f"{__name__}:expand", json.dumps(order).encode(), patience=LONGEST_EXPANSION
+        )
     except ReadingError as error:
         if not error.kind:
             raise RobotError(f"{label}: xacro {error}.") from error
