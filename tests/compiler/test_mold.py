@@ -97,3 +97,19 @@ def test_a_cast_can_be_cast_copied_and_replaced() -> None:
     copy.front.turns = 70
     assert cast.front.turns != 70
     assert copy.front.turns == 70
+
+
+class Watched(Bundle):
+    words: np.ndarray = array("words", of=int, address=True)
+    seen: Wheel = part(Wheel)
+
+
+def test_what_has_the_address_of_a_part_has_that_of_the_cast_s_own() -> None:
+    """Compliant ground copies the words of a part, for which it has their address."""
+    seen = Wheel.allocate(rim=2)
+    words = seen._cells
+    cast = Mold(Watched(words=words, seen=seen)).cast()
+    cast.seen.turns = 5
+    assert np.shares_memory(cast.words, cast.seen._cells)
+    assert cast.words[0] == 5
+    assert words[0] == 0

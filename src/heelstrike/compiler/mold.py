@@ -34,8 +34,9 @@ class _Shape(NamedTuple):
 class Mold(Generic[_Some]):
     """What a bundle holds at this moment, to cast others that begin so.
 
-    Its tables, its cells and the arrays that it can write to are each cast's own. Arrays that are
-    read only, addresses, and parts that are another's are shared.
+    Its tables, its cells and the arrays that it can write to are each cast's own, and so is what it
+    has the address of if that is memory of its own. Arrays that are read only, addresses of what
+    is another's, and parts that are another's are shared.
 
     Parameters
     ----------
@@ -47,7 +48,14 @@ class Mold(Generic[_Some]):
         self._words: list[NDArray[np.int64]] = []
         self._size = 0
         self._begins: dict[int, tuple[Any, int]] = {}  # of what memory, and where it comes to lie
+        self._addressed: list[tuple[_Shape, str, Any]] = []
         self._shape = self._of(laid_out)
+        for shape, name, value in self._addressed:
+            if id(_whole(value)) in self._begins:
+                place = self._place(value)
+                shape.arrays.append((name, value.shape, value.dtype, place))
+            else:
+                shape.shared[name] = value
         self._block = np.concatenate(self._words)
         self._pointers = np.array(list(self._lay_tables(self._shape)), dtype=np.int64)
 
@@ -62,6 +70,7 @@ class Mold(Generic[_Some]):
     def _of(self, bundle: Bundle) -> _Shape:
         own = bundle.__dict__
         arrays, parts, shared = [], [], {"_extents": bundle.extents}
+        addressed = []
         for name, member in bundle.declared.items():
             if member.role == "cell":
                 continue
@@ -70,19 +79,21 @@ class Mold(Generic[_Some]):
                 parts.append((name, self._of(value)))
             elif member.role == "array" and not member.address and value.flags.writeable:
                 arrays.append((name, value.shape, value.dtype, self._place(value)))
+            elif member.role == "array" and value.flags.writeable:
+                addressed.append((name, value))
             else:
                 shared[name] = value
         table = WORD_BYTES * self._size
         self._append(bundle.table)
         cells = own["_cells"]
         place = self._place(cells)
-        return _Shape(type(bundle), table, place, cells.size, arrays, parts, shared)
+        shape = _Shape(type(bundle), table, place, cells.size, arrays, parts, shared)
+        self._addressed += [(shape, name, value) for name, value in addressed]
+        return shape
 
     def _place(self, array: Any) -> int:
         """Return where in the block an array lies, which brings along all that it is a part of."""
-        whole = array
-        while isinstance(whole.base, np.ndarray):
-            whole = whole.base
+        whole = _whole(array)
         if id(whole) not in self._begins:
             self._begins[id(whole)] = whole, WORD_BYTES * self._size
             self._append(whole)
@@ -106,6 +117,13 @@ class Mold(Generic[_Some]):
             place += 1 + len(member.shape)
         for _, part in shape.parts:
             yield from self._lay_tables(part)
+
+
+def _whole(array: Any) -> Any:
+    """Return the array that has the memory which an array is a view of."""
+    while isinstance(array.base, np.ndarray):
+        array = array.base
+    return array
 
 
 def _cast(shape: _Shape, block: NDArray[np.int64], begin: int) -> Any:
