@@ -100,16 +100,18 @@ def test_a_cast_can_be_cast_copied_and_replaced() -> None:
 
 
 class Watched(Bundle):
-    words: np.ndarray = array("words", of=int, address=True)
     seen: Wheel = part(Wheel)
+    rim: np.ndarray = array("rim", address=True)
+    again: Wheel = part(Wheel, address=True)
 
 
-def test_what_has_the_address_of_a_part_has_that_of_the_cast_s_own() -> None:
-    """Compliant ground copies the words of a part, for which it has their address."""
-    seen = Wheel.allocate(rim=2)
-    words = seen._cells
-    cast = Mold(Watched(words=words, seen=seen)).cast()
-    cast.seen.turns = 5
-    assert np.shares_memory(cast.words, cast.seen._cells)
-    assert cast.words[0] == 5
-    assert words[0] == 0
+def test_addresses_of_its_own_memory_are_those_of_the_cast() -> None:
+    """Rows of contact have the gaps of the contact points; compliant ground copies words."""
+    seen = Wheel.allocate(rim=np.array([1.0, 2.0]))
+    again = Wheel.allocate(rim=seen.rim[:1])
+    cast = Mold(Watched(seen=seen, rim=seen.rim, again=again)).cast()
+    cast.seen.rim[0] = 5.0
+    assert cast.rim[0] == cast.again.rim[0] == 5.0
+    assert seen.rim[0] == 1.0
+    mine = Watched(seen=seen, rim=seen.rim, again=Wheel.allocate(rim=np.array([7.0])))
+    assert Mold(mine).cast().again is mine.again

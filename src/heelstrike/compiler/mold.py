@@ -50,12 +50,13 @@ class Mold(Generic[_Some]):
         self._begins: dict[int, tuple[Any, int]] = {}  # of what memory, and where it comes to lie
         self._addressed: list[tuple[_Shape, str, Any]] = []
         self._shape = self._of(laid_out)
-        for shape, name, value in self._addressed:
-            if id(_whole(value)) in self._begins:
-                place = self._place(value)
-                shape.arrays.append((name, value.shape, value.dtype, place))
-            else:
+        for shape, name, value in self._addressed:  # what is not there as yet is another's
+            if not self._is_own(value):
                 shape.shared[name] = value
+            elif isinstance(value, Bundle):
+                shape.parts.append((name, self._of(value)))
+            else:
+                shape.arrays.append((name, value.shape, value.dtype, self._place(value)))
         self._block = np.concatenate(self._words)
         self._pointers = np.array(list(self._lay_tables(self._shape)), dtype=np.int64)
 
@@ -79,7 +80,7 @@ class Mold(Generic[_Some]):
                 parts.append((name, self._of(value)))
             elif member.role == "array" and not member.address and value.flags.writeable:
                 arrays.append((name, value.shape, value.dtype, self._place(value)))
-            elif member.role == "array" and value.flags.writeable:
+            elif member.role == "part" or (member.role == "array" and value.flags.writeable):
                 addressed.append((name, value))
             else:
                 shared[name] = value
@@ -90,6 +91,11 @@ class Mold(Generic[_Some]):
         shape = _Shape(type(bundle), table, place, cells.size, arrays, parts, shared)
         self._addressed += [(shape, name, value) for name, value in addressed]
         return shape
+
+    def _is_own(self, value: Any) -> bool:
+        """Whether an array, or one of a bundle, lies in memory that comes to lie in the block."""
+        arrays = [values for _, values in value.storage()] if isinstance(value, Bundle) else [value]
+        return any(id(_whole(each)) in self._begins for each in arrays)
 
     def _place(self, array: Any) -> int:
         """Return where in the block an array lies, which brings along all that it is a part of."""
