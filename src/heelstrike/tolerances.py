@@ -65,9 +65,6 @@ NO_PIVOT = 1e-11
 twenty rows rounds to 1e-14 of the matrix, and rows that are less than a thousand times as
 independent as that say nothing."""
 
-SAME_EVENT = 1e-11
-"""Difference (s) of the times of an event and of its row: of one root, which is found to 1e-12."""
-
 NOTICEABLE_ENERGY = 1e-9
 """Energy that an impact makes, as a part of what goes through its contacts, from which on it is
 told of: rounding of a certified solve makes less."""
