@@ -24,7 +24,7 @@ from heelstrike.sim.image import Image
 from heelstrike.whole_file import write_whole
 
 _IDENTITY = "identity"
-_FORMAT = 4
+_FORMAT = 5
 # What reading an archive raises when its bytes are others.
 _DAMAGED = (ValueError, KeyError, AttributeError, TypeError, EOFError, RuntimeError, OverflowError)
 
