@@ -53,7 +53,7 @@ def test_every_engine_that_is_timed_stands_as_it_should(quick: tuple[Path, Any])
     assert (out / "benchmark_steps.png").stat().st_size > 10_000
     found = written(out)["steps"]
     rows = found["rows"]
-    assert len(rows) == 5
+    assert len(rows) == 6
     for row in rows:
         assert "invalid" not in row
         assert "mujoco_invalid" not in row

@@ -75,8 +75,8 @@ class Snapshot:
         """
         q, v = np.array(state.q, dtype=np.float64), np.array(state.v, dtype=np.float64)
         arrays = self.arrays | {"memory.q": q, "memory.v": v}
-        if "work.begin" in arrays:  # where an event-driven step begins
-            arrays["work.begin"] = np.concatenate((q, v))
+        if "work.step.begin" in arrays:  # where an event-driven step begins
+            arrays["work.step.begin"] = np.concatenate((q, v))
         return Snapshot(arrays, self.identity)
 
     def part(self, name: str) -> dict[str, NDArray[Any]]:
