@@ -92,7 +92,7 @@ def decide(scene: Any, control: Any, memory: Any, work: Any, record: Any, clock:
     assembly.problem.count = pose(model, work.step, memory)
     if assembly.problem.count > 0:
         sim.assemble_delassus(model, assembly.problem.count, memory.equations, assembly)
-        solver, answer = assembly.solver, assembly.answer
+        solver, answer = memory.solver, assembly.answer
         status = sim.solve_contact_kernel(work.order, assembly.problem, solver, answer)
         sim.add_impulse(model, assembly, assembly.problem.count, memory.equations, memory.next_v)
     sim.note_answer(model, work.step, memory)

@@ -24,7 +24,6 @@ import heelstrike as hs
 from heelstrike.cli.main import app
 from heelstrike.cli.terminal import Stage
 from heelstrike.experiments import comparison as comparison_module
-from heelstrike.gait import kept_gait
 from heelstrike.sim import RunStatus
 
 
@@ -87,7 +86,7 @@ def check(result: Any, *words: str) -> None:
 def test_a_gait_that_was_not_finished_is_not_there(
     tmp_path: Path, interrupt_at: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(kept_gait.SWITCH, "0")
+    monkeypatch.setenv("HEELSTRIKE_KEEP_GAITS", "0")
     interrupt_at("designing", 2)
     result = invoke("walk", "--out", tmp_path / "out")
     check(result, "while designing a gait of 0.3 m in 0.7 s", "nothing was written")
@@ -185,7 +184,7 @@ def test_the_process_ends_with_130_and_without_a_traceback(tmp_path: Path) -> No
         capture_output=True,
         text=True,
         check=False,
-        env=os.environ | {kept_gait.SWITCH: "0"},
+        env=os.environ | {"HEELSTRIKE_KEEP_GAITS": "0"},
     )
     assert done.returncode == 130
     assert done.stdout == ""

@@ -119,10 +119,10 @@ def test_wedge_that_goes_on_may_be_deeper() -> None:
     left = uncompiled(relax)
     for wedged, bounds_gaps, leaves in ((5, True, False), (6, True, True), (6, False, False)):
         impact.wedged, impact.relaxed = wedged, 0
-        assert left(robot.model, bounds_gaps, 1, memory, impact) == leaves
+        assert left(bounds_gaps, 1, memory, impact) == leaves
         assert impact.relaxed == leaves
     impact.wedged, impact.relaxed = 6, 1  # nothing more can be left out
-    assert not left(robot.model, True, 1, memory, impact)
+    assert not left(True, 1, memory, impact)
 
 
 def test_wedge_that_friction_holds_does_not_bounce() -> None:

@@ -49,8 +49,9 @@ def goes_on(setting: Setting, state: hs.State, begin: float, lead: float, length
     )  # fmt: skip
     simulation.advance(lead)
     if length > 0.0:
-        phase = simulation._work
-        phase.bridging, phase.bridges, phase.series = 1, LONGER, simulation.time
+        motion = simulation._work
+        motion.decision.bridging = 1
+        motion.series.count, motion.series.begin = LONGER, simulation.time
     simulation.advance(lead + abs(length))
     return simulation.record
 

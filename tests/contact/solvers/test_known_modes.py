@@ -16,7 +16,7 @@ def test_what_stands_straight_on_its_stops_takes_no_solver() -> None:
         ground=hs.Ground(friction=0.75), stop_when_fallen=False,
     )  # fmt: skip
     simulation.advance(3.0)
-    reduced, steps = simulation._memory.assembly.solver.reduced, 200
+    reduced, steps = simulation._memory.solver.reduced, 200
     general = 0
     for _ in range(steps):
         reduced.unknowns = 0  # the general way begins with them

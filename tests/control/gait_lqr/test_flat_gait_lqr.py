@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.control.gait_lqr.flat import FlatOrbit, _sampled
+from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.held import HeldRobot
 
 Floats = NDArray[np.float64]
@@ -61,7 +62,7 @@ def accelerations(q: Floats, v: Floats, torque: Floats, points: Sequence[int]) -
     """Accelerations (nv,) while contact points stay in place, by elimination."""
     robot = walking.bravo7()
     force = dynamics.applied_force(robot, q, v, torque) - dynamics.bias_force(robot, q, v)
-    return HeldRobot.on(robot, q, points, v).accelerated(force)[0]
+    return HeldRobot.on(Evaluation(robot, q, v), points).accelerated(force)[0]
 
 
 @pytest.mark.parametrize("place", [3, 40])
