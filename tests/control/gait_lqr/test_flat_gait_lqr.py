@@ -104,9 +104,9 @@ def test_a_touchdown_is_that_of_heel_and_toe_one_after_the_other(first: int) -> 
     def through(x: Floats) -> Floats:
         q, v = stance.state(*np.split(x, 2))
         _, q, v = moved(q, v, orbit().torque[-1], stance.foot.contacts, one)
-        v, _ = HeldRobot.on(robot, q, [one]).stopped(v)
+        v, _ = HeldRobot.on(Evaluation(robot, q), [one]).stopped(v)
         until, q, v = moved(q, v, after, [one], other)
-        v, _ = HeldRobot.on(robot, q, points).stopped(v)
+        v, _ = HeldRobot.on(Evaluation(robot, q), points).stopped(v)
         landed = np.concatenate([mirror.position(q), mirror.velocity(v)])[stance.rows]
         return landed - until * np.concatenate(begin[1:])
 
