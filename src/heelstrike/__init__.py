@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from heelstrike.contact import ActiveContacts as ActiveContacts
     from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
+    from heelstrike.contact import GroundShape as GroundShape
     from heelstrike.contact import contact_forward_dynamics as contact_forward_dynamics
     from heelstrike.contact import contact_inverse_dynamics as contact_inverse_dynamics
     from heelstrike.contact import contact_kinematics as contact_kinematics
@@ -166,6 +167,7 @@ _HOME = {
     "GaitLQR": "heelstrike.control",
     "GaitError": "heelstrike.errors",
     "Ground": "heelstrike.contact",
+    "GroundShape": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
     "HuntCrossley": "heelstrike.sim",
     "InertialUnit": "heelstrike.control",

@@ -200,11 +200,12 @@ def frame(kernels: Kernels) -> Callable[..., int]:
 
 PLAIN: Fixed = (
     ("loops", 0), ("couplings", 0), ("latches", 0), ("brakes", 0), ("loop_rows", 0), ("nd", 0),
-    ("segments", 1), ("concave", 0),
+    ("segments", 1), ("concave", 0), ("curved", 0),
 )  # fmt: skip
 """What a robot and a ground without rarer features have none of.
 
-A loop that is made for these has no code for closed loops, latches, brakes, dry friction, profiles.
+A loop that is made for these has no code for closed loops, latches, brakes, dry friction, profiles
+or curves.
 """
 
 
@@ -215,7 +216,7 @@ def fixed_for(model: Model, ground: GroundModel, work: Any, usual: Mapping[str, 
     """
     dry = model.dry_friction.any() or np.isfinite(model.brake_limit).any()
     rare = dry or model.loops or model.couplings or model.latches or model.brakes
-    plain = not rare and ground.friction.size == 1
+    plain = not rare and ground.friction.size == 1 and ground.curved == 0
     if not (plain and all(getattr(work, name) == value for name, value in usual.items())):
         return ()
     return PLAIN + tuple(usual.items())

@@ -87,6 +87,9 @@ class Surface(Bundle):
     restitution: Floats = array("capacity")
     """friction, restitution: Of contact points and their second faces; of joint stops zero, and
     friction 1 of dry joints. Numbered by the table of rows."""
+    bend: Floats = array("nc")
+    """Curvature (1/m) of the way along the ground of the centre of each contact point's disc,
+    positive over a hill: zero but on smooth ground."""
 
 
 class Assembly(Bundle):

@@ -312,7 +312,8 @@ class Simulation:
             )
         self._check(replace(self._setting, ground=ground, state=self.state))
         mine, its = self._ground.numbers(), ground.numbers()
-        if not all(np.array_equal(mine[name], its[name]) for name in mine):
+        alike = mine.keys() == its.keys()
+        if not (alike and all(np.array_equal(mine[name], its[name]) for name in mine)):
             self.method.forget_ground(self.robot, self._work, self._clock)
             self._clock.moving = 0
         self._ground = ground

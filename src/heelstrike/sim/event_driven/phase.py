@@ -65,6 +65,8 @@ class Faces(Bundle):
     on, or could meet (:mod:`heelstrike.sim.event_driven.faces`)."""
     paired: int = cell(int)
     """Whether the ground has concave corners, where points have second faces."""
+    bend: Floats = array("contacts")
+    """Curvature (1/m) of the way of the centre of each disc along smooth ground."""
     place: Floats = array(3)
     """Scratch of :func:`~heelstrike.sim.event_driven.smooth.faces.choose_faces`."""
     center: Floats = array(3)

@@ -11,7 +11,7 @@ from heelstrike.robot.model import SELDOM
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.files.logs import DIMENSIONS, log_attribute, log_variables
-from heelstrike.sim.files.settings import settings
+from heelstrike.sim.files.settings import settings, shape_settings
 from heelstrike.sim.files.variables import Variable
 from heelstrike.sim.push import numbers_of_pushes
 from heelstrike.sim.run import EVENT_MEMBERS, QUANTITIES, SOLVED, WORST, Run
@@ -140,6 +140,7 @@ def _attributes(run: Run) -> dict[str, Any]:
         "impulses_in_events": int(run.method.impulses_in_events),
         "ground_slope": float(run.ground.slope),
         "ground_has_profile": int(run.ground.profile is not None),
+        **shape_settings(run.ground),
         **{f"worst_{name}": getattr(run.certificates, name) for name in WORST},
         "solver_name": run.solver.name,
         **{f"solver_{name}": getattr(run.solver, name) for name in SOLVED},

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from heelstrike.contact.ground import Ground
+from heelstrike.contact.ground_shape import GroundShape
 from heelstrike.errors import HeelstrikeError
 from heelstrike.sim.compliant.contact_law import (
     BristleFriction,
@@ -45,6 +47,40 @@ def settings(prefix: str, thing: Any) -> dict[str, str | int | float]:
         else:
             found[name] = _plain(value)
     return found
+
+
+def shape_settings(ground: Ground) -> dict[str, str | int | float]:
+    """Return name and settings of the shape of a smooth ground as attributes."""
+    if ground.shape is None:
+        return {}
+    return {"ground_shape": type(ground.shape).__name__, **settings("ground_shape", ground.shape)}
+
+
+def shaped(ground: Ground, stored: Stored, classes: Mapping[str, type]) -> Ground:
+    """Return the ground of a file with its shape, which is of a class from outside.
+
+    Raises
+    ------
+    DamageError
+        If the class is not given, or its settings are missing or cannot be.
+    """
+    if "@ground_shape" not in stored.contents:
+        return ground
+    name = stored.text("ground_shape")
+    kind = classes.get(name)
+    if kind is None or not issubclass(kind, GroundShape):
+        raise UnknownShapeError(name)
+    return replace(ground, shape=_rebuilt(stored, "ground_shape", kind, classes))
+
+
+class UnknownShapeError(HeelstrikeError):
+    """A run is one on ground of a shape that is not known here."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(
+            f"the run was made on ground of the shape {name[:60]!r}, a class of somebody's that is "
+            f"not known here: load_run(path, classes=[{name[:60]}])"
+        )
 
 
 def _plain(value: Any) -> str | int | float:

@@ -25,7 +25,7 @@ from heelstrike.sim.files.dataset import (
 from heelstrike.sim.files.hdf5_contents import Contents
 from heelstrike.sim.files.logs import stored_log
 from heelstrike.sim.files.robot_dataset import stored_robot
-from heelstrike.sim.files.settings import stored_method
+from heelstrike.sim.files.settings import UnknownShapeError, shaped, stored_method
 from heelstrike.sim.files.variables import DamageError, Stored
 from heelstrike.sim.push import Push, pushes_of_numbers
 from heelstrike.sim.run import (
@@ -87,6 +87,8 @@ def stored_run(
         return _run(stored, described if robot is None else robot, classes)
     except RunFileError:
         raise
+    except UnknownShapeError as error:
+        raise RunFileError(f"{source}: {error}") from error
     except (DamageError, HeelstrikeError) as error:
         raise RunFileError(f"{source}: damaged: {error}") from error
 
@@ -122,12 +124,13 @@ def _run(stored: Stored, robot: Robot, classes: Sequence[type]) -> Run:
     (time,) = stored.arrays(TIME, sizes).values()
     if not np.all(np.diff(time) >= 0.0):
         raise DamageError("'time' goes backwards")
+    known = {kind.__name__: kind for kind in classes}
     allowed = "" if status in _ENDED_WELL else "anything"
     rows = {name: each._replace(allowed=allowed) for name, each in ROWS.items()}
     return Run(
         robot=robot,
-        ground=_ground(stored, sizes),
-        method=stored_method(stored, {kind.__name__: kind for kind in classes}),
+        ground=shaped(_ground(stored, sizes), stored, known),
+        method=stored_method(stored, known),
         status=status,
         message=stored.text("message"),
         time=time,

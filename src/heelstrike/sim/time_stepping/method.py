@@ -59,6 +59,7 @@ from heelstrike.sim.contacts.candidates import (
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
+    bend_acceleration,
     contact_rows,
     contact_velocity,
     evaluate_equations,
@@ -388,8 +389,12 @@ def are_usual(candidate: Integers, near: int, program: int, usual: UsualPoints) 
 
 
 @dissolved_kernel
-def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
-    """List the contact points that could act in this step, with their free terms."""
+def select_candidates(model: Model, curved: bool, work: Stepping, memory: Memory) -> int:
+    """List the contact points that could act in this step, with their free terms.
+
+    On curved ground a gap is linearised along the chord of the step, as loops are: with half of
+    what turning normals add to its rate.
+    """
     contacts, assembly, step = memory.contacts, memory.assembly, work.step
     candidate, problem = assembly.candidate, assembly.problem
     linearised, calls = is_linearised(work.scheme), work.impact.calls
@@ -412,6 +417,9 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
         contact = candidate[place]
         gap = contacts.gap[contact]
         normal = velocity[contact, 0]
+        if curved and linearised:
+            bend = memory.surface.bend[contact]
+            normal += 0.5 * step * bend_acceleration(model, tree, contacts, contact, bend)
         if linearised:
             far = gap > step * max(CLOSING_SPEED, -2.0 * normal)
             if far and (calls == 0 or work.impact.called[contact] == 0):
@@ -777,7 +785,7 @@ def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Im
 
 
 @dissolved_kernel
-def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> bool:
+def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: Memory) -> bool:
     """Find the velocity at the end of the step; return success.
 
     What an impulse elsewhere throws against the ground or a stop, though it was too far away to be
@@ -798,7 +806,7 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
             impact.bounce[place] = 0.0
         for i in range(3):
             assembly.answer.residual[i] = 0.0
-        near = select_candidates(model, work, memory)
+        near = select_candidates(model, curved, work, memory)
         note_group(POINT, 0, near, assembly)
         count = select_stops(model, work, near, memory)
         count = hold_latched(model, count, memory.next_v, memory)
@@ -846,7 +854,7 @@ def decide(
 ) -> int:
     """Find the velocity at the end of the step, and note what happens in it."""
     model = scene.model
-    solved = solve_step(model, clock.time, work, memory)
+    solved = solve_step(model, scene.ground.curved == 1, clock.time, work, memory)
     note_extremes(model, memory)
     if work.impact.relaxed == 1:
         note_wedge(model, clock.time, memory, work.impact, record)

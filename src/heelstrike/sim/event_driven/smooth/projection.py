@@ -7,6 +7,7 @@ import math
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.faces import CURVE
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -48,7 +49,12 @@ def tangential_place(
     model: Model, angle: Floats, contacts: Contacts, contact: int, rows: Rows, seconds: Contacts,
     face: Integers,
 ) -> float:  # fmt: skip
-    """Where a contact point is along the ground, less the length that its disc has rolled."""
+    """Where a contact point is along the ground, less the length that its disc has rolled.
+
+    On smooth ground nobody knows: there what sticks is held by its velocity alone.
+    """
+    if face[contact] == CURVE:
+        return 0.0
     point = rows.owner[contact]
     its = seconds if rows.kind[contact] == SECOND_FACE else contacts
     position, normal, radius = its.position[point], its.normal[point], model.contact_radius[point]
