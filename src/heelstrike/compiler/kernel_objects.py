@@ -6,10 +6,12 @@ object itself. The kernels are compiled apart from the loops, so that one loop s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache, lru_cache
 from typing import Any, ClassVar
+
+import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, number
 from heelstrike.compiler.bundle_type import bundle_at
@@ -54,7 +56,7 @@ class KernelObject:
                     f"{self.called} {kind.__name__} has no kernel: write {asked}({arguments}) "
                     "under @heelstrike.sim.kernel into its class"
                 )
-        if not (is_dataclass(self) and kind.__dataclass_params__.frozen):
+        if not (is_dataclass(kind) and vars(kind)["__dataclass_params__"].frozen):
             raise SimulationError(
                 f"{self.called} {kind.__name__} is no frozen dataclass: write "
                 "@dataclass(frozen=True) above its class"
@@ -73,7 +75,7 @@ class KernelObject:
         settings = {field.name: getattr(self, field.name) for field in fields(kind)}
         return numbers_of(
             type(self),
-            {name: each for name, each in settings.items() if isinstance(each, int | float)},
+            {name: float(each) for name, each in settings.items() if isinstance(each, int | float)},
         )
 
     def code(self, parameters: Bundle) -> int:
@@ -106,14 +108,18 @@ class KernelObject:
             ) from error
 
 
-def numbers_of(kind: type, numbers: dict[str, Any]) -> Bundle:
-    """Return a bundle of numbers by name, for objects of a class."""
-    return _bundle_of(kind, *numbers)(**numbers)
+def numbers_of(kind: type, numbers: Mapping[str, float | int]) -> Bundle:
+    """Return a bundle of numbers by name, for objects of a class; whole ones stay whole."""
+    whole = tuple(isinstance(each, int | np.integer) for each in numbers.values())
+    return _bundle_of(kind, tuple(numbers), whole)(**numbers)
 
 
 @cache
-def _bundle_of(kind: Any, *names: str) -> type[Bundle]:
-    return type(kind.__name__, (Bundle,), {name: number(float) for name in names})
+def _bundle_of(kind: Any, names: tuple[str, ...], whole: tuple[bool, ...]) -> type[Bundle]:
+    kinds = zip(names, whole, strict=True)
+    return type(
+        kind.__name__, (Bundle,), {name: number(int if one else float) for name, one in kinds}
+    )
 
 
 @lru_cache

@@ -7,6 +7,7 @@ import math
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel, ground_contact, path_curvature
+from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.dynamics.articulated import articulate, carry_along, solve_articulated
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import (
@@ -204,10 +205,12 @@ def assemble_delassus(model: Model, count: int, equations: Equations, assembly: 
             half[j, row] = 0.0
     for place in range(count):
         if assembly.leaf[place] == EVERYWHERE:
-            if straight:
-                halve_all_by_factor(model, factor, 2 * place, assembly)
-            else:
-                halve_all_by_bodies(model, 2 * place, equations, assembly)
+            rubs = assembly.problem.set[place] in (CONE, INTERVAL)
+            for row in range(2 * place, 2 * place + (2 if rubs else 1)):
+                if straight:
+                    halve_all_by_factor(model, factor, row, assembly)
+                else:
+                    halve_all_by_bodies(model, row, equations, assembly)
         elif straight:
             halve_by_factor(model, factor, place, assembly)
         else:

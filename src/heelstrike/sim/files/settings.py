@@ -12,6 +12,7 @@ import numpy as np
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.ground_shape import GroundShape
 from heelstrike.errors import HeelstrikeError
+from heelstrike.robot.robot import Robot
 from heelstrike.sim.compliant.contact_law import (
     BristleFriction,
     HuntCrossley,
@@ -19,6 +20,7 @@ from heelstrike.sim.compliant.contact_law import (
     RegularisedFriction,
 )
 from heelstrike.sim.compliant.method import Compliant
+from heelstrike.sim.contacts.constraint import Constraint, constrained
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.files.variables import DamageError, Stored
 from heelstrike.sim.method import Method, UnknownMethod
@@ -69,17 +71,45 @@ def shaped(ground: Ground, stored: Stored, classes: Mapping[str, type]) -> Groun
     name = stored.text("ground_shape")
     kind = classes.get(name)
     if kind is None or not issubclass(kind, GroundShape):
-        raise UnknownShapeError(name)
+        raise UnknownClassError("on ground of the shape", name)
     return replace(ground, shape=_rebuilt(stored, "ground_shape", kind, classes))
 
 
-class UnknownShapeError(HeelstrikeError):
-    """A run is one on ground of a shape that is not known here."""
+def constraint_settings(robot: Robot) -> dict[str, str | int | float]:
+    """Return names and settings of the constraints that hold a robot as attributes."""
+    found: dict[str, str | int | float] = {}
+    for i, each in enumerate(robot.constraints):
+        name = f"constraint_{i}"
+        found |= {name: type(each).__name__, **settings(name, each)}
+    return found
 
-    def __init__(self, name: str) -> None:
+
+def held(robot: Robot, stored: Stored, classes: Mapping[str, type]) -> Robot:
+    """Return the robot of a file with the constraints of its run, of classes from outside.
+
+    Raises
+    ------
+    DamageError
+        If a class is not given, or its settings are missing or cannot be.
+    """
+    found: list[Any] = []
+    while f"@constraint_{len(found)}" in stored.contents:
+        prefix = f"constraint_{len(found)}"
+        name = stored.text(prefix)
+        kind = classes.get(name)
+        if kind is None or not issubclass(kind, Constraint):
+            raise UnknownClassError("with the constraint", name)
+        found.append(_rebuilt(stored, prefix, kind, classes))
+    return constrained(robot, *found) if found else robot
+
+
+class UnknownClassError(HeelstrikeError):
+    """A run is one with something of a class that is not known here."""
+
+    def __init__(self, what: str, name: str) -> None:
         super().__init__(
-            f"the run was made on ground of the shape {name[:60]!r}, a class of somebody's that is "
-            f"not known here: load_run(path, classes=[{name[:60]}])"
+            f"the run was made {what} {name[:60]!r}, a class of somebody's that is not known here: "
+            f"load_run(path, classes=[{name[:60]}])"
         )
 
 

@@ -27,6 +27,8 @@ the work K (q + Δq/2) Δq. The linearly implicit scheme has θ = 1.
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from heelstrike.arguments import check_fields
@@ -36,6 +38,7 @@ from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.sets import INTERVAL, ImpulseSet
 from heelstrike.contact.workspace import ContactProblem
 from heelstrike.dynamics.kernels import integrate, passive_force
 from heelstrike.dynamics.workspace import Workspace
@@ -48,6 +51,7 @@ from heelstrike.sim.closed_sets import Scheme
 from heelstrike.sim.contacts.brakes import find_loops_of_step, note_brakes, share_friction
 from heelstrike.sim.contacts.candidates import (
     are_there,
+    find_constraints,
     hold_latched,
     list_candidate,
     list_dry_joints,
@@ -79,6 +83,7 @@ from heelstrike.sim.contacts.loops import (
 )
 from heelstrike.sim.contacts.points import point_velocities
 from heelstrike.sim.contacts.rows import (
+    CONSTRAINT,
     DRY_JOINT,
     LOOP,
     POINT,
@@ -88,6 +93,7 @@ from heelstrike.sim.contacts.rows import (
     lay_out_rows,
 )
 from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
+from heelstrike.sim.contacts.writers import Writers, rate_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.frame import DIVERGED, DONE, SOLVER_FAILED, Kernels, Scene
@@ -171,6 +177,8 @@ class TimeStepping(Method):
     First order in the step, whatever the scheme.
     """
 
+    holds: ClassVar[frozenset[ImpulseSet]] = frozenset(ImpulseSet)
+
     step: float = 1e-3
     """Length of the step h in seconds."""
     scheme: Scheme = Scheme.IMPACT_RESOLVED
@@ -233,6 +241,7 @@ class TimeStepping(Method):
             + len(robot.joint_names)
             + robot.model.latches
             + robot.model.brakes
+            + 2 * len(robot.constraints)
             + 2
         )
         return 1, events
@@ -241,7 +250,7 @@ class TimeStepping(Method):
         self, robot: Robot, work: Stepping, clock: Clock, *, stops: bool = False
     ) -> None:
         """What touched other ground says nothing of this one."""
-        rows = lay_out_rows(robot.model)
+        rows = lay_out_rows(robot)
         stood = work.impact.touching[rows.first[STOP] : rows.end[STOP]].copy()
         work.impact.touching[:] = NEVER
         if stops:
@@ -323,6 +332,8 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
     if memory.loops.unknown.shape[0] > 0:
         find_loops_of_step(model, memory)
+    if memory.rows.outside.kernel.shape[0] > 0:
+        find_constraints(model, memory.q, memory.v, equations.tree, memory.rows)
     if ground.concave == 1:
         locate_corners(
             model, ground, equations.tree, memory.rows, memory.seconds, memory.surface,
@@ -432,7 +443,7 @@ def select_candidates(model: Model, curved: bool, work: Stepping, memory: Memory
             if work.impact.relaxed == 0:
                 work.impact.bounce[count] = memory.surface.restitution[contact] * before
                 normal += work.impact.bounce[count]
-        list_candidate(POINT, contact, count, memory)
+        list_candidate(contact, count, memory)
         problem.free[2 * count] = normal
         problem.free[2 * count + 1] = velocity[contact, 1]
         count += 1
@@ -470,7 +481,7 @@ def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> in
                 continue
         elif not gap <= work.activation:
             continue
-        list_candidate(STOP, stop, count, memory)
+        list_candidate(stop, count, memory)
         problem.free[2 * count] = normal
         problem.free[2 * count + 1] = 0.0
         count += 1
@@ -501,10 +512,51 @@ def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> 
                 normal += work.impact.bounce[count]
         elif gap > work.activation:
             continue
-        list_candidate(SECOND_FACE, second, count, memory)
+        list_candidate(second, count, memory)
         problem.free[2 * count] = normal
         tangent = row_product(assembly.jacobian, 2 * count + 1, memory.next_v)
         problem.free[2 * count + 1] = tangent
+        count += 1
+    return count
+
+
+@kernel
+def select_constraints(count: int, work: Stepping, memory: Memory) -> int:
+    """Append the constraints from outside that could act in this step, and may let go.
+
+    As with loops, half of what turning rows add to a rate is in the free term: to second order that
+    is the chord of the step.
+    """
+    rows, problem, step = memory.rows, memory.assembly.problem, work.step
+    outside, calls = rows.outside, work.impact.calls
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        own = rows.owner[entry]
+        normal = rate_of(own, 0, memory.next_v, outside)
+        if rows.set[entry] == INTERVAL:
+            list_candidate(entry, count, memory)
+            problem.free[2 * count + 1] = normal
+            problem.bound[count] = step * rows.limit[entry]
+            count += 1
+            continue
+        gap = outside.gap[own, 0]
+        if is_linearised(work.scheme):
+            normal += 0.5 * step * outside.bias[own, 0]
+            far = gap > step * max(CLOSING_SPEED, -2.0 * normal)
+            if far and (calls == 0 or work.impact.called[entry] == 0):
+                continue
+            normal += gap / step
+        elif work.scheme == MOREAU_JEAN:
+            before = rate_of(own, 0, memory.v, outside)
+            if gap + 0.5 * step * before > work.activation:
+                continue
+            if work.impact.relaxed == 0:
+                work.impact.bounce[count] = memory.surface.restitution[entry] * before
+                normal += work.impact.bounce[count]
+        elif gap > work.activation:
+            continue
+        list_candidate(entry, count, memory)
+        problem.free[2 * count] = normal
+        problem.free[2 * count + 1] = rate_of(own, 1, memory.next_v, outside)
         count += 1
     return count
 
@@ -666,9 +718,8 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     assembly, contacts, rows = memory.assembly, memory.contacts, memory.rows
     equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
     impact, step = work.impact, work.step
-    straight = not are_there(SECOND_FACE, assembly) and are_usual(
-        assembly.candidate, near, DELASSUS, usual
-    )
+    others = are_there(SECOND_FACE, assembly) or are_there(CONSTRAINT, assembly)
+    straight = not others and are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
         gather_delassus(model, contacts, rows, near, count, equations, usual, assembly)
         loops = count - rows_of(memory.loops)
@@ -731,7 +782,7 @@ def may_go_through(
     thrown = 0
     for joint in range(model.nv):
         thrown += abs(v[joint]) > CLOSING_RATE
-    if thrown > 0:
+    if thrown > 0 or memory.rows.outside.kernel.shape[0] > 0:
         return True
     known = near == count and work.impact.happens == 0
     for contact in range(model.nc):
@@ -766,6 +817,12 @@ def stays_above(
     return gap + step * normal >= -0.5 * CLOSED_GAP
 
 
+@dissolved_kernel
+def far_beyond(step: float, own: int, outside: Writers) -> float:
+    """How far beyond its limit the tangent of a step may lead, whose chord does not."""
+    return CLOSED_GAP + max(0.5 * step * step * outside.bias[own, 0], 0.0)
+
+
 @kernel
 def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Impact) -> bool:
     """Call what would go through at the velocity that was found; return if any is new."""
@@ -781,6 +838,11 @@ def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Im
         joint, side = rows.owner[stop], rows.side[stop]
         if side * (memory.q[joint] + step * v[joint]) < side * rows.limit[stop] - CLOSED_GAP:
             call(stop, impact)
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        own = rows.owner[entry]
+        ahead = rows.outside.gap[own, 0] + step * rate_of(own, 0, v, rows.outside)
+        if rows.set[entry] != INTERVAL and ahead < -far_beyond(step, own, rows.outside):
+            call(entry, impact)
     return impact.calls > calls
 
 
@@ -811,6 +873,9 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
         count = select_stops(model, work, near, memory)
         count = hold_latched(model, count, memory.next_v, memory)
         first = note_group(STOP, near, count, assembly)
+        if memory.rows.outside.kernel.shape[0] > 0:
+            count = select_constraints(count, work, memory)
+        first = note_group(CONSTRAINT, first, count, assembly)
         count = list_dry_joints(count, work.step, memory.next_v, memory)
         first = note_group(DRY_JOINT, first, count, assembly)
         if impact.corner.near > 0:

@@ -15,7 +15,7 @@ from heelstrike.sim.contacts.geometry import (
     weigh,
 )
 from heelstrike.sim.contacts.loops import append_loops, find_loops, row_of, rows_of
-from heelstrike.sim.contacts.rows import DRY_JOINT, LOOP, POINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, LOOP, POINT, SECOND_FACE, Rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.phase import HeldRows, Modes, Phase, SaddlePoint, Step
 from heelstrike.sim.event_driven.smooth.dynamics import (
@@ -117,7 +117,7 @@ def gather_sunk(
     none of them: it is the instant that is corrected. Returns how many there are.
     """
     sunk = 0
-    for contact in range(rows.end[STOP]):
+    for contact in range(rows.end[CONSTRAINT]):
         if modes.closed[contact] == 1 or fired[2 * contact] == 1:
             continue
         if rows.kind[contact] == POINT and modes.passing[contact] == 1:
@@ -166,7 +166,7 @@ def project(
     strayed, fastest = 0.0, 0.0
     for attempt in range(5):
         observe_faces(
-            model, ground, state, rows, phase.modes, seconds, phase.faces, equations.tree, contacts,
+            model, ground, state, phase.modes, rows, seconds, phase.faces, equations.tree, contacts,
             surface,
         )  # fmt: skip
         weigh(model, equations)
