@@ -27,6 +27,7 @@ the work K (q + Δq/2) Δq. The linearly implicit scheme has θ = 1.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -104,7 +105,7 @@ from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.corners import join_forces, locate_corners
-from heelstrike.sim.time_stepping.doubts import too_light, too_stiff
+from heelstrike.sim.time_stepping.doubts import hardly_told, too_light, too_stiff
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
     Impact,
@@ -284,14 +285,17 @@ class TimeStepping(Method):
             f"{self.step:g} s, or Scheme.IMPACT_RESOLVED"
         )
         found = (
-            self._too_stiff(robot, q), too_light(robot, q), deep if sunk > SUNK else "",
+            self._too_stiff(robot, q), self._too_stiff(robot, q, hardly_told),
+            too_light(robot, q), deep if sunk > SUNK else "",
             beyond if past > PAST else "",
         )  # fmt: skip
         return [doubt for doubt in found if doubt]
 
-    def _too_stiff(self, robot: Robot, q: Floats) -> str:
+    def _too_stiff(
+        self, robot: Robot, q: Floats, asked: Callable[[Robot, Floats, float], str] = too_stiff
+    ) -> str:
         implicit = self.scheme in (Scheme.MOREAU_JEAN, Scheme.LINEARLY_IMPLICIT)
-        return "" if implicit else too_stiff(robot, q, self.step)
+        return "" if implicit else asked(robot, q, self.step)
 
 
 @dissolved_kernel
