@@ -10,7 +10,14 @@ from math import hypot
 from typing import Any
 
 import heelstrike as hs
-from heelstrike.sim import add_point_row, kernel, point_at, point_bias, point_velocity
+from heelstrike.sim import (
+    add_point_row,
+    kernel,
+    link_index,
+    point_at,
+    point_bias,
+    point_velocity,
+)
 
 
 @dataclass(frozen=True)
@@ -26,7 +33,7 @@ class Cable(hs.Constraint):
     set = hs.ImpulseSet.HALF_LINE
 
     def numbers(self, robot: Any) -> dict[str, float | int]:
-        where = robot.link_names.index(self.link)
+        where = link_index(robot, self.link)
         return {"link": where, "x": self.x, "z": self.z, "length": self.length}
 
     @kernel

@@ -165,9 +165,8 @@ def test_a_biped_in_a_harness_does_not_fall() -> None:
     """Held by a slack leash at its trunk it hangs there, and the leash carries its weight."""
     robot = walking.bravo7()
     begin = robot.reference_state()
-    trunk = robot.link_names[2]
     high = float(begin.q[1]) + 0.5
-    held = hs.constrained(robot, Cable(trunk, float(begin.q[0]), high, 0.6))
+    held = hs.constrained(robot, Cable("trunk", float(begin.q[0]), high, 0.6))
     found = hs.simulate(held, state=begin, duration=1.5, stop_when_fallen=False)
     assert found.completed, found.message
     reach = np.hypot(found.position[:, 0] - begin.q[0], found.position[:, 1] - high)

@@ -14,6 +14,7 @@ from heelstrike.dynamics.places import add_point_row as add_point_row
 from heelstrike.dynamics.places import point_at as point_at
 from heelstrike.dynamics.places import point_bias as point_bias
 from heelstrike.dynamics.places import point_velocity as point_velocity
+from heelstrike.dynamics.queries.evaluation import link_index as link_index
 from heelstrike.sim.batch import Batch, simulate_batch
 from heelstrike.sim.clock import Clock as Clock
 from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus, Scheme

@@ -31,8 +31,50 @@ Friction = tuple[Derived, Derived, bool]
 GRAVITY = 9.80665
 
 
+class Elastic(NormalLaw):
+    """A law that presses with k δⁿ at rest."""
+
+    stiffness: float
+
+    def sink(self, weight: float) -> float:
+        """Penetration in metres of a contact point at rest under a load in newtons.
+
+        Parameters
+        ----------
+        weight : float
+            The load (N).
+
+        Returns
+        -------
+        float
+            Metres.
+        """
+        return float((weight / self.stiffness) ** (1.0 / self._power()))
+
+    def stored_energy(self, gap: Floats) -> Floats:
+        """Elastic energy in joules at the given gaps (m).
+
+        Parameters
+        ----------
+        gap : float array
+            Gaps (m), negative in the ground.
+
+        Returns
+        -------
+        (nc,) float
+            Joules.
+        """
+        depth, power = np.maximum(-np.asarray(gap, dtype=np.float64), 0.0), self._power() + 1.0
+        energy: Floats = self.stiffness * depth**power / power
+        return energy
+
+    def _power(self) -> float:
+        """Exponent n."""
+        return 1.0
+
+
 @dataclass(frozen=True, kw_only=True)
-class HuntCrossley(NormalLaw):
+class HuntCrossley(Elastic):
     """Nonlinear spring whose damping grows with the penetration (the paper's [13]).
 
     ``F = k δⁿ (1 + 3/2 α δ̇)``, never pulling, with penetration δ. The force begins and ends at
@@ -140,37 +182,8 @@ class HuntCrossley(NormalLaw):
         leave = _root(lambda x: -x - log1p(-x) - level, 0.0, -np.expm1(-level - 1.0))
         return leave / approach
 
-    def sink(self, weight: float) -> float:
-        """Penetration in metres of a contact point at rest under a load in newtons.
-
-        Parameters
-        ----------
-        weight : float
-            The load (N).
-
-        Returns
-        -------
-        float
-            Metres.
-        """
-        return float((weight / self.stiffness) ** (1.0 / self.exponent))
-
-    def stored_energy(self, gap: Floats) -> Floats:
-        """Elastic energy in joules at the given gaps (m).
-
-        Parameters
-        ----------
-        gap : float array
-            Gaps (m), negative in the ground.
-
-        Returns
-        -------
-        (nc,) float
-            Joules.
-        """
-        depth = np.maximum(-np.asarray(gap, dtype=np.float64), 0.0)
-        energy: Floats = self.stiffness * depth ** (self.exponent + 1.0) / (self.exponent + 1.0)
-        return energy
+    def _power(self) -> float:
+        return self.exponent
 
     @kernel
     def force(self, gap: float, speed: float) -> tuple[float, float, float]:
@@ -195,7 +208,7 @@ class HuntCrossley(NormalLaw):
 
 
 @dataclass(frozen=True, kw_only=True)
-class KelvinVoigt(NormalLaw):
+class KelvinVoigt(Elastic):
     """Linear spring and damper side by side: ``F = max(0, k δ + c δ̇)`` with penetration δ.
 
     Raises
@@ -296,38 +309,6 @@ class KelvinVoigt(NormalLaw):
         """
         ratio = self.damping_ratio(mass)
         return 2.0 * _arc_over_root(ratio) * sqrt(mass / self.stiffness)
-
-    def sink(self, weight: float) -> float:
-        """Penetration in metres of a contact point at rest under a load in newtons.
-
-        Parameters
-        ----------
-        weight : float
-            The load (N).
-
-        Returns
-        -------
-        float
-            Metres.
-        """
-        return weight / self.stiffness
-
-    def stored_energy(self, gap: Floats) -> Floats:
-        """Elastic energy in joules at the given gaps (m).
-
-        Parameters
-        ----------
-        gap : float array
-            Gaps (m), negative in the ground.
-
-        Returns
-        -------
-        (nc,) float
-            Joules.
-        """
-        depth = np.maximum(-np.asarray(gap, dtype=np.float64), 0.0)
-        energy: Floats = 0.5 * self.stiffness * depth**2
-        return energy
 
     @kernel
     def force(self, gap: float, speed: float) -> tuple[float, float, float]:
