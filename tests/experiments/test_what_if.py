@@ -69,7 +69,7 @@ def test_a_law_that_raises_is_not_told_of_at_every_trial() -> None:
         ),
     )  # fmt: skip
     case = falls.walk(law=law)
-    assert case.run().status is hs.sim.RunStatus.CONTROLLER_FAILED
+    assert case.run(on_error="stop").status is hs.sim.RunStatus.CONTROLLER_FAILED
     assert "not tried" in next(iter(what_if.try_disturbances(case))).outcome
 
 
