@@ -175,7 +175,7 @@ def _screened(source: Path | str, text: str | None, options: Options, label: str
         return file
     directory = source.parent if isinstance(source, Path) else Path()
     mjcf = as_mjcf(file.xml, directory, options.packages, label)
-    return replace(file, xml=mjcf, text=xml_text(mjcf), massless=True)
+    return replace(file, xml=mjcf, massless=True)
 
 
 def stated_bodies(
@@ -240,13 +240,14 @@ def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path
     """Return a file as MuJoCo understands it, not yet compiled."""
     import mujoco
 
-    text = file.text
     urdf = file.xml.tag == "robot"
     if urdf:
         translate_dialects(file.xml)
         directory = source.parent if isinstance(source, Path) else Path()
         text = urdf_text(file.xml, directory, packages, label)
         check_urdf_tree(file.xml, label)
+    else:
+        text = xml_text(file.xml)
     spec = mujoco.MjSpec.from_string(text, include=file.models)
     # Welded bodies are joined by our own reader, which needs to know where each of them is.
     spec.compiler.fusestatic = False

@@ -20,8 +20,8 @@ MOST_FACES = 200_000
 """Most faces of an .stl file that MuJoCo reads."""
 
 
-def name_mesh_files(root: Element, label: str, place: Place) -> bool:
-    """Give every mesh of a tree the whole path of its file; return whether one has a file.
+def name_mesh_files(root: Element, label: str, place: Place) -> None:
+    """Give every mesh of a tree the whole path of its file.
 
     The parser then opens these files and no others, wherever it runs.
 
@@ -34,7 +34,7 @@ def name_mesh_files(root: Element, label: str, place: Place) -> bool:
     meshes = [mesh for asset in root.iter("asset") for mesh in asset.iter("mesh")]
     meshes = [mesh for mesh in meshes if mesh.get("file")]
     if not meshes:
-        return False
+        return
     meshdir = assetdir = ""
     stripped = False
     for compiler in root.iter("compiler"):
@@ -61,7 +61,6 @@ def name_mesh_files(root: Element, label: str, place: Place) -> bool:
         _leave_out(root, missing)
     # One more compiler element: MuJoCo reads them all, the last one last.
     SubElement(root, "compiler", {"strippath": "false"})
-    return True
 
 
 def is_mesh(file: Path) -> bool:
