@@ -12,17 +12,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.support import stances
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
 from heelstrike.tolerances import SAME_ROW
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
 
-Floats = NDArray[np.float64]
 
 EARLIEST = 0.5
 """Touchdowns before this fraction of a step do not end it."""
@@ -38,7 +37,7 @@ class ReferenceMotion:
     velocity: Floats
     """position, velocity: (nt, nu) Reference of the actuated joints, in the order of the actuators
     (rad, rad/s)."""
-    stance: NDArray[np.int64]
+    stance: Integers
     """(nt,) Index of the foot taken for the stance foot."""
     phase: Floats
     """(nt,) Time since the step began, in s."""

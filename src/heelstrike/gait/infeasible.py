@@ -6,14 +6,12 @@ from dataclasses import replace
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.program import Program, Solution
 from heelstrike.gait.starts import starts
 from heelstrike.gait.transcription import Group
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 FEASIBLE = 1e-7
 """Scaled violations up to which a point satisfies all constraints."""

@@ -32,9 +32,8 @@ from heelstrike.robot.files.posture import (
 )
 from heelstrike.robot.files.snapping import IN_PLANE, snap
 from heelstrike.robot.files.spatial import asymmetry, nothing_to_keep, refuse_spatial_joints
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import LockedJoint
-
-Floats = NDArray[np.float64]
 
 KINDS = ("free", "ball", "slide", "hinge")
 MANY = 12  # joints that are named in a remark

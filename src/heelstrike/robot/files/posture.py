@@ -7,13 +7,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.files.options import Options
 from heelstrike.robot.files.snapping import IN_PLANE
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
 LONGEST_TRAIN = 20  # joints each of which follows the one before

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.friction import friction_use
 from heelstrike.analysis.intervals import event_impulse, mean_over_intervals
@@ -17,6 +16,7 @@ from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.dynamics import center_of_mass, contact_positions, link_poses
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
@@ -25,8 +25,6 @@ from heelstrike.tolerances import SAME_ROW
 from heelstrike.view.drawing import legs
 from heelstrike.view.page.motion import frames as drawn
 from heelstrike.view.style import in_words
-
-Floats = NDArray[np.float64]
 
 MOST_PUSHES = 4
 """Pushes that are drawn at once."""
@@ -224,7 +222,7 @@ class Layout:
         field: str,
         angular: str,
         linear: str,
-        joints: NDArray[np.int64],
+        joints: Integers,
         named: Sequence[str],
     ) -> list[dict[str, Any]]:
         """One panel for the joints that differ by their side only, such as both knees."""
@@ -282,7 +280,7 @@ class Layout:
         ]  # fmt: skip
 
 
-def movable(robot: Robot) -> NDArray[np.int64]:
+def movable(robot: Robot) -> Integers:
     """Joints of a robot but for those that carry all of it through the world."""
     model = robot.model
     slides = (model.axis[:, 0] == 0.0) & np.isneginf(model.lower) & np.isposinf(model.upper)
@@ -294,7 +292,7 @@ def movable(robot: Robot) -> NDArray[np.int64]:
     return np.flatnonzero(~carries)
 
 
-def mean_forces(run: Run, rows: NDArray[np.int64]) -> Floats:
+def mean_forces(run: Run, rows: Integers) -> Floats:
     """Contact forces (normal, tangent) since the row before, of all of `rows` but the first, in N.
 
     Where no time lies between two rows, those of the later one.
@@ -317,7 +315,7 @@ def mean_forces(run: Run, rows: NDArray[np.int64]) -> Floats:
     return found
 
 
-def _only(run: Run, rows: NDArray[np.int64], forces: Floats) -> Run:
+def _only(run: Run, rows: Integers, forces: Floats) -> Run:
     """Return a run of some rows, with forces (n, nc, 2) of its own."""
     kept = {name: getattr(run, name)[rows] for name in ("time", *QUANTITIES)}
     return replace(run, **kept | {"contact_force": forces}, pushes=())

@@ -7,7 +7,6 @@ from dataclasses import field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.energy import energy_balance
 from heelstrike.analysis.friction import friction_use
@@ -16,6 +15,7 @@ from heelstrike.analysis.tracking import reference_motion
 from heelstrike.analysis.zero_moment_point import ZeroMomentPoint, zero_moment_point_limits
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
 from heelstrike.view.contact_figures import ROOM_ABOUT_POINTS
 from heelstrike.view.drawing import legs
@@ -23,8 +23,6 @@ from heelstrike.view.energy_figure import ALWAYS
 from heelstrike.view.page.rows import Rows, means
 from heelstrike.view.panels import impact_rows
 from heelstrike.view.style import in_words
-
-Floats = NDArray[np.float64]
 
 DASHED, DOTTED = 1, 2
 FLATTEST = 3.0
@@ -191,7 +189,7 @@ def _limits_in_words(limits: Sequence[float], unit: str) -> str:
     return f"limits {text} {unit}" if limits else ""
 
 
-def _alike(names: Sequence[str], which: NDArray[np.int64]) -> dict[str, list[int]]:
+def _alike(names: Sequence[str], which: Integers) -> dict[str, list[int]]:
     """Group indices of names that differ by their side only: one panel for both knees."""
     groups: dict[str, list[int]] = {}
     for i in which.tolist():

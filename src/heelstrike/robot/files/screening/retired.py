@@ -9,9 +9,9 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
+from heelstrike.robot.model import Floats
 from heelstrike.robot.warning import warn
 
 RETIRED = {
@@ -24,8 +24,6 @@ as of ``coordinate``, done here."""
 
 PLACED = ("geom", "joint", "site", "inertial", "camera", "light")
 TURNED = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
-
-Floats = NDArray[np.float64]
 
 
 def renew(root: Element, label: str) -> None:

@@ -12,11 +12,9 @@ from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 LONGEST_GUESS = 40  # letters of a word that may be a misspelling
 

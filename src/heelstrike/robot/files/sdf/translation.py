@@ -19,7 +19,6 @@ from heelstrike.robot.files.packages import find_file
 from heelstrike.robot.files.screening.mesh_files import is_mesh, refuse_large_meshes
 from heelstrike.robot.files.screening.xml_tree import Node
 from heelstrike.robot.files.sdf.elements import (
-    Floats,
     check,
     error,
     inverse,
@@ -31,6 +30,7 @@ from heelstrike.robot.files.sdf.elements import (
 )
 from heelstrike.robot.files.sdf.frames import MODEL, WORLD, Frames, frames_of
 from heelstrike.robot.files.sdf.nesting import JOINTS, flat
+from heelstrike.robot.model import Floats
 from heelstrike.robot.warning import warn
 
 HINGES, SLIDES = ("revolute", "continuous"), ("prismatic",)
