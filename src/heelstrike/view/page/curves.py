@@ -120,62 +120,42 @@ def _joints(run: Run, gait: Gait | None, rows: Rows) -> list[Plot]:
 
 
 def _torques(run: Run, rows: Rows) -> list[Plot]:
-    robot, model = run.robot, run.robot.model
-    joints = model.actuator_joint
-    leg = legs(robot)[joints] if robot.nu else np.zeros(0, dtype=np.int64)
-    found = []
-    for name, several in _alike(robot.actuator_names, np.arange(robot.nu)).items():
-        unit = "N m" if model.axis[joints[several[0]], 0] != 0.0 else "N"
-        limits = sorted(
-            {
-                float(end)
-                for i in several
-                for end in (model.torque_lower[i], model.torque_upper[i])
-                if np.isfinite(end)
-            }
-        )
-        traces = [
-            Trace(run.torque[rows, i], in_words(robot.actuator_names[i]), int(leg[i]), place)
-            for place, i in enumerate(several)
-        ]
-        found.append(
-            Plot(
-                f"{name} {'torque' if unit == 'N m' else 'force'}",
-                unit,
-                traces,
-                [("limit", level) for level in limits],
-                span=_usual_span(run, run.torque[:, several], limits),
-                steps=True,
-                note=_limits_in_words(limits, unit),
-                group="joint torques",
-            )
-        )
-    return found
+    """What motors do to their joints, with their limits."""
+    model = run.robot.model
+    ends = np.column_stack((model.torque_lower, model.torque_upper))
+    return _on_joints(run, rows, run.torque, model.actuator_joint, run.robot.actuator_names, ends)
 
 
 def _brakes(run: Run, rows: Rows) -> list[Plot]:
     """What brakes do to their joints, with the limits of those that slip."""
-    robot, model = run.robot, run.robot.model
-    leg = legs(robot)
+    model = run.robot.model
+    ends = np.column_stack((-model.brake_limit, model.brake_limit))
+    return _on_joints(
+        run, rows, run.brake_torque, model.brake_joint, run.robot.brake_names, ends, "brake"
+    )
+
+
+def _on_joints(
+    run: Run, rows: Rows, values: Floats, joints: Integers, names: Sequence[str], ends: Floats,
+    what: str = "",
+) -> list[Plot]:  # fmt: skip
+    """Torques (nt, n) on joints, with their limits (n, 2): a panel for those that are alike."""
+    leg = legs(run.robot)[joints]
     found = []
-    for name, several in _alike(robot.brake_names, np.arange(model.brakes)).items():
-        unit = "N m" if model.axis[model.brake_joint[several[0]], 0] != 0.0 else "N"
-        ends = {float(model.brake_limit[k]) for k in several if np.isfinite(model.brake_limit[k])}
-        limits = sorted({sign * end for end in ends for sign in (-1.0, 1.0)})
+    for name, several in _alike(names, np.arange(len(names))).items():
+        unit = "N m" if run.robot.model.axis[joints[several[0]], 0] != 0.0 else "N"
+        limits = sorted({float(end) for end in ends[several].ravel() if np.isfinite(end)})
         traces = [
-            Trace(
-                run.brake_torque[rows, k], in_words(robot.brake_names[k]),
-                int(leg[model.brake_joint[k]]), place,
-            )
-            for place, k in enumerate(several)
-        ]  # fmt: skip
+            Trace(values[rows, i], in_words(names[i]), int(leg[i]), place)
+            for place, i in enumerate(several)
+        ]
         found.append(
             Plot(
-                f"{name} brake",
+                f"{name} {what or ('torque' if unit == 'N m' else 'force')}",
                 unit,
                 traces,
-                [("slips", level) for level in limits],
-                span=_usual_span(run, run.brake_torque[:, several], limits),
+                [("slips" if what else "limit", level) for level in limits],
+                span=_usual_span(run, values[:, several], limits),
                 steps=True,
                 note=_limits_in_words(limits, unit),
                 group="joint torques",
