@@ -7,7 +7,6 @@ height; nothing is tuned for a robot.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -43,6 +42,7 @@ from heelstrike.robot import Robot
 from heelstrike.robot.model import Floats
 from heelstrike.sim import Controller
 from heelstrike.sim.controller.law import Law
+from heelstrike.wording import meant
 
 SAMPLE = 1e-3
 """Time between two calls of every controller, in s; a longer step of the method goes before."""
@@ -282,8 +282,7 @@ def law_called(words: str) -> Entry:
         raise ControllerError(
             f"{words} is a file: say which law of it is meant, as in {words}:NAME"
         )
-    near = difflib.get_close_matches(name, known, n=1)
-    guess = f" Did you mean {known[near[0]].name!r}?" if near else ""
+    guess = meant(name, {each: repr(entry.name) for each, entry in known.items()})
     raise ControllerError(
         f"there is no controller {words!r}.{guess} There are "
         f"{', '.join(entry.name for entry in LAWS)}. One of your own is MODULE:NAME or "

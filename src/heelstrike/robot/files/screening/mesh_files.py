@@ -10,6 +10,7 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.files.looks import is_file, is_there, will_read
 from heelstrike.robot.files.screening.inclusion import Place, resolved
 from heelstrike.robot.warning import warn
+from heelstrike.wording import some_of
 
 LARGEST_MESHES = 256 * 2**20
 """Bytes of all mesh files of a robot together."""
@@ -116,11 +117,10 @@ def _leave_out(root: Element, missing: dict[str, str]) -> None:
             if name in missing:
                 asset.remove(mesh)
     if bare:
-        shown = ", ".join(bare[:SHOWN]) + (f" and {len(bare) - SHOWN} more" if bare[SHOWN:] else "")
         warn(
-            f"{first}, which is not there: {len(missing)} meshes are missing, and {shown} cannot "
-            "touch the ground with them. If one is a foot, give it a box, or spheres at heel and "
-            "toe."
+            f"{first}, which is not there: {len(missing)} meshes are missing, and "
+            f"{some_of(bare, SHOWN)} cannot touch the ground with them. If one is a foot, give it "
+            "a box, or spheres at heel and toe."
         )
 
 
