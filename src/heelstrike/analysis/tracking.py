@@ -8,7 +8,6 @@ duration and then holds still. All of it follows from the touchdowns of the run.
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -110,16 +109,6 @@ class TrackingError:
     position: Floats
     velocity: Floats
     """position, velocity: (nt, nu) Errors in rad and rad/s."""
-
-    @cached_property
-    def joint_rms(self) -> Floats:
-        """Root mean square of the position error of each joint over all rows, (nu,), in rad."""
-        return np.asarray(np.sqrt((self.position**2).mean(axis=0)))
-
-    @cached_property
-    def joint_max(self) -> Floats:
-        """Largest position error of each joint, (nu,), in rad."""
-        return np.asarray(np.abs(self.position).max(axis=0))
 
     @property
     def rms(self) -> float:
