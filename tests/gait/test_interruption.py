@@ -72,6 +72,7 @@ def test_ctrl_c_is_not_taken_for_a_failure_that_it_prints(
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.usefixtures("afresh")
 def test_other_threads_optimise_as_before() -> None:
     found: list[hs.Gait] = []
     thread = threading.Thread(
