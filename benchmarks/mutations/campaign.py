@@ -96,11 +96,12 @@ def copy_sources() -> None:
 
     atexit.register(clear)
     COPY.mkdir(parents=True)
-    for name in ("src", "tests"):
+    for name in ("src", "tests", "benchmarks", "docs"):  # tests import benchmarks and read pages
         shutil.copytree(HOME / name, COPY / name, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "README.md"):
+    for name in ("pyproject.toml", "README.md", "mkdocs.yml"):
         shutil.copy(HOME / name, COPY / name)
-    compileall.compile_dir(COPY, quiet=2)
+    for name in ("src", "tests", "benchmarks"):
+        compileall.compile_dir(COPY / name, quiet=2)
 
 
 def environment(**setting: str) -> dict[str, str]:
@@ -214,7 +215,7 @@ def drawn(seed: int, number: int, rooms: Sequence[str] = ()) -> list[Mutant]:
     else:
         shares, chosen = SHARES, known_mutants(PACKAGE)
     begin = len(chosen)
-    for place, (room, share) in enumerate(shares.items()):
+    for place, room in enumerate(shares):
         draw = random.Random(f"{seed}/{room}")
         kinds: dict[str, list[Mutant]] = {}
         inside = sorted((PACKAGE / room).rglob("*.py")) or [PACKAGE / room]

@@ -58,7 +58,7 @@ def probe(home: Path) -> float:
 
 def test_a_change_in_another_file_is_not_missed(tmp_path: Path) -> None:
     """`bias_force` calls a kernel that reads `model.py`'s neighbour: change the callee's file."""
-    shutil.copytree(SOURCE, tmp_path / "heelstrike", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(SOURCE, tmp_path / "heelstrike")
     kernels = tmp_path / "heelstrike" / "dynamics" / "kernels.py"
     callee = tmp_path / "heelstrike" / "dynamics" / "doubled.py"
     callee.write_text(
