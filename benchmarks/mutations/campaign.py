@@ -36,6 +36,7 @@ import importlib
 import json
 import os
 import random
+import resource
 import shutil
 import signal
 import subprocess
@@ -76,8 +77,10 @@ REACH_DEADLINE = 3
 """Tests that take longer than this (s of processor time, traced) are left out."""
 DEADLINE = 12
 """What a test may take with a mutant (s of processor time) before it counts as caught."""
+LONGEST = 120
+"""What all tests together may take (s of processor time) before a mutant counts as endless."""
 LONGEST_WAIT = 900.0
-"""What all tests together may take (s) before a mutant counts as endless."""
+"""The same of a process that starts afresh, and of its children (s that pass)."""
 QUICK = 20
 """Tests that run first in a new process, the quickest; the others only if these pass."""
 SLOW = 0.5
@@ -294,19 +297,11 @@ class Asker:
                 os._exit(self._in_fork(mutant, text, tests))
             finally:
                 os._exit(1)  # the mutant spoilt what runs the tests
-        begin = time.monotonic()
-        try:
-            while time.monotonic() - begin < LONGEST_WAIT:
-                finished, status, _ = os.wait4(process, os.WNOHANG)
-                if finished:
-                    return os.waitstatus_to_exitcode(status)
-                time.sleep(0.02)
-            return None
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(process, signal.SIGKILL)
+        status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+        return None if status == -signal.SIGXCPU else status
 
     def _in_fork(self, mutant: Mutant, text: str, tests: list[str]) -> int:
+        resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST + 5))  # a fork begins at zero
         nowhere = os.open(os.devnull, os.O_RDWR)
         for stream in range(3):
             os.dup2(nowhere, stream)
