@@ -38,7 +38,7 @@ LONGEST = 60.0
 that does nothing else."""
 
 _JOB = f"{__name__}:answer"
-_ROOMS = ("robot",)
+_ROOMS = ("robot", "tolerances")
 
 
 @dataclass(frozen=True, kw_only=True)
