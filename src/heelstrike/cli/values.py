@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from heelstrike.errors import HeelstrikeError, RobotError, SimulationError
 from heelstrike.wording import meant
@@ -53,7 +53,7 @@ def ground_called(words: str, *, friction: float = 0.75, restitution: float = 0.
     """
     from heelstrike.contact.ground import Ground
 
-    given = {"friction": friction, "restitution": restitution}
+    given: dict[str, Any] = {"friction": friction, "restitution": restitution}
     flat = Ground(**given)
     where = f"--ground {words}"
 

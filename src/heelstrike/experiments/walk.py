@@ -172,7 +172,7 @@ def beginning(
     else:
         trial = law.trial(robot, walked)
         state, duration, controller = trial.state, trial.step_duration, trial.controller
-    if ground is not None and np.any(ground.model().vertices[:, 1]):
+    if ground is not None and (ground.shape is not None or np.any(ground.model().vertices[:, 1])):
         if law is not None and law.stands:
             state = robot.standing(ground)
         else:
@@ -182,6 +182,8 @@ def beginning(
 
 def _slope_at(ground: Ground, x: float) -> float:
     """Inclination (rad) of the ground at x; positive climbs."""
+    if ground.shape is not None:
+        return float(np.arctan(ground.shape.at(x)[1]))
     corners = ground.model().vertices
     segment = int(np.clip(np.searchsorted(corners[:, 0], x, "right") - 1, 0, len(corners) - 2))
     run, rise = corners[segment + 1] - corners[segment]

@@ -65,9 +65,8 @@ def changed(case: Case, change: Change) -> Case:
         case Lever.CONTROLLER:
             return replace(case, law=law_called(str(value)))
         case Lever.FRICTION:
-            numbers = case.ground.numbers()
-            more = np.maximum(numbers["friction"], value)
-            return replace(case, ground=Ground.of_numbers(numbers | {"friction": more}))
+            more = np.maximum(case.ground.friction, value)
+            return replace(case, ground=replace(case.ground, friction=more))
         case Lever.TORQUE_LIMIT:
             model = case.robot.model
             ends = {

@@ -382,7 +382,7 @@ def robot_picture(
             height = float(points[:, 1].min()) if len(points) else float(low[1])
             surface = np.array([[left, height], [right, height]])
         else:
-            surface = ground_outline(ground, left, right)
+            surface = ground.outline(left, right)
         bottom = float(surface[:, 1].min()) - 0.06 * size
         axes.fill_between(surface[:, 0], surface[:, 1], bottom, color=PALE, lw=0.0, zorder=0)
         _draw_pushes(axes, robot, poses, pushes, size)
@@ -456,14 +456,6 @@ def _contact_bottoms(robot: Robot, origin: Floats, angle: Floats) -> Floats:
     model, link = robot.model, robot.model.contact_link
     center = in_world(origin[link], angle[link], model.contact_position)
     return center - np.outer(model.contact_radius, [0.0, 1.0])
-
-
-def ground_outline(ground: Ground, left: float, right: float) -> Floats:
-    """Corners (x, z) of the surface of the ground from one x to another, (n, 2), in m."""
-    corners = ground.model().vertices
-    inside = corners[(corners[:, 0] > left) & (corners[:, 0] < right)]
-    ends = np.array([[x, float(ground.height(x))] for x in (left, right)])
-    return np.concatenate((ends[:1], inside, ends[1:]))
 
 
 def extent(segments: Floats) -> tuple[Floats, Floats]:

@@ -21,7 +21,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows, draw_scale
-from heelstrike.view.drawing import body, extent, ground_outline, leg_labels
+from heelstrike.view.drawing import body, extent, leg_labels
 from heelstrike.view.style import (
     FORCE_COLOR,
     GREY,
@@ -203,7 +203,7 @@ class Film:
 
     def _draw_ground(self, camera: Floats) -> None:
         left, right = self._x
-        outline = ground_outline(self._ground, left + camera[0], right + camera[0]) - camera
+        outline = self._ground.outline(left + camera[0], right + camera[0]) - camera
         below = self._z[0] - 1.0
         self._soil.set_xy(np.concatenate((outline, [[right, below], [left, below]])))
         marks = np.arange(np.ceil(2.0 * (left + camera[0])), 2.0 * (right + camera[0])) / 2.0

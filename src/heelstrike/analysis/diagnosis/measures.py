@@ -12,7 +12,7 @@ from heelstrike.analysis.actuation import actuator_power, cost_of_transport
 from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.slip import max_slip
-from heelstrike.analysis.support import stances, walking_steps
+from heelstrike.analysis.support import stances, step_times, walking_steps
 from heelstrike.analysis.tracking import tracking_error
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Integers
@@ -117,7 +117,7 @@ def measures(run: Run, gait: Gait | None = None) -> tuple[Measure, ...]:
 def _measures(run: Run, gait: Gait | None) -> Iterator[Measure]:
     motion = run_motion(run)
     landings = walking_steps(run)
-    times = [float(run.time[0]), *(landing.touchdown for landing in landings)]
+    times = step_times(run)
     rows = np.minimum(np.searchsorted(run.time, np.array(times) - 1e-9), len(run.time) - 1)
     center = motion.center_of_mass[rows, 0]
     if len(times) > 1:

@@ -22,7 +22,7 @@ from heelstrike.analysis.diagnosis.limits import REACHED
 from heelstrike.analysis.friction import friction_coefficient
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.slip import slip_distance
-from heelstrike.analysis.support import pushing, pushing_feet, stances, walking_steps
+from heelstrike.analysis.support import pushing, pushing_feet, stances, step_times
 from heelstrike.analysis.tracking import reference_motion
 from heelstrike.analysis.wrenches import sole_points
 from heelstrike.dynamics import leg_joints
@@ -160,7 +160,7 @@ class Walk:
     @cached_property
     def landings(self) -> tuple[float, ...]:
         """When steps began, in s: at the start and at the touchdowns that ended one."""
-        return (float(self.run.time[0]), *(s.touchdown for s in walking_steps(self.run)))
+        return step_times(self.run)
 
     @cached_property
     def step_duration(self) -> float:

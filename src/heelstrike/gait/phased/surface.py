@@ -68,7 +68,7 @@ class Surface:
         self.gait = gait
         self.robot = gait.robot
         terrain = (Ground() if ground is None else ground).model()
-        if len(terrain.friction) > 1:
+        if len(terrain.friction) > 1 or terrain.curved:
             raise GaitError("a gait that repeats needs level or sloping ground")
         along = np.diff(terrain.vertices[:2], axis=0)[0]
         along = along / np.hypot(*along)
