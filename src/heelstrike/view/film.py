@@ -15,10 +15,10 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import run_motion
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows, draw_scale
 from heelstrike.view.drawing import body, extent, leg_labels
@@ -31,8 +31,6 @@ from heelstrike.view.style import (
     ZERO_MOMENT_POINT_COLOR,
 )
 
-Floats = NDArray[np.float64]
-
 DPI = 100
 FOLLOWS_WITHIN = 0.6
 """Seconds over which the camera evens out the motion of the centre of mass."""
@@ -44,7 +42,7 @@ class Frames:
 
     time: Floats
     """(nf,) Time of each frame, in s."""
-    row: NDArray[np.int64]
+    row: Integers
     """(nf,) Row of the run that each frame shows."""
     segments: Floats
     """(nf, ns, 2, 2) The robot."""

@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.support import walking_steps
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows, draw_scale
 from heelstrike.view.drawing import body, extent, leg_labels
@@ -73,7 +73,7 @@ def draw_snapshots(excerpt: Excerpt) -> Figure:
     return figure
 
 
-def _usual_rows(run: Run, times: NDArray[np.float64]) -> NDArray[np.int64]:
+def _usual_rows(run: Run, times: Floats) -> Integers:
     """Rows at the given times, but the impacts' ones: after the first, before the last."""
     usual = np.flatnonzero(~impact_rows(run))
     if not len(usual):

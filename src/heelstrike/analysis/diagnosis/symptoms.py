@@ -27,6 +27,7 @@ from heelstrike.analysis.tracking import reference_motion
 from heelstrike.analysis.wrenches import sole_points
 from heelstrike.dynamics import leg_joints
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.sole import has_length, soles
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.run import Run
@@ -34,7 +35,6 @@ from heelstrike.sim.run import Run
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 SLOW = 1e-3
@@ -216,7 +216,7 @@ class Walk:
         return pushing_feet(self.run)
 
     @cached_property
-    def edge(self) -> NDArray[np.int64]:
+    def edge(self) -> Integers:
         """What each foot stands on, (nt, nf): its sole, its toe or heel, or nothing.
 
         Feet without a length stand on what they have.

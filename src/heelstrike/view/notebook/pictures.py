@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import link_poses
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.view.drawing import Skeleton, body, extent
 from heelstrike.view.style import FOOT_COLORS, GREY, INK, PALE
-
-Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT = 420.0, 190.0
 """Largest picture, in pixels."""
