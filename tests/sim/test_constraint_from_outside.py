@@ -167,7 +167,8 @@ def test_a_biped_in_a_harness_does_not_fall() -> None:
     begin = robot.reference_state()
     high = float(begin.q[1]) + 0.5
     held = hs.constrained(robot, Cable("trunk", float(begin.q[0]), high, 0.6))
-    found = hs.simulate(held, state=begin, duration=1.5, stop_when_fallen=False)
+    pushed = hs.State(begin.q, np.concatenate(([1.0, 0.0, 1.0], np.zeros(6))))
+    found = hs.simulate(held, state=pushed, duration=1.5, stop_when_fallen=False)
     assert found.completed, found.message
     reach = np.hypot(found.position[:, 0] - begin.q[0], found.position[:, 1] - high)
     assert reach.max() < 0.6 + 1e-6

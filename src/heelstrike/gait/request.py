@@ -226,6 +226,11 @@ def _profiles(profile: ClearanceProfile | str | None, impact: bool) -> tuple[Cle
 def _mirror_of(robot: Robot) -> Mirror:
     """Return the mirror image of a robot that can walk, or refuse another."""
     name = f"robot {robot.name!r}"
+    if robot.constraints:
+        raise GaitError(
+            f"{name} is held by constraints from outside, of which no gait knows: design the gait "
+            "for the robot without them"
+        )
     if not robot.floating:
         raise GaitError(
             f"{name} has no floating trunk: its first three coordinates must be the trunk's x, z "
