@@ -64,6 +64,7 @@ def usual() -> dict[str, dict[str, Any]]:
         "Trial": {**walked, "controller": law, "step_length": 0.3, "step_duration": 0.7},
         "WholeBody": on_a_gait,
         "compare": {**walked, "methods": [hs.TimeStepping()], "duration": 0.1},
+        "constrained": {"robot": robot},
         "contact_forward_dynamics": {**there, "torque": np.zeros(robot.nu)},
         "contact_inverse_dynamics": {**there, "acceleration": np.zeros(robot.nv)},
         "contact_kinematics": there,
@@ -99,9 +100,10 @@ def usual() -> dict[str, dict[str, Any]]:
 RESULTS = """ActiveContacts Batch DisturbanceResponse Floquet Gait Largest LimitCycle Monodromy
 PhasedGait Robot Run Snapshot StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
-TOLD_APART = """Bundle EndOfRun GaitLQR SteppingConstraints VirtualConstraints
+TOLD_APART = """Bundle Constraint EndOfRun GaitLQR GroundShape SteppingConstraints VirtualConstraints
 ZeroMomentPointRegulation array builtin_robots cell controller number part watch"""
-"""Declarations of controllers, laws and the viewer, whose own tests have this."""
+"""Declarations of controllers, laws, classes to derive from, and the viewer, whose own tests have
+this."""
 WRONG = ("0.5", None, object(), ["a"], {"a": 1}, 1j, b"x", [[1, [2]]], 2.5, hs.load_robot)
 
 

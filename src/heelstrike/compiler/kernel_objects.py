@@ -32,7 +32,7 @@ class KernelObject:
     asked: ClassVar[dict[str, str]]
     """Names of the kernels that it must have, and their arguments for messages."""
 
-    entry: ClassVar[Callable[..., Callable[..., Any]]]
+    _entry: ClassVar[Callable[..., Callable[..., Any]]]
     """Makes what loops call: of ``numbers_at``, which turns an address into ``self``, and of the
     kernels."""
 
@@ -126,7 +126,7 @@ def _bundle_of(kind: Any, names: tuple[str, ...], whole: tuple[bool, ...]) -> ty
 def _compiled(kind: Any, numbers: Any) -> SeparateKernel:
     """Return the kernels of a class as loops call them, with the address of numbers."""
     kernels = [getattr(kind, name) for name in kind.asked]
-    call: Any = kind.entry(bundle_at(numbers), *kernels)
+    call: Any = kind._entry(bundle_at(numbers), *kernels)
     # Machine code is kept beside the file of the class, under the name of its first kernel.
     place = kernels[0].py_func
     call.__module__, call.__name__ = place.__module__, place.__name__

@@ -81,7 +81,7 @@ class GroundShape(KernelObject):
         return number(types.int64, types.int64, number, number, normal)
 
     @staticmethod
-    def entry(numbers_at: Any, height: Any) -> Callable[..., float]:
+    def _entry(numbers_at: Any, height: Any) -> Callable[..., float]:
         """Make what loops call."""
 
         def ask(address: int, what: int, x: float, z: float, normal: Floats) -> float:

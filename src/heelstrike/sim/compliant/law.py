@@ -115,7 +115,7 @@ class NormalLaw(ContactLaw):
     """
 
     forces = NormalForces
-    entry = staticmethod(_press)
+    _entry = staticmethod(_press)
 
 
 class FrictionLaw(ContactLaw):
@@ -128,7 +128,7 @@ class FrictionLaw(ContactLaw):
     """
 
     forces = FrictionForces
-    entry = staticmethod(_rub)
+    _entry = staticmethod(_rub)
 
     @property
     def joint_speed(self) -> float:

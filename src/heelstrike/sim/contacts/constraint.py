@@ -96,7 +96,7 @@ class Constraint(KernelObject):
         return types.int64(types.int64, model, tree, vector, vector, vector, matrix, vector)
 
     @staticmethod
-    def entry(numbers_at: Any, rows: Any) -> Callable[..., int]:
+    def _entry(numbers_at: Any, rows: Any) -> Callable[..., int]:
         """Make what loops call."""
 
         def write(
