@@ -100,8 +100,9 @@ def usual() -> dict[str, dict[str, Any]]:
 RESULTS = """ActiveContacts Batch DisturbanceResponse Floquet Gait Largest LimitCycle Monodromy
 PhasedGait Robot Run Snapshot StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
-TOLD_APART = """Bundle Constraint EndOfRun GaitLQR GroundShape SteppingConstraints VirtualConstraints
-ZeroMomentPointRegulation array builtin_robots cell controller number part watch"""
+TOLD_APART = """Bundle Constraint EndOfRun GaitLQR GroundShape SteppingConstraints
+VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell controller number part
+watch"""
 """Declarations of controllers, laws, classes to derive from, and the viewer, whose own tests have
 this."""
 WRONG = ("0.5", None, object(), ["a"], {"a": 1}, 1j, b"x", [[1, [2]]], 2.5, hs.load_robot)
