@@ -24,7 +24,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numba.extending import typeof_impl
 
-from heelstrike.compiler.bundle_type import WORD_BYTES, BundleType, Fixed, bundle_type
+from heelstrike.compiler.bundle_type import WORD_BYTES, BundleType, bundle_type
 from heelstrike.field_texts import FieldTexts
 
 _EXTENT = re.compile(r"(?:(\d+)\s*)?([A-Za-z]\w*)?(?:\s*\+\s*(\d+))?")
@@ -343,14 +343,8 @@ class Bundle:
         return bundle
 
     @classmethod
-    def compiled_type(cls, fixed: Fixed = ()) -> BundleType:
+    def compiled_type(cls) -> BundleType:
         """Return its type to Numba.
-
-        Parameters
-        ----------
-        fixed : tuple of str and int
-            Extents and whole numbers, of the bundle or its parts, that are these in all bundles
-            that the code will be called with.
 
         Returns
         -------
@@ -358,7 +352,7 @@ class Bundle:
             The type.
         """
         kind: Any = cls
-        return bundle_type(kind, fixed)
+        return bundle_type(kind)
 
     @property
     def extents(self) -> dict[str, int]:

@@ -97,8 +97,19 @@ class DocumentedNumba:
             min(settings.OPT, self.level)
         )  # an integer that Numba asks questions
 
-    def entry(self, compiled: Any, signature: Any) -> Callable[..., Any]:  # noqa: ARG002
-        """Return what may be called with arguments of exactly the right types."""
+    def loop(
+        self,
+        signature: Any,
+        function: Callable[..., Any],
+        fixed: Any,  # noqa: ARG002
+    ) -> Callable[..., Any]:
+        """Return what may be called with arguments of exactly the right types.
+
+        By documented names nothing can be put in that is `fixed`; without it code is larger.
+        """
+        compiled = self.kept(function)
+        self.compile(lambda: compiled.compile(signature))
+        compiled.disable_compile()
         entry: Callable[..., Any] = compiled
         return entry
 
