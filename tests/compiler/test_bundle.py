@@ -251,8 +251,10 @@ def test_code_may_take_extents_and_numbers_for_granted() -> None:
     chain = Chain(mode=2, angle=np.zeros(3), loose=np.zeros(5))
     yard = Yard(chain=chain)
     yard.ends = 4
-    kinds = Yard.compiled_type(), Yard.compiled_type((("links", 7), ("mode", 9), ("ends", 1)))
-    usual, fixed = (loop_for(types.int64(kind), describe) for kind in kinds)
+    signature = types.int64(Yard.compiled_type())
+    usual = loop_for(signature, describe)
+    fixed = loop_for(signature, describe, (("links", 7), ("mode", 9), ("ends", 1), ("strange", 1)))
+    more = loop_for(signature, describe, (("ends", 8),))
     assert usual(yard) == 4000 + 200 + 30 + 5
     assert fixed(yard) == 4000 + 900 + 70 + 3  # made for others than this one
-    assert Yard.compiled_type((("strange", 1),)) is kinds[0]
+    assert more(yard) == 4000 + 200 + 30 + 17  # 2 ends + 1
