@@ -8,7 +8,6 @@ from typing import Any
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.clearance import ClearanceProfile
@@ -17,8 +16,7 @@ from heelstrike.gait.request import Request
 from heelstrike.gait.starts import Start
 from heelstrike.gait.transcription import Group, Row, Transcription
 from heelstrike.interruption import deferred_interrupts
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 CONVERGED = 1e-8
 """Tolerance of IPOPT on scaled constraints and optimality."""
