@@ -10,7 +10,7 @@ import hashlib
 import os
 from collections.abc import Sequence
 from functools import cache
-from importlib.util import find_spec
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
@@ -67,19 +67,13 @@ def program_digest(rooms: Sequence[str], package: str) -> bytes:
     package : str
         Package from elsewhere, which is not imported for it: that takes longer than the rest.
     """
-    digest = hashlib.sha256(f"{_installed(package)} {np.__version__}".encode())
+    try:
+        other = version(package)
+    except PackageNotFoundError:  # installed without a word about itself
+        other = "of unknown version"
+    digest = hashlib.sha256(f"{other} {np.__version__}".encode())
     for room in rooms:
         place = Path(__file__).parent / room
         for file in sorted(place.rglob("*.py")) or [place.with_suffix(".py")]:
             digest.update(file.read_bytes())
     return digest.digest()
-
-
-def _installed(package: str) -> str:
-    """Say which version of a package is installed, by the names of files: to ask takes longer."""
-    spec = find_spec(package)
-    if spec is None or spec.origin is None:
-        return "not found"
-    begins = Path(spec.origin)
-    names = (each.name for each in begins.parents[1].glob(f"{package}-*.dist-info"))
-    return f"{sorted(names)} {begins.stat().st_mtime_ns}"
