@@ -52,7 +52,7 @@ def calls(robot: hs.Robot, gait: hs.Gait) -> dict[str, float]:
     def ahead(steps: int) -> Callable[[], object]:
         return lambda: going.advance(going.time + steps * STEP)
 
-    few, many = (_least(ahead(n), 400, lambda: going.restore(kept)) for n in (8, 72))
+    few, many = (_least(ahead(n), 150) for n in (8, 72))
     a_step = (many - few) / 64
     one = _least(lambda: hs.simulate(robot, law, duration=STEP, **setup), 400)
     return {
@@ -67,13 +67,9 @@ def calls(robot: hs.Robot, gait: hs.Gait) -> dict[str, float]:
     }
 
 
-def _least(
-    call: Callable[[], object], times: int, before: Callable[[], object] | None = None
-) -> float:
+def _least(call: Callable[[], object], times: int) -> float:
     best = float("inf")
     for _ in range(times):
-        if before is not None:
-            before()
         begin = perf_counter()
         call()
         best = min(best, perf_counter() - begin)
