@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,7 +50,7 @@ def test_what_is_rare_has_the_loop_that_knows_it() -> None:
     assert taken_for_granted(robot, hs.Ground(slope=0.1), method)
     assert not taken_for_granted(robot, PROFILE, method)
     assert not taken_for_granted(robot, hs.Ground(), TimeStepping(scheme=hs.Scheme.MOREAU_JEAN))
-    rubbing = robot.model.replaced(dry_friction=np.full(robot.nv, 0.5))
+    rubbing = replace(robot, model=robot.model.replaced(dry_friction=np.full(robot.nv, 0.5)))
     work = work_of(method, robot)
     assert fixed_for(rubbing, hs.Ground().model(), work, method.usual_numbers) == ()
 
