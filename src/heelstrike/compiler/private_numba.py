@@ -131,9 +131,11 @@ class PrivateNumba(DocumentedNumba):
         loaded = compiled._cache.rebuilt(
             compiled.targetctx, dumps(_parts(compiled.get_compile_result(signature)))
         )
+        raw = _unfinished(outer, no_cpython_wrapper=False)
+        loop = self.compile(lambda: _loop(raw, compiled._cache, signature, ()))
         expected = np.ones(3)
         wanted = _outer(_inner)(expected, 3)
-        for call in (compiled, loaded.entry_point, self.loop(signature, outer, ())):
+        for call in (compiled, loaded.entry_point, loop):
             found = np.ones(3)
             if call(found, 3) != wanted or found.tobytes() != expected.tobytes():
                 raise ArithmeticError("a small kernel does not compute what Python computes")
