@@ -45,8 +45,8 @@ def _call(number: int, arguments: tuple[Any, ...]) -> Any:
     return _by_number[int(number)](*arguments)
 
 
-def _compiled_for(signature: Any, function: Any, **options: Any) -> Any:
-    del signature, options
+def _compiled_for(signature: Any, function: Any, *fixed: Any, **options: Any) -> Any:
+    del signature, fixed, options
     return _twin(function)
 
 

@@ -99,6 +99,16 @@ def test_a_cast_can_be_cast_copied_and_replaced() -> None:
     assert copy.front.turns == 70
 
 
+def test_python_makes_the_members_that_it_is_asked_for() -> None:
+    cast = Mold(a_cart()).cast()
+    assert roll(cast) == 10  # compiled code finds all of them
+    assert not {"load", "first", "front"} & set(vars(cast))
+    front = cast.front
+    assert cast.front is front
+    assert (front.turns, front.rim.tolist()) == (4, [3.0, 2.0])
+    assert not hasattr(cast, "wings")
+
+
 class Watched(Bundle):
     seen: Wheel = part(Wheel)
     rim: np.ndarray = array("rim", address=True)

@@ -19,18 +19,21 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 from numba.extending import typeof_impl
 
-from heelstrike.compiler.bundle_type import WORD_BYTES, BundleType, Fixed, bundle_type
+from heelstrike.compiler.bundle_type import WORD_BYTES, BundleType, bundle_type
 from heelstrike.field_texts import FieldTexts
 
 _EXTENT = re.compile(r"(?:(\d+)\s*)?([A-Za-z]\w*)?(?:\s*\+\s*(\d+))?")
 
 # Names of no members: where a bundle keeps what is its own, and an argument of `allocate`.
-_TAKEN = ("_cells", "_floats", "_ints", "_extents", "_block", "_places", "_table", "dtype")
+_TAKEN = (
+    "_cells", "_floats", "_ints", "_extents", "_block", "_places", "_table", "_late", "_stored",
+    "dtype",
+)  # fmt: skip
 
 _Some = TypeVar("_Some", bound="Bundle")
 
@@ -271,6 +274,16 @@ class Bundle:
         for name in members:
             raise TypeError(f"{type(self).__name__} has no {name}")
 
+    if not TYPE_CHECKING:  # what a class declares is all there is
+
+        def __getattr__(self, name: str) -> Any:
+            """Make a member that was not asked for before, of a bundle that was cast in a mold."""
+            late = self.__dict__.get("_late")
+            made = None if late is None else late(name)
+            if made is None:
+                raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
+            return self.__dict__.setdefault(name, made)
+
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in self._cell_names:
             raise AttributeError(f"{type(self).__name__}.{name} is no cell, and stays what it is")
@@ -343,14 +356,8 @@ class Bundle:
         return bundle
 
     @classmethod
-    def compiled_type(cls, fixed: Fixed = ()) -> BundleType:
+    def compiled_type(cls) -> BundleType:
         """Return its type to Numba.
-
-        Parameters
-        ----------
-        fixed : tuple of str and int
-            Extents and whole numbers, of the bundle or its parts, that are these in all bundles
-            that the code will be called with.
 
         Returns
         -------
@@ -358,7 +365,7 @@ class Bundle:
             The type.
         """
         kind: Any = cls
-        return bundle_type(kind, fixed)
+        return bundle_type(kind)
 
     @property
     def extents(self) -> dict[str, int]:
@@ -386,7 +393,7 @@ class Bundle:
                 words.append(cells)
                 cells += WORD_BYTES
                 continue
-            value = own[name]
+            value = getattr(self, name)
             if name in places:
                 words += [begin + places[name], *value.shape]
             elif member.role == "array":

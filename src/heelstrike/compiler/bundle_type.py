@@ -30,6 +30,9 @@ _WORD = ir.IntType(64)
 Fixed = tuple[tuple[str, int], ...]
 """Extents and whole numbers by name that compiled code takes for granted: it is made for them."""
 
+_EXTENT = "heelstrike.extent."
+_KNOWN = ir.FunctionType(_WORD, [_WORD] * 3)
+
 
 class BundleType(types.Type):
     """Type of a bundle; each class of bundles has a class of types of its own.
@@ -44,13 +47,11 @@ class BundleType(types.Type):
         Members that can be set.
     places : dict of str to int
         Where in the table a member begins.
-    fixed : dict of str to int
-        Extents and numbers that are constants of the code.
     """
 
-    def __init__(self, cls: Any, fixed: Fixed = ()) -> None:
-        self.cls, self.fixed = cls, dict(fixed)
-        self.members = {name: _member_type(each, fixed) for name, each in cls.declared.items()}
+    def __init__(self, cls: Any) -> None:
+        self.cls = cls
+        self.members = {name: _member_type(each) for name, each in cls.declared.items()}
         self.cells = {name for name, member in cls.declared.items() if member.role == "cell"}
         self.extents: dict[str, tuple[str, int]] = {}
         self.places: dict[str, int] = {}
@@ -61,7 +62,7 @@ class BundleType(types.Type):
             for dimension, extent in enumerate(member.shape):
                 if extent in cls.named:
                     self.extents[extent] = (name, dimension)
-        described = repr((self.members, sorted(self.cells), self.extents, *fixed))
+        described = repr((self.members, sorted(self.cells), self.extents))
         # The name goes into every symbol of the machine code: short, but never that of another.
         digest = hashlib.sha256(described.encode()).hexdigest()[:12]
         super().__init__(name=f"{cls.__name__}_{digest}")
@@ -88,12 +89,9 @@ class BundleType(types.Type):
         """Read a member or an extent. Arrays carry no reference count."""
         if name in self.cells:
             return builder.load(self.cell(context, builder, table, name))
-        is_number = name in self.extents or self.cls.declared[name].role == "number"
-        if is_number and name in self.fixed:
-            return ir.Constant(_WORD, self.fixed[name])
         if name in self.extents:
             member, dimension = self.extents[name]
-            return _word(builder, table, self.places[member] + 1 + dimension)
+            return _known(builder, _word(builder, table, self.places[member] + 1 + dimension), name)
         place, member = self.places[name], self.members[name]
         word = _word(builder, table, place)
         if isinstance(member, BundleType):
@@ -101,11 +99,11 @@ class BundleType(types.Type):
         if member == types.float64:
             return builder.bitcast(word, ir.DoubleType())
         if not isinstance(member, types.Array):
-            return word
+            return _known(builder, word, name)
         shape = [
-            ir.Constant(_WORD, factor * self.fixed[extent] + more)
-            if extent in self.fixed
-            else _word(builder, table, place + 1 + i)
+            _known(builder, _word(builder, table, place + 1 + i), extent, factor, more)
+            if extent
+            else ir.Constant(_WORD, more)
             for i, (factor, extent, more) in enumerate(self.cls.declared[name].extents)
         ]
         strides = [ir.Constant(_WORD, WORD_BYTES)]
@@ -125,28 +123,12 @@ class BundleType(types.Type):
         return made._getvalue()
 
 
-def bundle_type(cls: Any, fixed: Fixed = ()) -> BundleType:
-    """Return the type of a class of bundles, of those alone that have what is fixed."""
-    return _bundle_type(cls, tuple((name, value) for name, value in fixed if name in _sizes(cls)))
-
-
-@cache
-def _sizes(cls: Any) -> frozenset[str]:
-    """Names of the extents and whole numbers of a class and of its parts."""
-    names = set(cls.extent_names)
-    for name, member in cls.declared.items():
-        if member.role == "part":
-            names |= _sizes(member.kind)
-        elif member.role == "number" and member.kind is int:
-            names.add(name)
-    return frozenset(names)
-
-
 @cache  # for good: a type made anew would be another, and machine code for it compiled again
-def _bundle_type(cls: Any, fixed: Fixed) -> BundleType:
+def bundle_type(cls: Any) -> BundleType:
+    """Return the type of a class of bundles."""
     kind: type[BundleType] = type(cls.__name__, (BundleType,), {})
     register_model(kind)(_BundleModel)
-    made = kind(cls, fixed)
+    made = kind(cls)
     _made.append(made)
     numba_in_use().declare(made)
     return made
@@ -161,9 +143,9 @@ def _named(name: str) -> Any:
     return next((each for each in reversed(_made) if each.name == name), types.Opaque(name))
 
 
-def _member_type(member: Any, fixed: Fixed) -> Any:
+def _member_type(member: Any) -> Any:
     if member.role == "part":
-        return bundle_type(member.kind, fixed)
+        return bundle_type(member.kind)
     scalar = types.float64 if member.kind is float else types.int64
     return types.Array(scalar, len(member.shape), "C") if member.role == "array" else scalar
 
@@ -225,6 +207,34 @@ def _word(builder: Any, table: Any, place: int) -> Any:
     value = builder.load(builder.gep(table, [ir.Constant(_WORD, place)], inbounds=True))
     value.set_metadata("invariant.load", builder.module.add_metadata([]))
     return value
+
+
+def _known(builder: Any, word: Any, name: str, factor: int = 1, more: int = 0) -> Any:
+    """Return a word that is so many times an extent or number, and some more.
+
+    It goes through a function of that name, which returns it as it is, until
+    :func:`definitions` put another in its place.
+    """
+    module = builder.module
+    function = module.globals.get(_EXTENT + name)
+    if function is None:
+        function = ir.Function(module, _KNOWN, _EXTENT + name)
+        function.linkage = "linkonce_odr"
+        function.attributes.add("alwaysinline")
+        ir.IRBuilder(function.append_basic_block()).ret(function.args[0])
+    return builder.call(function, [word, ir.Constant(_WORD, factor), ir.Constant(_WORD, more)])
+
+
+def definitions(fixed: Fixed) -> str:
+    """Return the functions, as a module of LLVM, by which extents and numbers are constants."""
+    return "\n".join(
+        f"""define i64 @"{_EXTENT}{name}"(i64 %word, i64 %factor, i64 %more) alwaysinline {{
+  %product = mul i64 %factor, {value}
+  %sum = add i64 %product, %more
+  ret i64 %sum
+}}"""
+        for name, value in fixed
+    )
 
 
 @lower_setattr_generic(BundleType)

@@ -13,7 +13,7 @@ import types
 import warnings
 from collections.abc import Callable, Mapping
 from functools import cache, cached_property, partial, update_wrapper
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numba
 from numba import njit
@@ -21,6 +21,9 @@ from numba.extending import typeof_impl
 
 from heelstrike.compiler.documented_numba import OPTIONS, DocumentedNumba
 from heelstrike.compiler.fingerprint import is_ours as is_ours
+
+if TYPE_CHECKING:
+    from heelstrike.compiler.bundle_type import Fixed
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -151,12 +154,22 @@ def compiled_for(signature: Any, function: Function, *, boundscheck: bool = Fals
     return result
 
 
-def loop_for(signature: Any, function: Function) -> Function:
+def loop_for(signature: Any, function: Function, fixed: Fixed = ()) -> Function:
     """Compile a kernel like :func:`compiled_for`, to be called without a look at its arguments.
 
     Only for loops whose arguments this package makes: anything but the right types crashes.
+
+    Parameters
+    ----------
+    signature : numba signature
+        Types of the result and the arguments.
+    function : callable
+        The kernel.
+    fixed : tuple of str and int
+        Extents and whole numbers that are these in all bundles that it will be called with. They
+        are put in last: loops that differ in them alone are but one until they are optimised.
     """
-    entry: Any = numba_in_use().entry(compiled_for(signature, function), signature)
+    entry: Any = numba_in_use().loop(signature, function, fixed)
     loop: Function = entry
     return loop
 

@@ -18,7 +18,7 @@ from numba import cfunc, config, njit
 from numba.extending import intrinsic, overload_attribute, overload_method
 
 from heelstrike.compiler import kept_code
-from heelstrike.compiler.fingerprint import fingerprint
+from heelstrike.compiler.fingerprint import fingerprint_after
 from heelstrike.interruption import kept_interrupts
 
 Result = TypeVar("Result")
@@ -50,7 +50,8 @@ class DocumentedNumba:
 
     def made_of(self, function: Callable[..., Any]) -> str:
         """Return the fingerprint of a kernel and of what compiles it."""
-        return fingerprint(function, *self.settings(), *map(import_module, self.shaping))
+        shaping = tuple(map(import_module, self.shaping))
+        return fingerprint_after((*self.settings(), *shaping), function)
 
     def settings(self) -> list[str]:
         """Return what Numba is set to: code for a profiler is beside that for others."""
@@ -97,8 +98,19 @@ class DocumentedNumba:
             min(settings.OPT, self.level)
         )  # an integer that Numba asks questions
 
-    def entry(self, compiled: Any, signature: Any) -> Callable[..., Any]:  # noqa: ARG002
-        """Return what may be called with arguments of exactly the right types."""
+    def loop(
+        self,
+        signature: Any,
+        function: Callable[..., Any],
+        fixed: Any,  # noqa: ARG002
+    ) -> Callable[..., Any]:
+        """Return what may be called with arguments of exactly the right types.
+
+        By documented names nothing can be put in that is `fixed`; without it code is larger.
+        """
+        compiled = self.kept(function)
+        self.compile(lambda: compiled.compile(signature))
+        compiled.disable_compile()
         entry: Callable[..., Any] = compiled
         return entry
 

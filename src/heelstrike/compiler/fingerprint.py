@@ -37,13 +37,24 @@ _HAS_DOCSTRING = 0x4000000  # since Python 3.13
 
 def fingerprint(*parts: Any) -> str:
     """Return the fingerprint of kernels, functions, classes, constants and modules."""
-    account = _Account()
-    for part in parts:
-        if isinstance(part, types.ModuleType):
-            account.add_module(part.__name__)
-        else:
-            account.add(part)
+    return fingerprint_after((), *parts)
+
+
+def fingerprint_after(before: tuple[Any, ...], *parts: Any) -> str:
+    """Return the fingerprint of some parts and more, of which the first are looked at once.
+
+    They are many, and the same for all kernels. What they are made of must not change.
+    """
+    account = _account(before).copy()
+    account.add_parts(parts)
     return account.digest()
+
+
+@functools.lru_cache(8)
+def _account(parts: tuple[Any, ...]) -> _Account:
+    account = _Account()
+    account.add_parts(parts)
+    return account
 
 
 def is_ours(function: Any) -> bool:
@@ -60,6 +71,20 @@ class _Account:
 
     def digest(self) -> str:
         return self._digest.hexdigest()
+
+    def copy(self) -> _Account:
+        """Return another that goes on from here."""
+        other = _Account()
+        other._digest, other._known = self._digest.copy(), self._known.copy()
+        return other
+
+    def add_parts(self, parts: tuple[Any, ...]) -> None:
+        """Add parts; of a module, what it defines."""
+        for part in parts:
+            if isinstance(part, types.ModuleType):
+                self.add_module(part.__name__)
+            else:
+                self.add(part)
 
     def add(self, value: Any) -> None:
         """Add a value that is known by a name."""

@@ -2,12 +2,14 @@
 
 To lay a bundle out takes a look at every member of every part, a hundred times as long as to copy
 what comes of it. Simulations begin with the same memory again and again: laid out once, it is cast
-for each.
+for each. Compiled code finds members by the tables of a cast; Python makes those that it is asked
+for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -26,9 +28,13 @@ class _Shape(NamedTuple):
     table: int
     cells: int
     cell_count: int
-    arrays: list[tuple[str, tuple[int, ...], np.dtype[Any], int]]
-    parts: list[tuple[str, _Shape]]
+    arrays: dict[str, tuple[tuple[int, ...], np.dtype[Any], int]]
+    parts: dict[str, _Shape]
     shared: dict[str, Any]
+
+
+Layout = tuple[tuple[str, tuple[int, ...], np.dtype[Any]], ...]
+"""Names, shapes and kinds of the arrays of a bundle."""
 
 
 class Mold(Generic[_Some]):
@@ -54,11 +60,14 @@ class Mold(Generic[_Some]):
             if not self._is_own(value):
                 shape.shared[name] = value
             elif isinstance(value, Bundle):
-                shape.parts.append((name, self._of(value)))
+                shape.parts[name] = self._of(value)
             else:
-                shape.arrays.append((name, value.shape, value.dtype, self._place(value)))
+                shape.arrays[name] = value.shape, value.dtype, self._place(value)
         self._block = np.concatenate(self._words)
         self._pointers = np.array(list(self._lay_tables(self._shape)), dtype=np.int64)
+        layout, places = written_to(_cast(self._shape, self._block, 0))
+        places[:, 0] -= address_of_array(self._block)
+        self._stored = layout, places
 
     def cast(self) -> _Some:
         """Return another bundle, as the one laid out was when the mold was made of it."""
@@ -66,27 +75,27 @@ class Mold(Generic[_Some]):
         begin = address_of_array(block)
         block[self._pointers] += begin
         made: _Some = _cast(self._shape, block, begin)
+        made.__dict__["_stored"] = *self._stored, begin
         return made
 
     def _of(self, bundle: Bundle) -> _Shape:
-        own = bundle.__dict__
-        arrays, parts, shared = [], [], {"_extents": bundle.extents}
-        addressed = []
+        arrays, parts, addressed = {}, {}, []
+        shared: dict[str, Any] = {"_extents": bundle.extents}
         for name, member in bundle.declared.items():
             if member.role == "cell":
                 continue
-            value = own[name]
+            value = getattr(bundle, name)
             if member.role == "part" and not member.address:
-                parts.append((name, self._of(value)))
+                parts[name] = self._of(value)
             elif member.role == "array" and not member.address and value.flags.writeable:
-                arrays.append((name, value.shape, value.dtype, self._place(value)))
+                arrays[name] = value.shape, value.dtype, self._place(value)
             elif member.role == "part" or (member.role == "array" and value.flags.writeable):
                 addressed.append((name, value))
             else:
                 shared[name] = value
         table = WORD_BYTES * self._size
         self._append(bundle.table)
-        cells = own["_cells"]
+        cells = bundle.__dict__["_cells"]
         place = self._place(cells)
         shape = _Shape(type(bundle), table, place, cells.size, arrays, parts, shared)
         self._addressed += [(shape, name, value) for name, value in addressed]
@@ -111,8 +120,8 @@ class Mold(Generic[_Some]):
 
     def _lay_tables(self, shape: _Shape) -> Iterator[int]:
         """Write where members come to lie into the tables; yield where there are addresses."""
-        begins = {name: begin for name, _, _, begin in shape.arrays}
-        begins |= {name: part.table for name, part in shape.parts}
+        begins = {name: begin for name, (_, _, begin) in shape.arrays.items()}
+        begins |= {name: part.table for name, part in shape.parts.items()}
         place, cells = shape.table // WORD_BYTES, shape.cells
         for name, member in shape.kind.declared.items():
             if member.role == "cell":
@@ -121,7 +130,7 @@ class Mold(Generic[_Some]):
                 self._block[place] = begins[name]
                 yield place
             place += 1 + len(member.shape)
-        for _, part in shape.parts:
+        for part in shape.parts.values():
             yield from self._lay_tables(part)
 
 
@@ -138,8 +147,36 @@ def _cast(shape: _Shape, block: NDArray[np.int64], begin: int) -> Any:
     own.update(shape.shared)
     own["address"] = begin + shape.table
     own["_cells"] = np.ndarray(shape.cell_count, np.int64, block, shape.cells)
-    for name, extents, numbers, place in shape.arrays:
-        own[name] = np.ndarray(extents, numbers, block, place)
-    for name, part in shape.parts:
-        own[name] = _cast(part, block, begin)
+    own["_late"] = partial(_member, shape, block, begin)
     return bundle
+
+
+def _member(shape: _Shape, block: NDArray[np.int64], begin: int, name: str) -> Any:
+    """Make an array or a part of a cast, None if it has none of that name."""
+    if name in shape.arrays:
+        extents, numbers, place = shape.arrays[name]
+        return np.ndarray(extents, numbers, block, place)
+    return _cast(shape.parts[name], block, begin) if name in shape.parts else None
+
+
+def written_to(bundle: Bundle) -> tuple[Layout, NDArray[np.int64]]:
+    """Return the arrays behind a bundle that can be written to, and where they are.
+
+    Returns
+    -------
+    layout : tuple
+        Name, shape and kind of each: the same tuple for all casts of a mold.
+    places : (n, 2) int
+        Address of each, and its words.
+    """
+    stored = bundle.__dict__.get("_stored")
+    if stored is not None:
+        layout, offsets, begin = stored
+        return layout, offsets + np.array((begin, 0))
+    arrays = [(name, each) for name, each in bundle.storage() if each.flags.writeable]
+    places = [(address_of_array(array), array.size) for _, array in arrays]
+    made = tuple((name, array.shape, array.dtype) for name, array in arrays)
+    return _LAYOUTS.setdefault(made, made), np.array(places, dtype=np.int64).reshape(-1, 2)
+
+
+_LAYOUTS: dict[Layout, Layout] = {}

@@ -7,6 +7,7 @@ Numba optimises every function, turns it into machine code, and does so again in
 calls it. For kernels nested six deep that is a third of the time to compile. Here a kernel that
 only other kernels call stays an unfinished module until an outer kernel has taken in everything it
 needs and is optimised as a whole, once. Another fifth goes into asking what ``a + b`` may mean.
+Loops that differ in constants alone are the same unfinished module, and optimised one by one.
 
 The next Numba may know these names no more, or mean something else by them;
 :meth:`PrivateNumba.test` finds out.
@@ -19,13 +20,14 @@ import importlib
 import pickle
 import re
 import sys
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from llvmlite.binding import parse_assembly
+from llvmlite.binding import parse_assembly, parse_bitcode
 from numba import TypingError, njit, types
 from numba.core.caching import NullCache
 from numba.core.cgutils import normalize_ir_text
@@ -42,6 +44,7 @@ from numba.core.untyped_passes import InlineClosureLikes
 from numba.np import linalg
 
 from heelstrike.compiler import kept_code
+from heelstrike.compiler.bundle_type import Fixed, definitions
 from heelstrike.compiler.documented_numba import (
     OPTIONS,
     DocumentedNumba,
@@ -61,9 +64,7 @@ class PrivateNumba(DocumentedNumba):
 
     def part(self, function: Callable[..., Any], *, dissolved: bool) -> Any:
         """Return a kernel without machine code of its own; it counts no references."""
-        options = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-        options["forceinline"] = dissolved
-        return njit(**options, pipeline_class=_InnerKernelCompiler)(function)
+        return _unfinished(function, no_cpython_wrapper=True, forceinline=dissolved, _nrt=False)
 
     def kept(
         self, function: Callable[..., Any], *, boundscheck: bool = False, separate: bool = False
@@ -84,12 +85,16 @@ class PrivateNumba(DocumentedNumba):
             stack.enter_context(no_garbage_collection())
             return call()
 
-    def entry(self, compiled: Any, signature: Any) -> Callable[..., Any]:
+    def loop(
+        self, signature: Any, function: Callable[..., Any], fixed: Fixed
+    ) -> Callable[..., Any]:
         """Return what may be called with arguments of exactly the right types.
 
         Numba compares the types of all arguments with those it compiled for, at every call.
         """
-        entry: Callable[..., Any] = compiled.overloads[tuple(signature.args)].entry_point
+        compiled = _unfinished(function, no_cpython_wrapper=False)
+        cache = _Cache(compiled, self.made_of(function), self.settings())
+        entry: Callable[..., Any] = self.compile(lambda: _loop(compiled, cache, signature, fixed))
         return entry
 
     def separate(
@@ -118,15 +123,19 @@ class PrivateNumba(DocumentedNumba):
         name, key = "private_numba.tested", bytes.fromhex(self.made_of(_inner))
         if kept_code.read(places, name, key) is not None:
             return
-        compiled = self.kept(_outer(self.part(_inner, dissolved=False)))
+        outer = _outer(self.part(_inner, dissolved=False))
+        compiled = self.kept(outer)
         compiled._cache.places = []
         signature = types.float64(types.float64[::1], types.int64)
         self.compile(lambda: compiled.compile(signature))
-        result = compiled.get_compile_result(signature)
-        loaded = CompileResult._rebuild(compiled.targetctx, *pickle.loads(dumps(result._reduce())))
+        loaded = compiled._cache.rebuilt(
+            compiled.targetctx, dumps(_parts(compiled.get_compile_result(signature)))
+        )
+        raw = _unfinished(outer, no_cpython_wrapper=False)
+        loop = self.compile(lambda: _loop(raw, compiled._cache, signature, ()))
         expected = np.ones(3)
         wanted = _outer(_inner)(expected, 3)
-        for call in (compiled, self.entry(compiled, signature), loaded.entry_point):
+        for call in (compiled, loaded.entry_point, loop):
             found = np.ones(3)
             if call(found, 3) != wanted or found.tobytes() != expected.tobytes():
                 raise ArithmeticError("a small kernel does not compute what Python computes")
@@ -163,6 +172,12 @@ class _UnfinishedLibrary(JITCodeLibrary):
                 self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
         self._finalized = True
+
+    def serialize_using_object_code(self) -> tuple[str, str, bytes]:
+        """What is kept of it: object code there is none."""
+        self._ensure_finalized()
+        bitcode: bytes = self._final_module.as_bitcode()
+        return self.name, "unfinished", zlib.compress(bitcode, 1)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -212,6 +227,68 @@ class _InnerKernelCompiler(CompilerBase):
         return [pipeline]
 
 
+def _unfinished(function: Callable[..., Any], **more: bool) -> Any:
+    """Return a function that Numba compiles up to an unfinished module."""
+    options = OPTIONS | {"no_cfunc_wrapper": True} | more
+    return njit(**options, pipeline_class=_InnerKernelCompiler)(function)
+
+
+def _loop(compiled: Any, cache: _Cache, signature: Any, fixed: Fixed) -> Any:
+    """Load a loop, or finish what there is of it with its constants; return what is called."""
+    asked, context = (signature, fixed), compiled.targetctx
+    code = cache.read(asked)
+    if code is None:
+        raw = cache.read(signature)
+        if raw is None:
+            compiled.compile(signature)
+            raw = dumps(compiled.get_compile_result(signature)._reduce())
+            cache.write(signature, raw)
+        code = dumps(_finished(context.codegen(), pickle.loads(raw), fixed))
+        cache.write(asked, code)
+    return cache.rebuilt(context, code).entry_point
+
+
+def _finished(codegen: Any, parts: tuple[Any, ...], fixed: Fixed) -> tuple[Any, ...]:
+    """Put constants into an unfinished module and optimise it; return the parts of its result.
+
+    All its functions are its own but the one that Python calls, whose name is that of no other:
+    those of loops with other constants compute something else.
+    """
+    (name, _, bitcode), about, *more = parts
+    module = parse_bitcode(zlib.decompress(bitcode))
+    constants = parse_assembly(definitions(fixed))
+    constants.triple, constants.data_layout = module.triple, module.data_layout
+    module.link_in(constants)
+    entry = about.llvm_cpython_wrapper_name
+    own = hashlib.sha256(repr(fixed).encode()).hexdigest()[:12]
+    for function in module.functions:
+        if function.name == entry:
+            function.name = f"{entry}_{own}"
+        elif not function.is_declaration:
+            function.linkage = "internal"
+    about.mangled_name = f"{about.mangled_name}_{own}"
+    library = codegen.create_library(f"{name}_{own}")
+    library._final_module = module
+    library._optimize_final_module()
+    library._final_module.verify()
+    code = codegen._tm.emit_object(library._final_module), _names_alone([f"{entry}_{own}"])
+    return (library.name, "object", code), about, *more
+
+
+def _parts(result: Any) -> tuple[Any, ...]:
+    """Return what a result is made of, without the bitcode for others to take in: nobody does."""
+    (name, kind, (code, _)), *more = result._reduce()
+    names = [each.name for each in result.library.get_defined_functions()]
+    return (name, kind, (code, _names_alone(names))), *more
+
+
+def _names_alone(names: list[str]) -> bytes:
+    """Return bitcode from which Numba knows which functions there are."""
+    empty = "\n".join(f'define void @"{name}"() {{ ret void }}' for name in names)
+    bitcode: bytes = parse_assembly(empty).as_bitcode()
+    return bitcode
+
+
 class _Cache(NullCache):
     """Machine code on disk that is good for exactly what the kernel is made of.
 
@@ -245,37 +322,45 @@ class _Cache(NullCache):
         Numba first loads all that it could compile with, which takes as long as to import it. What
         kernels of this package need to run is the bare runtime.
         """
+        found = self.read(signature)
+        result = None if found is None else self.rebuilt(context, found)
+        if result is None:
+            _load_numba()
+            return None
+        # Of types that only look alike Numba would not find it, and would load it at every call.
+        asked, _ = normalize_signature(signature)
+        return result if result.signature.args == asked else None
+
+    def rebuilt(self, context: Any, code: bytes) -> Any:
+        """Return what can be called, made of what is kept; None if that calls what is not here."""
         _load_numba()
         if self._is_ours:
             rtsys.initialize(context)
         else:
             context.refresh()
-        found = self.read(signature)
-        if found is None:
-            return None
         try:
-            parts = pickle.loads(found)
+            parts = pickle.loads(code)
         except (AttributeError, ImportError):  # it calls kernels of modules that are not here now
             return None
-        result = CompileResult._rebuild(context, *parts)
-        # Of types that only look alike Numba would not find it, and would load it at every call.
-        asked, _ = normalize_signature(signature)
-        return result if result.signature.args == asked else None
+        return CompileResult._rebuild(context, *parts)
 
-    def read(self, signature: Any) -> bytes | None:
-        """Return what is kept for a signature, if there is something."""
-        return kept_code.read(self.places, *self._name_and_key(signature))
+    def read(self, asked: Any) -> bytes | None:
+        """Return what is kept for a signature, or for one with constants."""
+        return kept_code.read(self.places, *self._name_and_key(asked))
+
+    def write(self, asked: Any, code: bytes) -> None:
+        """Keep it for a signature, or for one with constants."""
+        kept_code.write(self.places, *self._name_and_key(asked), code)
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Keep machine code, unless it is good for this process only."""
         if result.library.has_dynamic_globals or any(not loop.can_cache for loop in result.lifted):
             return
-        name, key = self._name_and_key(signature)
-        kept_code.write(self.places, name, key, dumps(result._reduce()))
+        self.write(signature, dumps(_parts(result)))
 
-    def _name_and_key(self, signature: Any) -> tuple[str, bytes]:
+    def _name_and_key(self, asked: Any) -> tuple[str, bytes]:
         """Name of the file, which the next version of the kernel takes over, and what it is for."""
-        kind = f"{signature!r} {self._kind}"
+        kind = f"{asked!r} {self._kind}"
         place = hashlib.sha256(kind.encode()).hexdigest()[:16]
         name = f"{self._name}.{place}.{sys.implementation.cache_tag}.machine_code"
         return name, hashlib.sha256(f"{self._made_of} {kind}".encode()).digest()

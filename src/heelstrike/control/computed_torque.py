@@ -8,7 +8,6 @@ those that do this while the ground holds the stance foot; see
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import ArrayLike
 
 from heelstrike.arguments import check_fields
@@ -290,11 +289,13 @@ def pitch_of(robot: Robot) -> int:
 
 def _check_reach(robot: Robot) -> None:
     """Refuse a robot of which closed loops and motors leave joints free."""
+    from scipy.linalg import null_space  # robots without loops begin sooner without
+
     joints = np.arange(3, robot.nv)
     at = robot.closed(robot.reference_state())
     motors = np.eye(robot.nv)[robot.model.actuator_joint]
     told = np.concatenate([loop_jacobian(robot, at.q), motors])[:, joints]
-    free = scipy.linalg.null_space(told, rcond=UNREACHED)
+    free = null_space(told, rcond=UNREACHED)
     if free.size:
         names = ", ".join(
             robot.joint_names[j] for j in joints[np.abs(free).max(axis=1) > UNREACHED]

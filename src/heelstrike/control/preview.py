@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import solve_discrete_are
 
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
@@ -114,6 +113,8 @@ def preview_control(
     ControllerError
         If a number is not positive.
     """
+    from scipy.linalg import solve_discrete_are
+
     given = {
         "height": height, "period": period, "error_weight": error_weight,
         "jerk_weight": jerk_weight, "gravity": gravity, "horizon": horizon,

@@ -15,13 +15,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import LinAlgError, null_space, solve_continuous_are, solve_discrete_are
-from scipy.signal import cont2discrete
 
 from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.contact import ContactInverseDynamics, contact_inverse_dynamics, contact_kinematics
 from heelstrike.control.arguments import must_be, numbers_of, positive, weights_of
+from heelstrike.control.zero_order_hold import over_an_interval
 from heelstrike.dynamics import linearize, loop_displacement, loop_jacobian
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
@@ -99,6 +98,8 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
         If no contact point touches the ground, the posture cannot be held there, or nothing of the
         robot can move.
     """
+    from scipy.linalg import null_space
+
     refuse_loops(robot, "a regulator of standing", ControllerError, loops=False)
     if not robot.nu:
         raise ControllerError(f"robot {robot.name!r} has no motors to stand by")
@@ -248,6 +249,8 @@ def _regulator(
     robot: Robot, linear: LinearStanding, cost: Floats, effort: Floats, period: float | None
 ) -> tuple[Floats, NDArray[np.complex128]]:
     """Gains of the regulator and poles of the closed loop."""
+    from scipy.linalg import solve_continuous_are, solve_discrete_are
+
     A, B = linear.A, linear.B
     try:
         if period is None:
@@ -255,11 +258,11 @@ def _regulator(
             gain = np.linalg.solve(effort, B.T @ value)
             poles = np.linalg.eigvals(A - B @ gain)
         else:
-            A, B, *_ = cont2discrete((A, B, np.eye(len(A)), np.zeros(B.shape)), period)
+            A, B = over_an_interval(A, B, period)
             value = solve_discrete_are(A, B, period * cost, period * effort)
             gain = np.linalg.solve(period * effort + B.T @ value @ B, B.T @ value @ A)
             poles = np.log(np.linalg.eigvals(A - B @ gain).astype(complex)) / period
-    except (LinAlgError, ValueError) as error:
+    except (np.linalg.LinAlgError, ValueError) as error:
         raise ControllerError(
             f"no regulator makes robot {robot.name!r} stand in this posture: its motors do not "
             f"reach what falls, or weights leave it without cost ({error})"

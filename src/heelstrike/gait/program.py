@@ -8,7 +8,6 @@ from typing import Any
 
 import casadi
 import numpy as np
-import scipy.sparse.linalg
 
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.clearance import ClearanceProfile
@@ -268,6 +267,8 @@ class Program:
 
     def polished(self, unknowns: Floats) -> Floats:
         """Satisfy the equations to rounding, by the least change of the unknowns."""
+        import scipy.sparse.linalg
+
         x = casadi.MX.sym("x", self.size)
         exact = np.flatnonzero(self._lower == self._upper).tolist()
         residual = self._evaluated(x)[1][exact] - casadi.DM(self._lower[exact])

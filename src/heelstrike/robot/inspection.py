@@ -20,7 +20,6 @@ from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.looks import is_file
 from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.reading import read_bodies, read_mjcf
-from heelstrike.robot.files.saving.mjcf import body_links
 from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS, builtin_robots, load_robot
 from heelstrike.robot.loops import coupling_words, latch_words
 from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats, label
@@ -181,6 +180,8 @@ def _of_robot(robot: Robot) -> Iterator[Finding]:
 
 def _missing_masses(robot: Robot) -> Iterator[Finding]:
     """Find massless links that are bodies of their own, and do not only carry a second joint."""
+    from heelstrike.robot.files.saving.mjcf import body_links  # brings all that reads files along
+
     for link in body_links(robot):
         if robot.model.mass[link] == 0.0:
             yield Finding(

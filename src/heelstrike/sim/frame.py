@@ -230,8 +230,8 @@ def compiled_loop(kernels: Kernels, work: Any, fixed: Fixed = ()) -> tuple[Any, 
     """Compile the loop of a method, or load it; return it with the seconds that took."""
     begin = perf_counter()
     kinds = (Model, GroundModel, Control, Memory, work, Record, Clock)
-    signature = types.int64(*(kind.compiled_type(fixed) for kind in kinds))
+    signature = types.int64(*(kind.compiled_type() for kind in kinds))
     try_solvers.begin()
-    compiled = loop_for(signature, frame(kernels))
+    compiled = loop_for(signature, frame(kernels), fixed)
     try_solvers.finish()
     return compiled, perf_counter() - begin

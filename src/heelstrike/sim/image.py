@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -14,13 +15,11 @@ from numpy.typing import NDArray
 from heelstrike.compiler.bundle import Bundle, address_of_array
 from heelstrike.compiler.bundle_type import WORD_BYTES
 from heelstrike.compiler.compilation import loop_for
+from heelstrike.compiler.mold import Layout, written_to
 from heelstrike.compiler.words import copy_between
 from heelstrike.robot.model import Integers
 
 Arrays = dict[str, NDArray[Any]]
-Layout = tuple[tuple[str, tuple[int, ...], np.dtype[Any]], ...]
-
-_LAYOUTS: dict[Layout, Layout] = {}
 
 
 class Image(NamedTuple):
@@ -52,15 +51,10 @@ class Camera:
     """
 
     def __init__(self, bundles: Iterable[tuple[str, Bundle]]) -> None:
-        named = [each for prefix, bundle in bundles for each in bundle.storage(prefix)]
-        named = [(name, array) for name, array in named if array.flags.writeable]
-        layout = tuple((name, array.shape, array.dtype) for name, array in named)
-        self._layout = _LAYOUTS.setdefault(layout, layout)
-        self.names = tuple(name for name, _ in named)
-        self._arrays = tuple(array for _, array in named)
-        places = [(address_of_array(array), array.size) for array in self._arrays]
-        self._places = np.array(places, dtype=np.int64).reshape(-1, 2)
-        self._ends = np.cumsum(self._places[:, 1]).tolist()
+        prefixes, self._bundles = zip(*bundles, strict=True)
+        layouts, places = zip(*map(written_to, self._bundles), strict=True)
+        self._places = np.concatenate(places)
+        self._layout, self.names, self._ends = _together(prefixes, layouts)
 
     def take(self) -> Image:
         """Take an image."""
@@ -101,6 +95,25 @@ class Camera:
             for (_, shape, kind), begin in zip(self._layout, begins, strict=False)
         )
         return Image(self._layout, words, arrays)
+
+
+def _together(
+    prefixes: tuple[str, ...], layouts: tuple[Layout, ...]
+) -> tuple[Layout, tuple[str, ...], list[int]]:
+    """Return layouts as one, its names, and where each of its arrays ends, in words."""
+    of = prefixes, tuple(map(id, layouts))
+    if of not in _KNOWN:
+        each = list(zip(prefixes, layouts, strict=True))
+        layout = tuple(
+            (prefix + name, shape, kind) for prefix, all_of in each for name, shape, kind in all_of
+        )
+        ends = np.cumsum([math.prod(shape) for _, shape, _ in layout]).tolist()
+        _KNOWN[of] = (layout, tuple(name for name, _, _ in layout), ends), layouts
+    return _KNOWN[of][0]
+
+
+_KNOWN: dict[Any, Any] = {}
+"""By prefixes and layouts, which are kept: their ids must stay theirs."""
 
 
 @cache

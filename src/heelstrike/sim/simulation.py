@@ -15,6 +15,7 @@ import numpy as np
 
 from heelstrike.arguments import refusal, takes
 from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.mold import Mold
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import ControllerError, SimulationError
@@ -67,6 +68,8 @@ FAR = 1e300
 LAID = 1e-6
 
 _OUTCOMES = tuple(Outcome)
+_USUAL = TimeStepping()
+_CLOCK = Mold(Clock())
 
 CAN_GO_ON = (RunStatus.COMPLETED, RunStatus.INTERRUPTED)
 
@@ -225,12 +228,9 @@ class Simulation:
         put_on(self.robot, setting.braked, setting.state, HOLDS, self._memory)
         self._work = work_of(method, self.robot)
         rows, events = method.room(self.robot)
-        self._clock = Clock(
-            record_every=setting.record_every,
-            fallen_height=setting.fallen_height,
-            row_margin=rows,
-            event_margin=events,
-        )
+        self._clock = clock = _CLOCK.cast()
+        clock.record_every, clock.fallen_height = setting.record_every, setting.fallen_height
+        clock.row_margin, clock.event_margin = rows, events
         method.set_clock(setting, self._clock)
         for bundle in (self._memory, self._work, self._clock, setting.ground.model()):
             _ = bundle.address  # laid out now, not while the loop is timed
@@ -748,7 +748,8 @@ class Simulation:
         self._name: str = f"{type(controller).__name__}.torque"
         self._decides = _place(type(controller) if law is None else law.function.python)
         self._decides += " (voltages)" if voltage else ""
-        self._shown: Contacts = read_only(memory.contacts)
+        if python is not None:
+            self._shown: Contacts = read_only(memory.contacts)
         if law is not None:
             self._name = f"controller {law.function.name!r}"
         self._take_gains(law, voltage)
@@ -1080,7 +1081,7 @@ def check_duration(duration: float) -> None:
 def checked_method(method: Method | None) -> Method:
     """Return a way through time, time stepping if none is asked for, or refuse what is none."""
     if method is None:
-        return TimeStepping()
+        return _USUAL
     if isinstance(method, UnknownMethod):
         raise SimulationError(
             f"{method.name} is here as data only, as its file tells of it; load the run with the "

@@ -22,6 +22,7 @@ from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows, draw_scale
 from heelstrike.view.drawing import body, extent, leg_labels
+from heelstrike.view.milestones import Milestones
 from heelstrike.view.style import (
     FORCE_COLOR,
     GREY,
@@ -134,16 +135,14 @@ class Film:
         self._clock = axes.text(
             0.02, 0.97, "", transform=axes.transAxes, va="top", fontsize=1.3 * font, color=INK
         )
-        self._metres = [
-            axes.text(0.0, 0.0, "", ha="center", va="top", fontsize=0.9 * font, color=GREY)
-            for _ in range(int(np.ptp(self._x)) + 2)
-        ]
+        self._metres = Milestones(0.9 * font)
+        axes.add_artist(self._metres)
         self._speed = "" if speed == 1.0 else f"   (speed × {speed:g})"
         self._legend(figure, run, font)
         self._moving: list[Artist] = [
             self._soil,
             self._marks,
-            *self._metres,
+            self._metres,
             self._robot,
             self._arrows.shafts,
             self._arrows.heads,
@@ -211,12 +210,8 @@ class Film:
         height = np.asarray(self._ground.height(marks)) - camera[1]
         top = np.column_stack((marks - camera[0], height))
         self._marks.set_segments(list(np.stack((top, top - np.outer(tall, [0.0, 1.0])), axis=1)))
-        for label in self._metres:
-            label.set_text("")
-        whole = np.flatnonzero(marks == np.round(marks))
-        for label, mark in zip(self._metres, whole, strict=False):
-            label.set_text(f"{marks[mark]:.0f} m".replace("-", "−"))
-            label.set_position(top[mark] - [0.0, 0.035 * self._size])
+        whole = marks == np.round(marks)
+        self._metres.show(marks[whole], top[whole] - [0.0, 0.035 * self._size])
 
     def _legend(self, figure: Figure, run: Run, font: float) -> None:
         lines, dots = leg_labels(run.robot), [("o", ORANGE, "centre of mass")]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import qr
 
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.linearized.slopes import along_the_ground, contact_slopes
@@ -91,6 +90,8 @@ class Chart:
     """
 
     def __init__(self, standing: Standing, origin: Floats, scale: Floats | None = None) -> None:
+        from scipy.linalg import qr  # not needed to simulate
+
         self._standing, self._origin = standing, origin
         scale = np.ones(len(origin)) if scale is None else scale
         gradient = standing.gradient(origin) / scale

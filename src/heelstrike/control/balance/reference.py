@@ -10,7 +10,6 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from heelstrike.compiler.bundle import Bundle, array, number
 from heelstrike.compiler.compilation import kernel
@@ -119,6 +118,8 @@ def reference_of(robot: Robot, gait: Gait) -> Reference:
 
 def _cubics(phases: Floats, values: Floats) -> Floats:
     """Coefficients of a spline, (pieces, ..., 4), in the part of each piece that has gone by."""
+    from scipy.interpolate import CubicSpline  # takes half a second to import
+
     spline = CubicSpline(phases, values)
     width = (phases[1] - phases[0]) ** np.arange(4)
     coefficients = np.moveaxis(spline.c[::-1], 0, -1) * width

@@ -17,9 +17,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.linalg import block_diag, expm
-from scipy.signal import cont2discrete
 
 from heelstrike import dynamics
 from heelstrike.contact import (
@@ -31,6 +28,7 @@ from heelstrike.contact.linearized.slopes import both, contact_slopes, exchanged
 from heelstrike.contact.linearized.strikes import strikes
 from heelstrike.control.computed_torque import pitch_of
 from heelstrike.control.gait_lqr.riccati import over_all_steps
+from heelstrike.control.zero_order_hold import over_an_interval
 from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.gait.gait import Gait
@@ -145,10 +143,14 @@ class FlatOrbit:
         Those of torques that follow at once, in the middles of `FINE` even intervals; or, of
         `count` intervals over each of which torques are held, at their beginnings.
         """
+        from scipy.linalg import block_diag
+
         number, nx = FINE if count is None else count, len(cost)
         both, width = block_diag(cost, effort), self.gait.step_duration / number
         moves = [
-            (*_held(A, B, width), width * both) if count is None else _sampled(A, B, both, width)
+            (*over_an_interval(A, B, width), width * both)
+            if count is None
+            else _sampled(A, B, both, width)
             for A, B in self.between(number)
         ]
         gains = np.zeros((number, len(effort), nx))
@@ -169,11 +171,13 @@ class FlatOrbit:
 
         The torques follow at once, or are held over each interval.
         """
+        from scipy.linalg import expm
+
         width = self.gait.step_duration / len(gains)
         moved = np.eye(len(self.jump))
         for (A, B), gain in zip(self.between(len(gains)), gains, strict=True):
             if held:
-                grown, pushed = _held(A, B, width)
+                grown, pushed = over_an_interval(A, B, width)
                 moved = (grown - pushed @ gain) @ moved
             else:
                 moved = expm(width * (A - B @ gain)) @ moved
@@ -181,6 +185,8 @@ class FlatOrbit:
 
     def between(self, count: int) -> list[tuple[Floats, Floats]]:
         """A and B in the middles of even intervals."""
+        from scipy.interpolate import CubicSpline
+
         middles = (np.arange(count) + 0.5) * self.gait.step_duration / count
         A, B = (
             CubicSpline(self.time, np.array(each))(middles)
@@ -238,17 +244,14 @@ class FlatOrbit:
         return float(np.abs(self.stance.after(q, v) - begin).max())
 
 
-def _held(A: Floats, B: Floats, width: float) -> tuple[Floats, Floats]:
-    """What an interval makes of errors, and of torques that are held over it."""
-    return cont2discrete((A, B, A, 0.0 * B), width)[:2]
-
-
 def _sampled(A: Floats, B: Floats, price: Floats, width: float) -> tuple[Floats, Floats, Floats]:
     """The same, and what errors at its beginning and torques cost until its end.
 
     All three are blocks of one exponential (C. F. Van Loan 1978, *Computing integrals involving the
     matrix exponential*, IEEE Transactions on Automatic Control 23(3)).
     """
+    from scipy.linalg import expm
+
     (nx, nu), size = B.shape, len(price)
     still = np.vstack([np.hstack([A, B]), np.zeros((nu, size))])
     found = expm(width * np.block([[-still.T, price], [np.zeros((size, size)), still]]))

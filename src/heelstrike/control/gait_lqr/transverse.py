@@ -19,10 +19,10 @@ solution the jump takes from the beginning of a step to the end of the one befor
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.linalg import null_space
 
 from heelstrike.contact import ActiveContacts, linearize_contact
 from heelstrike.contact.linearized.slopes import both, contact_slopes, exchanged, following
@@ -31,6 +31,9 @@ from heelstrike.control.gait_lqr.orbit import Orbit, contacts_of
 from heelstrike.control.gait_lqr.riccati import over_all_steps
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 STEPS, FINE = 256, 2048
 """Steps of the classical Runge-Kutta method a period: for gains, and for what comes of them."""
@@ -55,6 +58,8 @@ class Transverse:
     @classmethod
     def of(cls, orbit: Orbit, steps: int = STEPS) -> Transverse:
         """Find them at so many steps."""
+        from scipy.linalg import null_space
+
         first, last = orbit.q.first, orbit.q.last
         theta = np.linspace(first, last, 2 * steps + 1)
         size = orbit.gait.robot.nv - 2
@@ -70,6 +75,8 @@ class Transverse:
 
     def regulator(self, cost: Floats, effort: Floats) -> CubicSpline:
         """Gains (nu, 2 p) of the least cost over the phase."""
+        from scipy.interpolate import CubicSpline
+
         cheap = np.linalg.inv(effort)
         costs = self.pace[:, None, None] * (self.basis.T @ cost @ self.basis)
         pushes = self.B @ cheap @ np.moveaxis(self.B, 1, 2) / self.pace[:, None, None]

@@ -16,7 +16,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from heelstrike.dynamics.queries.loops import loop_jacobian
@@ -65,9 +64,11 @@ def drive_of(robot: Robot) -> Drive:
                 f"{', '.join([*robot.loop_names, *robot.coupling_names])} bind them to each other."
             )
         return Drive(driven, (), ())
+    from scipy.linalg import qr  # for robots with such joints alone
+
     names = ", ".join(robot.joint_names[j] for j in following)
     jacobian = loop_jacobian(robot, robot.closed(robot.reference_state()).q)
-    own, order = scipy.linalg.qr(jacobian[:, following].T, mode="r", pivoting=True)
+    own, order = qr(jacobian[:, following].T, mode="r", pivoting=True)
     size = np.abs(np.diag(own))
     rank = int(np.sum(size > INDEPENDENT * size.max(initial=0.0)))
     whole = int(np.linalg.matrix_rank(jacobian, tol=INDEPENDENT * max(size.max(initial=1.0), 1.0)))

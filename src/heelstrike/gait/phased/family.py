@@ -14,8 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq
 
 from heelstrike import dynamics
 from heelstrike.contact.ground import Ground
@@ -96,6 +94,8 @@ class Postures:
             )
         x = 2.0 * (theta - theta[0]) / (theta[-1] - theta[0]) - 1.0
         joints = q[:, robot.model.actuator_joint]
+        from scipy.interpolate import CubicSpline  # takes half a second to import
+
         slopes = CubicSpline(x, joints).derivative()(np.array([-1.0, 1.0]))
         return replace(
             gait,
@@ -295,4 +295,6 @@ def _equal_shift(postures: Postures, slope: float, most: float, level: float) ->
             f"no shift of the hips up to {ends[1]:.3g} m keeps the energy of the walk of robot "
             f"{postures.gait.robot.name!r} on a slope of {slope:.3g}; ask for a smaller slope"
         )
+    from scipy.optimize import brentq  # takes half a second to import
+
     return float(brentq(missing, *ends, xtol=1e-4))

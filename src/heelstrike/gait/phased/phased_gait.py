@@ -8,13 +8,13 @@ walkers*, IEEE Transactions on Automatic Control 48(1).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev
 from numpy.typing import ArrayLike
-from scipy.special import comb
 
 from heelstrike import dynamics
 from heelstrike.arguments import check_fields
@@ -128,12 +128,11 @@ class PhasedGait:
             )
         degree = points.shape[1] - 1
         order = np.arange(degree + 1)
+        choices = np.array([math.comb(degree, each) for each in order])
 
         def bezier(x: Floats) -> Floats:
             s = 0.5 * (x[:, None] + 1.0)
-            curve: Floats = (
-                comb(degree, order) * s**order * (1.0 - s) ** (degree - order)
-            ) @ points.T
+            curve: Floats = (choices * s**order * (1.0 - s) ** (degree - order)) @ points.T
             return curve
 
         return cls(

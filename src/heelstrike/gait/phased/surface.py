@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from scipy.optimize import brentq
 
 from heelstrike import dynamics
 from heelstrike.arguments import takes
@@ -187,6 +186,8 @@ class Surface:
                 f"the gait: at θ = {last:.6g} rad it is {self.swing_gap(last):.4g} m above the "
                 "ground"
             )
+        from scipy.optimize import brentq  # takes half a second to import
+
         place = min(down, key=lambda k: abs(phases[k] - last))
         return float(
             brentq(self.swing_gap, phases[place], phases[place + 1], xtol=1e-15, rtol=1e-15)

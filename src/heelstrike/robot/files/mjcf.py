@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from heelstrike.robot.assembly import LARGEST_NUMBER, assembled
-from heelstrike.robot.contact_points import of_model, read_contact_points
+from heelstrike.robot.contact_points import of_model
 from heelstrike.robot.files.actuators import read_actuators
+from heelstrike.robot.files.contact_points import read_contact_points
 from heelstrike.robot.files.joint_numbers import read_joint_numbers
 from heelstrike.robot.files.links import read_links, read_loops
 from heelstrike.robot.files.mujoco_file import MujocoFile, parse

@@ -2,7 +2,8 @@
 
 A file from elsewhere is parsed by :mod:`heelstrike.reader_process`, where it cannot hurt. What is
 asked there and answered is JSON. Answers are kept on disk with all that was looked at for them, and
-hold as long as that is the same; so do those for the built-in robots, which are read here.
+hold as long as that is the same; so do those for the built-in robots, which are read here. What
+reads a file is not imported where an answer is there already.
 """
 
 from __future__ import annotations
@@ -22,12 +23,9 @@ from heelstrike.errors import RobotError
 from heelstrike.kept_files import kept_file, make_room, program_digest
 from heelstrike.reader_process import READER, ReadingError
 from heelstrike.robot.files.looks import Looks, noting, same
-from heelstrike.robot.files.mjcf import planar_robot
-from heelstrike.robot.files.mujoco_file import stated_bodies
 from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.packages import FOLDERS
 from heelstrike.robot.files.robot_json import robot_entries, robot_of_entries
-from heelstrike.robot.files.ros.xacro import expanded
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import RobotWarning, warn
@@ -137,6 +135,9 @@ def answer(order: bytes) -> bytes:
 
 def _found(asked: _Order) -> dict[str, Any]:
     """What is found in a file, as JSON holds it."""
+    from heelstrike.robot.files.mjcf import planar_robot
+    from heelstrike.robot.files.mujoco_file import stated_bodies
+
     options = Options(**asked.options)
     source = Path(asked.path) if asked.path is not None else asked.text or ""
     found: dict[str, Any] = {"error": None, "robot": None, "bodies": None}
@@ -163,6 +164,8 @@ def _order(
     path = source if isinstance(source, Path) else None
     text = None if isinstance(source, Path) else source
     if path is not None and options.arguments is not None:
+        from heelstrike.robot.files.ros.xacro import expanded
+
         text = expanded(path, options.arguments, options.packages, str(path))
     return _Order(
         path=None if path is None else str(path),

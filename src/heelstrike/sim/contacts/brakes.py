@@ -141,6 +141,8 @@ def put_on(robot: Robot, wanted: Sequence[bool], state: State, how: int, memory:
     that is an impact (``PUT_ON``).
     """
     model, loops = robot.model, memory.loops
+    if not len(model.brake_joint):
+        return
     for brake, joint in enumerate(model.brake_joint):
         slips = model.brake_limit[brake] < np.inf
         if not wanted[brake]:

@@ -129,6 +129,8 @@ def latches_at(
         If a joint has no latch, or is not at the end where its latch would hold it.
     """
     model = robot.model
+    if latched is None and not model.latches:
+        return ()
     end = np.where(model.latch_side > 0, model.upper[model.latch_joint], 0.0)
     end = np.where(model.latch_side < 0, model.lower[model.latch_joint], end)
     there = np.abs(state.q[model.latch_joint] - end) <= AT_THE_END

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
+import numba
 import numpy as np
 
 from heelstrike.robot.model import SELDOM
@@ -153,7 +153,7 @@ def _attributes(run: Run) -> dict[str, Any]:
         "compile_s": run.timing.compile_s,
         "wall_s": run.timing.wall_s,
         "error": _writable(error),
-        **{f"{name}_version": _version(name) for name in ("heelstrike", "numpy", "numba")},
+        **{f"{name}_version": number for name, number in _versions().items()},
     }
 
 
@@ -162,12 +162,7 @@ def _writable(text: str) -> str:
     return text.encode("utf-8", "backslashreplace").decode("utf-8").replace("\0", "\\0")
 
 
-def _version(package: str) -> str:
-    if package == "heelstrike":
-        from heelstrike import __version__
+def _versions() -> dict[str, str]:
+    from heelstrike import __version__
 
-        return __version__
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "unknown"
+    return {"heelstrike": __version__, "numpy": np.__version__, "numba": numba.__version__}
