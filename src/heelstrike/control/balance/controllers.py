@@ -8,6 +8,7 @@ from math import sqrt
 import numpy as np
 
 from heelstrike.control.arguments import check_gait, must_be, number_of
+from heelstrike.control.balance.constrained import constrained_programs
 from heelstrike.control.balance.footsteps import Planning
 from heelstrike.control.balance.law import keep_balance
 from heelstrike.control.balance.numbers import Legs, Parameters, Weights
@@ -180,6 +181,7 @@ class WholeBody(Law):
             planning=Planning(**planning),
             weights=Weights(**weights),
             legs=_legs(robot, gait, feet),
+            constrained=constrained_programs(robot),
             adapts=int(self.adapts),
             **rest,
         )
