@@ -18,8 +18,6 @@ FEW = 40
 """Arrays and numbers that any kernel may reach: three bundles of a purpose each."""
 
 NOT_YET: dict[str, int] = {
-    "contact.solvers.active_set": 3,
-    "contact.solvers.certified_solve": 2,
     "sim.compliant.corners": 1,
     "sim.compliant.dynamics": 13,
     "sim.compliant.method": 13,
@@ -46,7 +44,6 @@ NOT_YET: dict[str, int] = {
     "sim.event_driven.smooth.saddle_point": 8,
     "sim.event_driven.smooth.watch": 2,
     "sim.record.recording": 6,
-    "sim.time_stepping.impact": 12,
     "sim.time_stepping.method": 15,
 }
 """How many kernels of each module reach more than twice what they use; none may be added."""
