@@ -46,7 +46,15 @@ from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.contacts.rows import POINT, SECOND_FACE, STOP, Rows, lay_out_rows
+from heelstrike.sim.contacts.rows import (
+    CONSTRAINT,
+    POINT,
+    SECOND_FACE,
+    STOP,
+    Rows,
+    lay_out_rows,
+)
+from heelstrike.sim.contacts.writers import rate_of
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import Assembly
 from heelstrike.sim.time_stepping.corners import Corner
@@ -104,7 +112,7 @@ class Impact(Bundle):
 
 def allocate_impact(robot: Robot, *, bounded: bool = False) -> Impact:
     """Allocate what the steps of a robot need, with nothing known yet."""
-    entries = len(lay_out_rows(robot.model).kind)
+    entries = len(lay_out_rows(robot).kind)
     return Impact.allocate(
         nv=robot.nv,
         capacity=entries,
@@ -170,10 +178,11 @@ def stays_wedged(steps: int, impact: Impact) -> bool:
 
 @kernel
 def modes_change(assembly: Assembly, before: Integers) -> bool:
-    """Whether a point or stop opens, closes or slides otherwise than in the step before."""
+    """Whether anything opens, closes or slides otherwise than in the step before."""
     return (
         changes(POINT, assembly, before)
         or changes(STOP, assembly, before)
+        or changes(CONSTRAINT, assembly, before)
         or changes(SECOND_FACE, assembly, before)
     )
 
@@ -283,28 +292,18 @@ def find_members(
 
 @kernel
 def speed_before(
-    model: Model, entry: int, rows: Rows, tree: Workspace, contacts: Contacts, seconds: Contacts
-) -> float:
-    """Normal velocity of a contact point, on either face, as the step begins."""
+    model: Model, entry: int, v: Floats, rows: Rows, tree: Workspace, contacts: Contacts,
+    seconds: Contacts,
+) -> float:  # fmt: skip
+    """Normal velocity of a contact point, on either face, or a constraint, as the step begins."""
+    if rows.kind[entry] == CONSTRAINT:
+        return rate_of(rows.owner[entry], 0, v, rows.outside)
     point = rows.owner[entry]
     if rows.kind[entry] == POINT:
         normal, _ = contact_velocity(model, tree, contacts, point)
     else:
         normal, _ = contact_velocity(model, tree, seconds, point)
     return normal
-
-
-@kernel
-def find_bounces(
-    model: Model, members: int, candidate: Integers, restitution: Floats, rows: Rows,
-    tree: Workspace, contacts: Contacts, seconds: Contacts, member: Integers, bounce: Floats,
-) -> None:  # fmt: skip
-    """Write what restitution asks of each of the members of an impact."""
-    for place in range(members):
-        entry = candidate[member[place]]
-        if restitution[entry] > 0.0:
-            before = speed_before(model, entry, rows, tree, contacts, seconds)
-            bounce[place] = restitution[entry] * before
 
 
 @kernel
