@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import walking
 from mechanisms import parallel_ankles
 
 import heelstrike as hs
@@ -64,3 +65,12 @@ def test_where_loops_hold_pivots_are_searched() -> None:
     robot = parallel_ankles()
     assert not np.any(robot_view(robot).flat_foot)
     assert not np.any(constrained_programs(robot))
+
+
+def test_a_law_keeps_no_addresses() -> None:
+    """It goes to other processes, and to robots whose code is another: addresses are the run's."""
+    law = hs.FootstepFeedback(walking.bravo7(), walking.gait())
+    assert not np.any(law.parameters.constrained)
+    parameters, _ = law.numbers(walking.bravo7())
+    assert np.all(parameters.constrained == constrained_programs(walking.bravo7()))
+    assert np.all(parameters.constrained != 0)

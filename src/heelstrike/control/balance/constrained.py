@@ -8,6 +8,8 @@ they contribute are the columns found here.
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array
@@ -84,13 +86,19 @@ def constrain_tree(
 
 def constrained_programs(robot: Robot) -> Integers:
     """Return the addresses of :func:`constrain_tree` on each foot, zero where there is none."""
-    arguments = flat_foot_arguments(robot) | {
-        "rest": np.setdiff1d(np.arange(robot.nv), robot.model.actuator_joint),
-        "sole": np.zeros(2),
-        "on": Constrained.allocate(nv=robot.nv, nu=robot.nu),
-    }
-    unread = "on.mass", "on.force", "on.columns"
-    return np.array(flat_foot_programs(robot, constrain_tree, arguments, unread), np.int64)
+    if robot not in _PROGRAMS:
+        arguments = flat_foot_arguments(robot) | {
+            "rest": np.setdiff1d(np.arange(robot.nv), robot.model.actuator_joint),
+            "sole": np.zeros(2),
+            "on": Constrained.allocate(nv=robot.nv, nu=robot.nu),
+        }
+        unread = "on.mass", "on.force", "on.columns"
+        found = flat_foot_programs(robot, constrain_tree, arguments, unread)
+        _PROGRAMS[robot] = np.array(found, np.int64)
+    return _PROGRAMS[robot]
+
+
+_PROGRAMS: WeakKeyDictionary[Robot, Integers] = WeakKeyDictionary()
 
 
 @kernel

@@ -7,6 +7,7 @@ from math import sqrt
 
 import numpy as np
 
+from heelstrike.compiler.bundle import Bundle
 from heelstrike.control.arguments import check_gait, must_be, number_of
 from heelstrike.control.balance.constrained import constrained_programs
 from heelstrike.control.balance.footsteps import Planning
@@ -181,7 +182,7 @@ class WholeBody(Law):
             planning=Planning(**planning),
             weights=Weights(**weights),
             legs=_legs(robot, gait, feet),
-            constrained=constrained_programs(robot),
+            constrained=np.zeros(2, np.int64),
             adapts=int(self.adapts),
             **rest,
         )
@@ -195,6 +196,22 @@ class WholeBody(Law):
         }
         super().__init__(keep_balance, parameters, robot=robot, memory=begin)
         self.gait = gait
+
+    def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
+        """Return its parameters, and a memory to begin with, for a robot; all can be set.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot, whose straight-line code goes with the parameters.
+
+        Returns
+        -------
+        tuple of Bundle
+            Parameters and memory.
+        """
+        parameters, memory = super().numbers(robot)
+        return parameters.replaced(constrained=constrained_programs(robot)), memory
 
 
 class FootstepFeedback(WholeBody):
