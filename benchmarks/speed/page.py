@@ -27,11 +27,15 @@ CAPTIONS = {
 }
 
 
+PARTS = ("steps", "stops", "precision", "threads", "scaling", "footprint", "endurance", "laws")
+"""Parts that have a place in the page."""
+
+
 def blocks(results: dict[str, Any], folder: Path) -> Iterator[tuple[str, str]]:
     """Yield the blocks of the page by name."""
     about = words(results["machine"], results["peers"])
     yield "machine", f"Measured {results['date'][:10]} on {about}"
-    for part in ("steps", "precision", "threads", "scaling", "footprint", "endurance", "laws"):
+    for part in PARTS:
         if part not in results:
             continue
         made = list(tables({part: results[part]}))

@@ -16,14 +16,14 @@ from rich.console import Console
 
 from heelstrike.experiments.engines import compared, peers
 from heelstrike.view.style import save_figure
-from speed import endurance, footprint, laws, precision, scaling, steps, threads
+from speed import endurance, footprint, laws, precision, scaling, steps, stops, threads
 from speed.figures import draw
 from speed.machine import machine, words
 from speed.tables import tables
 
 PARTS = {
     each.__name__.rpartition(".")[2]: each
-    for each in (steps, precision, threads, scaling, footprint, endurance, laws)
+    for each in (steps, stops, precision, threads, scaling, footprint, endurance, laws)
 }
 """Parts by name."""
 INTERRUPTED = 130

@@ -57,6 +57,14 @@ def _steps(part: dict[str, Any]) -> Iterator[Table]:
         )
 
 
+def _stops(part: dict[str, Any]) -> Iterator[Table]:
+    yield Table(
+        f"µs a step of {1e3 * part['step_s']:g} ms, best of many, in turn",
+        ["scenario", "µs", "times standing"],
+        [[row["scenario"], number(row["us"]), number(row["times"])] for row in part["rows"]],
+    )
+
+
 def _validity(row: dict[str, Any], name: str) -> str:
     """What makes a run valid, or why it does not count."""
     refused = row.get("invalid") if name == "heelstrike" else row.get(f"{name}_invalid")
@@ -190,6 +198,7 @@ def _laws(part: dict[str, Any]) -> Iterator[Table]:
 
 _MAKERS = {
     "steps": _steps,
+    "stops": _stops,
     "precision": _precision,
     "threads": _threads,
     "scaling": _scaling,

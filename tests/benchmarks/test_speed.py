@@ -82,6 +82,9 @@ def test_the_whole_quick_form(quick: tuple[Path, Any]) -> None:
     assert found["endurance"]["failures"] == 0
     assert found["endurance"]["unfinished"] == 0
     assert found["endurance"]["complementarity"] <= 1e-9
+    names = [row["scenario"] for row in found["stops"]["rows"]]
+    assert "at rest on its stops" in names[1]
+    assert all(row["us"] > 0.0 for row in found["stops"]["rows"])
     assert found["laws"]["a user's"] < found["laws"]["a user's, checked=True"]
     assert set(found["footprint"]["allocations_a_step"].values()) == {0.0}
     memory = found["footprint"]["memory"]

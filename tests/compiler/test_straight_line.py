@@ -187,6 +187,19 @@ def test_what_a_recording_would_take_for_a_constant_is_refused() -> None:
         Recording(Program(counting, {"counted": Counted.allocate(n=1)}))
 
 
+def test_scratch_may_have_cells_and_is_written_nowhere() -> None:
+    def doubling(counted: Counted, x: np.ndarray) -> None:
+        counted.count = x.shape[0]
+        for i in range(counted.count):
+            counted.value[i] = x[i] + x[i]
+            x[i] = counted.value[i]
+
+    arguments = {"counted": Counted.allocate(n=2), "x": np.zeros(2)}
+    recording = Recording(Program(doubling, arguments, scratch=("counted",)))
+    assert [name for name, *_ in recording.written()] == ["x", "x"]
+    assert not recording.left()
+
+
 def constant(number: float) -> ir.Module:
     """Module of a function that writes a number."""
     module = ir.Module("constant")

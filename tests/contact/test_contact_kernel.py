@@ -208,6 +208,28 @@ def test_stops_that_barely_press_or_part_need_no_solver(
         assert caller.residual.max() <= 2e-10
 
 
+@pytest.mark.parametrize("tilt", [1e-5, 1e-4, 1e-3])
+def test_a_row_that_hardly_differs_from_those_before_is_solved_last(tilt: float) -> None:
+    """The toe under a straight leg: what it adds, 1e-10 to 1e-6 of it, another row tells as well.
+
+    Five rows of rank four, of which the third would be divided by that. The answer is the shortest,
+    to the digits that are there, and takes neither the elimination that looks for pivots nor a
+    solver.
+    """
+    e = np.eye(4)
+    root = np.array([e[0], e[1], [0.6, 0.1, tilt, 0.0], e[3], [-0.3, 0.2, 0.9, 0.0], np.zeros(4)])
+    G = root @ root.T
+    impulse = np.append(np.linalg.pinv(root[:5].T) @ (root.T @ [1.0, 0.1, 0.5, 0.1, 0.8, 0.0]), 0.0)
+    caller = Caller()
+    caller.mode[:] = STICK
+    caller.work.sticking.order[:] = -1
+    assert caller.solve(G, -G @ impulse, [0.8, 0.8, 0.0]) == SOLVED
+    np.testing.assert_allclose(caller.impulse[:6], impulse, rtol=0.0, atol=1e-13)
+    assert caller.work.tally.solver == WARM_START
+    assert caller.work.tally.iterations == 0
+    assert np.all(caller.work.sticking.order == -1)
+
+
 @pytest.mark.parametrize("solver", ALL)
 def test_prescribed_sliding(solver: int) -> None:
     """Accelerations: a point that slides forward keeps its friction whatever its acceleration.

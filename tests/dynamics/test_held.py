@@ -54,6 +54,20 @@ def test_a_rod_held_at_its_end_is_a_pendulum() -> None:
     np.testing.assert_allclose(force, [MASS * x, MASS * (z + G)], rtol=1e-13)
 
 
+def test_the_trunks_own_coordinates_follow_a_place() -> None:
+    """Far above it turning moves the place by more than one, and is no better a pivot for that."""
+    robot = rod()
+    held = HeldRobot.on(Evaluation(robot, [0.0, 5.0, 0.3]), [0])
+    assert np.abs(held.rows.rows[:, 2]).max() < 1.0
+    far = HeldRobot(
+        Evaluation(robot, [0.0, 0.0, 0.3]), [Place(2, np.array([0.0, -3.0]), np.zeros(2), 2)]
+    )
+    assert np.abs(far.rows.rows[:, 2]).max() > 1.0
+    for each in (held, far):
+        assert each.rows.coordinate.tolist() == [0, 1]
+        assert each.rows.mix.tolist() == [[1.0, 0.0], [0.0, 1.0]]
+
+
 def test_a_struck_rod_turns_about_the_end_that_stops() -> None:
     """Falling flat at u it turns on at 3u/2L, three quarters of its momentum left to the pivot."""
     robot, speed = rod(), 2.0

@@ -18,8 +18,6 @@ FEW = 40
 """Arrays and numbers that any kernel may reach: three bundles of a purpose each."""
 
 NOT_YET: dict[str, int] = {
-    "contact.solvers.active_set": 3,
-    "contact.solvers.certified_solve": 2,
     "sim.compliant.corners": 1,
     "sim.compliant.dynamics": 14,
     "sim.compliant.method": 13,
@@ -48,7 +46,6 @@ NOT_YET: dict[str, int] = {
     "sim.frame": 1,
     "sim.record.recording": 7,
     "sim.time_stepping.corners": 1,
-    "sim.time_stepping.impact": 12,
     "sim.time_stepping.method": 16,
 }
 """How many kernels of each module reach more than twice what they use; none may be added."""

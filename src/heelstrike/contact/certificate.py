@@ -23,7 +23,7 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
-from heelstrike.contact.sets import INTERVAL, LINE, room
+from heelstrike.contact.sets import INTERVAL, LINE, has_no_tangent, room
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -147,6 +147,8 @@ def certify(
                 else:
                     cone = max(cone, -force)
 
+        if has_no_tangent(problem, contact):
+            continue
         if root[tangent] > 0.0:
             force_scale = root[tangent] * inverse
         else:
@@ -236,6 +238,9 @@ def sum_velocities(problem: ContactProblem, impulse: Floats, velocity: Floats) -
     """Write ``velocity = G impulse + free``."""
     count, delassus, free = problem.count, problem.delassus, problem.free
     for i in range(2 * count):
+        if i % 2 == 1 and has_no_tangent(problem, i // 2):
+            velocity[i] = free[i]
+            continue
         # Friction is summed apart from the normal impulses: the sums run side by side.
         by_normal = free[i]
         by_friction = 0.0

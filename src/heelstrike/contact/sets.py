@@ -38,6 +38,13 @@ class ImpulseSet(enum.IntEnum):
 
 
 @kernel
+def has_no_tangent(problem: ContactProblem, group: int) -> bool:
+    """Whether the second row of a group is empty: that of a stop or a loop."""
+    tangent = 2 * group + 1
+    return problem.set[group] in (HALF_LINE, LINE) and problem.delassus[tangent, tangent] == 0.0
+
+
+@kernel
 def press(group: int, problem: ContactProblem) -> None:
     """Write the normal row of an interval for the solvers, to whom it is the section of a cone.
 

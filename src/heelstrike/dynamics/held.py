@@ -153,26 +153,62 @@ def begin_solving(held: HeldRows) -> None:
 
 
 @kernel
+def take_out(row: int, coordinate: int, other: int, held: HeldRows) -> None:
+    """Take a row that is solved for a coordinate out of another."""
+    rows, mix = held.solved, held.mix
+    ratio = rows[other, coordinate]
+    for j in range(held.row.shape[0]):
+        rows[other, j] -= ratio * rows[row, j]
+    for k in range(held.count):
+        mix[other, k] -= ratio * mix[row, k]
+    rows[other, coordinate] = 0.0
+
+
+@kernel
 def solve_row(row: int, coordinate: int, held: HeldRows) -> None:
     """Solve a row for a coordinate, and take it out of the other rows."""
-    rows, mix, count, size = held.solved, held.mix, held.count, held.row.shape[0]
+    rows, mix, count = held.solved, held.mix, held.count
     inverse = 1.0 / rows[row, coordinate]
-    for j in range(size):
+    for j in range(held.row.shape[0]):
         rows[row, j] = inverse * rows[row, j]
     for k in range(count):
         mix[row, k] = inverse * mix[row, k]
     rows[row, coordinate] = 1.0
     for i in range(count):
-        if i == row:
-            continue
-        ratio = rows[i, coordinate]
-        for j in range(size):
-            rows[i, j] -= ratio * rows[row, j]
-        for k in range(count):
-            mix[i, k] -= ratio * mix[row, k]
-        rows[i, coordinate] = 0.0
+        if i != row:
+            take_out(row, coordinate, i, held)
     held.coordinate[row] = coordinate
     held.row[coordinate] = row
+
+
+@kernel
+def solve_unit_rows(preferred: Integers, held: HeldRows) -> int:
+    """Solve rows for preferred coordinates that they have as they are; return how many.
+
+    So the trunk's x, z and rotation are in the rows of a place: these pivots need no search, and
+    most of the other rows have nothing to take out.
+    """
+    rows, mix, count = held.solved, held.mix, held.count
+    solved = 0
+    for i in range(count):
+        for k in range(preferred.shape[0]):
+            coordinate = preferred[k]
+            entry = rows[i, coordinate]
+            if abs(entry) != 1.0:
+                continue
+            if entry < 0.0:
+                for j in range(held.row.shape[0]):
+                    rows[i, j] = -rows[i, j]
+                for j in range(count):
+                    mix[i, j] = -mix[i, j]
+            for other in range(count):
+                if other != i and rows[other, coordinate] != 0.0:
+                    take_out(i, coordinate, other, held)
+            held.coordinate[i] = coordinate
+            held.row[coordinate] = i
+            solved += 1
+            break
+    return solved
 
 
 @kernel
@@ -189,17 +225,19 @@ def largest_left(coordinate: int, held: HeldRows) -> tuple[float, int]:
 
 @kernel
 def solve_rows(preferred: Integers, held: HeldRows) -> int:
-    """Solve the rows by their largest entries; return their rank.
+    """Solve the rows by their largest entries, or by entries of one; return their rank.
 
     Coordinates that are preferred, those without a motor, are solved for before others.
     """
     count, size = held.count, held.row.shape[0]
     begin_solving(held)
+    rank = solve_unit_rows(preferred, held)
+    if rank == count:
+        return rank
     largest = 0.0
     for i in range(count):
         for j in range(size):
             largest = max(largest, abs(held.rows[i, j]))
-    rank = 0
     for others in range(2):
         while rank < count:
             best = NO_PIVOT * largest

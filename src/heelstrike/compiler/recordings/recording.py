@@ -40,7 +40,8 @@ class Program:
     arguments: Mapping[str, Any]
     """Its arguments in order, bundles and arrays, with their true shapes."""
     scratch: tuple[str, ...] = ()
-    """Arrays, ``argument`` or ``argument.member``, whose contents nobody reads afterwards."""
+    """Arrays, ``argument`` or ``argument.member``, and bundles whose contents nobody reads
+    afterwards."""
     name: str = ""
     """Name of the function that is made of it; else the kernel's."""
 
@@ -53,6 +54,8 @@ class Program:
         parts = [self.name, *self.scratch]
         for name, value in self._members():
             parts.append(name)
+            if isinstance(value, Bundle):  # it does not take part
+                continue
             if not _is_floats(value):
                 parts.append(repr(np.asarray(value).tolist()))
             elif name.split(".")[0] == CONSTANT:
@@ -60,6 +63,10 @@ class Program:
             else:
                 parts.append(repr(value.shape))
         return "\0".join(parts).encode()
+
+    def leaves_unread(self, name: str) -> bool:
+        """Whether nobody reads an array afterwards."""
+        return name in self.scratch or name.split(".")[0] in self.scratch
 
     def _members(self) -> Iterator[tuple[str, Any]]:
         for name, argument in self.arguments.items():
@@ -90,7 +97,7 @@ class Recording:
     Raises
     ------
     TypeError
-        If a bundle has cells.
+        If a bundle has cells that others read.
     """
 
     def __init__(self, program: Program, known: Mapping[str, Symbols] | None = None) -> None:
@@ -100,7 +107,8 @@ class Recording:
         operands: list[Any] = []
         for name, argument in program.arguments.items():
             if isinstance(argument, Bundle):
-                if any(member.role == "cell" for member in argument.declared.values()):
+                cells = any(member.role == "cell" for member in argument.declared.values())
+                if cells and not program.leaves_unread(name):
                     raise TypeError(f"{name} has cells, which a recording would take for constants")
                 members = {
                     member: self._symbols(f"{name}.{member}", value, known or {})
@@ -128,7 +136,7 @@ class Recording:
     def written(self) -> Iterator[tuple[str, int, Any]]:
         """Array, index and value of every entry that the kernel writes for others to read."""
         for name, array in self.arrays.items():
-            if name in self.program.scratch or name.split(".")[0] == CONSTANT:
+            if self.program.leaves_unread(name) or name.split(".")[0] == CONSTANT:
                 continue
             for index, entry in enumerate(array.flat):
                 unchanged = isinstance(entry, Entry) and (entry.array, entry.index) == (name, index)
@@ -140,7 +148,9 @@ class Recording:
         return {
             name: array
             for name, array in self.arrays.items()
-            if "." in name and name.split(".")[0] != CONSTANT and name not in self.program.scratch
+            if "." in name
+            and name.split(".")[0] != CONSTANT
+            and not self.program.leaves_unread(name)
         }
 
 

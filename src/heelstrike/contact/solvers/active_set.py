@@ -26,11 +26,12 @@ from heelstrike.contact.solvers.least_norm import split
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
-    ContactWorkspace,
     Equations,
     Floats,
     Integers,
     ReducedProblem,
+    Settings,
+    Tally,
     Yardstick,
 )
 from heelstrike.dynamics.dense import eliminate
@@ -130,18 +131,20 @@ def expand(
 
 
 @kernel
-def evaluate(problem: ContactProblem, work: ContactWorkspace) -> float:
+def evaluate(
+    problem: ContactProblem, settings: Settings, reduced: ReducedProblem, tally: Tally,
+    yardstick: Yardstick, equations: Equations, trial: ContactAnswer,
+) -> float:  # fmt: skip
     """Find the impulse of the modes under trial and return its largest residual.
 
     Where rounding shows, iterative refinement sharpens the answer as long as it helps.
     """
-    equations, reduced, yardstick = work.equations, work.reduced, work.yardstick
-    trial, point, before = work.trial, equations.point, equations.before
+    point, before = equations.point, equations.before
     for contact in range(problem.count):
         if problem.set[contact] == LINE:
             trial.mode[contact] = STICK
     assemble(problem, trial.mode, yardstick.slope, reduced, equations)
-    symmetric = work.settings.skewed == 0
+    symmetric = settings.skewed == 0
     for j in range(equations.size):
         symmetric = symmetric and equations.lean[j] == 0.0
     singular = (
@@ -155,12 +158,12 @@ def evaluate(problem: ContactProblem, work: ContactWorkspace) -> float:
         point[j] = equations.weight[j] * equations.tableau[row, 0] if row >= 0 else 0.0
     held = not symmetric  # whether directions that change a velocity are held back
     if singular:
-        held = split(problem, trial.mode, held, reduced, work.tally, equations)
-    worst = prove(problem, work)
+        held = split(problem, trial.mode, held, reduced, tally, equations)
+    worst = prove(problem, settings, reduced.tangent, point, yardstick, trial)
     if singular and held and not worst < PROMISING * (1.0 + yardstick.effort):
         # The slip speed is not unique, and what the elimination left it at does not do.
-        split(problem, trial.mode, False, reduced, work.tally, equations)
-        worst = prove(problem, work)
+        split(problem, trial.mode, False, reduced, tally, equations)
+        worst = prove(problem, settings, reduced.tangent, point, yardstick, trial)
     for _ in range(REFINEMENTS):
         if worst < max(SHARP, 4.0 * yardstick.rounding):
             break
@@ -169,21 +172,23 @@ def evaluate(problem: ContactProblem, work: ContactWorkspace) -> float:
         for j in range(equations.size):
             before[j] = point[j]
         refine(reduced, trial.velocity, equations)
-        sharper = prove(problem, work)
+        sharper = prove(problem, settings, reduced.tangent, point, yardstick, trial)
         if not sharper < worst:
             for j in range(equations.size):
                 point[j] = before[j]
-            return prove(problem, work)
+            return prove(problem, settings, reduced.tangent, point, yardstick, trial)
         worst = sharper
     return worst
 
 
 @kernel
-def prove(problem: ContactProblem, work: ContactWorkspace) -> float:
+def prove(
+    problem: ContactProblem, settings: Settings, tangent: Integers, point: Floats,
+    yardstick: Yardstick, trial: ContactAnswer,
+) -> float:  # fmt: skip
     """Write the point out as an impulse and certify it; return its largest residual."""
-    slope, tangent = work.yardstick.slope, work.reduced.tangent
-    expand(problem, work.equations.point, slope, tangent, work.trial)
-    return certify(problem, work.settings, work.yardstick, work.trial)
+    expand(problem, point, yardstick.slope, tangent, trial)
+    return certify(problem, settings, yardstick, trial)
 
 
 @kernel
@@ -233,17 +238,19 @@ def label(count: int, reduced: ReducedProblem, yardstick: Yardstick, answer: Con
 
 
 @kernel
-def amend(problem: ContactProblem, work: ContactWorkspace) -> int:
+def amend(
+    problem: ContactProblem, tangent: Integers, root: Floats, equations: Equations,
+    trial: ContactAnswer,
+) -> int:  # fmt: skip
     """Change the modes under trial that their own answer contradicts.
 
     What penetrates closes, and slips as it did; what pulls opens. Friction beyond its cone slips,
     and slip against its friction sticks. Returns ``SOLVED``, or ``UNCERTIFIED`` if nothing is
     changed.
     """
-    mode, velocity, point = work.trial.mode, work.trial.velocity, work.equations.point
-    root, rest, tangent = work.yardstick.root, work.trial.rest, work.reduced.tangent
+    mode, velocity, point, rest = trial.mode, trial.velocity, equations.point, trial.rest
     slack = 0.0
-    for place in range(work.equations.size):
+    for place in range(equations.size):
         slack = max(slack, EXCESS * abs(point[place]))
     changed = False
     place = 0
@@ -272,5 +279,4 @@ def amend(problem: ContactProblem, work: ContactWorkspace) -> int:
             if along < -slack and problem.set[contact] != LINE:
                 mode[contact] = OPEN
         changed = changed or mode[contact] != before
-    work.tally.iterations += 1
     return SOLVED if changed else UNCERTIFIED

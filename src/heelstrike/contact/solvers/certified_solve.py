@@ -37,15 +37,19 @@ from heelstrike.contact.solvers.known_modes import AS_GOOD, CLEAN
 from heelstrike.contact.solvers.lemke import lemke
 from heelstrike.contact.solvers.reduction import reduce_problem, scale_matrix
 from heelstrike.contact.workspace import (
+    Combinations,
     ContactAnswer,
     ContactProblem,
     ContactWorkspace,
     Dictionary,
     Equations,
+    Floats,
     Integers,
+    Iteration,
     ReducedProblem,
     Settings,
     StickingRows,
+    Tally,
     Yardstick,
 )
 
@@ -148,29 +152,24 @@ def _signature() -> Any:
 
 @kernel
 def propose(
-    solver: int, call: int, problem: ContactProblem, best: float, guess: Integers,
-    work: ContactWorkspace,
+    solver: int, call: int, count: int, best: float, guess: Integers, reduced: ReducedProblem,
+    tally: Tally, lemke_memory: Dictionary, iteration: Iteration, combinations: Combinations,
+    mode: Integers,
 ) -> int:  # fmt: skip
-    """Write the modes that a solver would have tried next, its ``call``-th, to the trial.
+    """Write the modes that a solver would have tried next, its ``call``-th, to `mode`.
 
-    Returns ``SOLVED``, or how it ended if there are no more: ``UNCERTIFIED`` of modes that were
-    guessed if their answer contradicts none of them. ``guess`` are the modes of the best answer so
-    far and ``best`` its residual.
+    Returns ``SOLVED``, or how it ended if there are no more. ``guess`` are the modes of the best
+    answer so far and ``best`` its residual.
     """
-    count, reduced, tally, mode = problem.count, work.reduced, work.tally, work.trial.mode
-    if solver == WARM_START:
-        if call == 0:
-            return SOLVED
-        return amend(problem, work) if call <= work.settings.amendments else ITERATION_LIMIT
     if solver == LEMKE:
-        return lemke(count, call, reduced, tally, work.lemke, mode)
+        return lemke(count, call, reduced, tally, lemke_memory, mode)
     if solver == FISCHER_BURMEISTER:
-        return fischer_burmeister(count, call, reduced, tally, work.iteration, mode)
+        return fischer_burmeister(count, call, reduced, tally, iteration, mode)
     if solver == GAUSS_SEIDEL:
-        return gauss_seidel(count, call, reduced, tally, work.iteration, mode)
+        return gauss_seidel(count, call, reduced, tally, iteration, mode)
     if call == 0:
-        begin_combinations(count, guess, best, work.combinations)
-    found = next_combination(count, reduced.tangent, tally, work.combinations, mode)
+        begin_combinations(count, guess, best, combinations)
+    found = next_combination(count, reduced.tangent, tally, combinations, mode)
     return SOLVED if found else UNCERTIFIED
 
 
@@ -183,21 +182,32 @@ def seek(
     Of modes that were guessed and amended, or if patient, the answer has to be clean. Returns how
     it ended, and the residual of the answer, which was ``best`` so far.
     """
-    settings = work.settings
+    settings, tally, reduced = work.settings, work.tally, work.reduced
+    equations, trial = work.equations, work.trial
+    outcome = SOLVED
     call = 0
     while True:
-        outcome = propose(solver, call, problem, best, answer.mode, work)
+        if solver == WARM_START and call > 0:
+            outcome = ITERATION_LIMIT
+            if call <= settings.amendments:
+                tally.iterations += 1
+                outcome = amend(problem, reduced.tangent, work.yardstick.root, equations, trial)
+        elif solver != WARM_START:
+            outcome = propose(
+                solver, call, problem.count, best, answer.mode, reduced, tally, work.lemke,
+                work.iteration, work.combinations, trial.mode,
+            )  # fmt: skip
         if outcome != SOLVED:
             return outcome, best
         call += 1
-        worst = evaluate(problem, work)
+        worst = evaluate(problem, settings, reduced, tally, work.yardstick, equations, trial)
         if solver == COMBINATIONS:
-            note_residual(problem.count, worst, work.trial.mode, work.combinations)
+            note_residual(problem.count, worst, trial.mode, work.combinations)
         # What a guess came to and was not believed for gives way, even if its residual is less.
         certified = solver != WARM_START and settings.patient == 0 and worst <= settings.tolerance
         if worst < best or certified:
             best = worst
-            keep(problem.count, work.trial, answer)
+            keep(problem.count, trial, answer)
         if certified:
             return SOLVED, best
         if is_clean(problem.count, worst, settings, work.yardstick):
@@ -214,16 +224,19 @@ def release(
     a candidate that is not quite a solution may become one. Returns whether the modes are those of
     the answer now, and its residual.
     """
+    reduced, yardstick, trial = work.reduced, work.yardstick, work.trial
     for _ in range(ROUNDS):
-        if not label(problem.count, work.reduced, work.yardstick, answer):
+        if not label(problem.count, reduced, yardstick, answer):
             return True, best
         for contact in range(problem.count):
-            work.trial.mode[contact] = answer.mode[contact]
-        worst = evaluate(problem, work)
+            trial.mode[contact] = answer.mode[contact]
+        worst = evaluate(
+            problem, work.settings, reduced, work.tally, yardstick, work.equations, trial
+        )
         if not (worst < best or worst <= AS_GOOD):
             break
         best = worst
-        keep(problem.count, work.trial, answer)
+        keep(problem.count, trial, answer)
     return False, best
 
 
@@ -237,7 +250,7 @@ def try_solvers(
     """
     tally, reduced, tolerance = work.tally, work.reduced, work.settings.tolerance
     patient = work.settings.patient != 0
-    begin(problem, work, answer)
+    begin(problem, work.yardstick.slope, work.reduced, work.trial, answer)
     status = UNCERTIFIED
     best = math.inf
     with_fallbacks = order.shape[0] > 1
@@ -282,16 +295,19 @@ def try_solvers(
 
 
 @kernel
-def begin(problem: ContactProblem, work: ContactWorkspace, answer: ContactAnswer) -> None:
+def begin(
+    problem: ContactProblem, slope: Floats, reduced: ReducedProblem, trial: ContactAnswer,
+    answer: ContactAnswer,
+) -> None:  # fmt: skip
     """Put the modes of the answer on trial, and no impulse in their place."""
     for contact in range(problem.count):
-        work.trial.mode[contact] = answer.mode[contact]
+        trial.mode[contact] = answer.mode[contact]
     for i in range(2 * problem.count):
         answer.impulse[i] = 0.0
         answer.velocity[i] = problem.free[i]
     for i in range(3):
         answer.residual[i] = math.inf
-    reduce_problem(problem, answer.mode, work.yardstick.slope, work.reduced)
+    reduce_problem(problem, answer.mode, slope, reduced)
 
 
 def contact_workspace(capacity: int, *, ready: bool = True) -> ContactWorkspace:

@@ -12,7 +12,7 @@ from heelstrike.compiler.recordings.recording import Program, inverse_above
 from heelstrike.compiler.straight_line import straight_line_code
 from heelstrike.robot.model import Floats
 
-LARGEST = 8
+LARGEST = 10
 """Unknowns of the largest system with a program; its length grows with the cube of their number."""
 
 POOR_PIVOT = 1e-7

@@ -33,6 +33,10 @@ SHARED_ROW = 1e-14
 EARLY_PIVOT = 1e-2
 """Pivots that keep more than this of their diagonal are good."""
 
+COSTLY_PIVOT = 1e-5
+"""Pivots that keep less than this of their diagonal leave no clean answer: rounding of the numbers,
+1e-16, is more than ``CLEAN`` of them."""
+
 CLEAN = 1e-11
 """Modes with smaller residuals are taken at once; others may be nearly right, and better follow."""
 
@@ -93,31 +97,54 @@ def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> int
     """Like :func:`solve_equations` for few equations, as they are listed, by straight-line code.
 
     Returns ``FAILS``, ``HOLDS``, or ``MAY_DRIFT`` where a poor pivot may have cost digits: the
-    other elimination leaves it for the end.
+    other elimination leaves it for the end. A row that nearly depends on those before it is tried
+    once more as the last: the toe under a straight leg, whose heel tells as much, and better.
     """
     if size >= rows.programs.shape[0] or rows.programs[size] == 0:
         return FAILS
     delassus, source, matrix = problem.delassus, rows.row, rows.lower_half
     x, pivot = rows.x, rows.pivot
-    place = 0
-    for i in range(size):
-        row = source[i]
-        x[i] = -problem.free[row]
-        for j in range(i + 1):
-            matrix[place] = delassus[row, source[j]]
-            place += 1
-    play(rows.programs[size], (matrix, x, pivot))
-    rank = good = 0
-    for i in range(size):
-        diagonal = delassus[source[i], source[i]]
-        if pivot[i] > POOR_PIVOT * diagonal:
-            rank += 1
-            good += pivot[i] > EARLY_PIVOT * diagonal
-        elif abs(pivot[i]) > NO_PIVOT * diagonal:
-            return FAILS
-    if rank < size:
+    outcome = FAILS
+    for attempt in range(2):
+        place = 0
+        for i in range(size):
+            row = source[i]
+            x[i] = -problem.free[row]
+            for j in range(i + 1):
+                matrix[place] = delassus[row, source[j]]
+                place += 1
+        play(rows.programs[size], (matrix, x, pivot))
+        outcome, late, rank = HOLDS, -1, 0
+        for i in range(size):
+            diagonal = delassus[source[i], source[i]]
+            rank += pivot[i] > POOR_PIVOT * diagonal
+            if pivot[i] > EARLY_PIVOT * diagonal or abs(pivot[i]) <= NO_PIVOT * diagonal:
+                continue
+            if late < 0 and pivot[i] <= COSTLY_PIVOT * diagonal:
+                late = i
+            if pivot[i] <= POOR_PIVOT * diagonal:
+                outcome = FAILS
+            elif outcome == HOLDS:
+                outcome = MAY_DRIFT
+        if late < 0 or attempt == 1:
+            break
+        list_last(late, size, 2 * problem.count, rows)
+    if outcome != FAILS and rank < size:
         leave_out_idle(size, rows)
-    return HOLDS if good == rank else MAY_DRIFT
+    return outcome
+
+
+@kernel
+def list_last(place: int, size: int, count: int, rows: StickingRows) -> None:
+    """Let an equation change places with the last."""
+    source, sharers, last = rows.row, rows.sharers, size - 1
+    source[place], source[last] = source[last], source[place]
+    sharers[place], sharers[last] = sharers[last], sharers[place]
+    for row in range(count):
+        if rows.equation[row] == place:
+            rows.equation[row] = last
+        elif rows.equation[row] == last:
+            rows.equation[row] = place
 
 
 @kernel
@@ -300,7 +327,8 @@ def name_by_velocity(
     """Name what contacts do; return how many were open but at rest, or -1 if one slips.
 
     Contacts at rest may carry impulses, and only with all of these admitted is the least norm
-    unique. One that would pull need not be admitted, if it is not quite at rest.
+    unique. One that would pull need not be admitted, if it is not quite at rest: neither where it
+    parts, nor where it comes nearer by so little that the answer is clean.
     """
     mode, velocity = answer.mode, answer.velocity
     root, rest = yardstick.root, answer.rest
@@ -313,7 +341,8 @@ def name_by_velocity(
                 return -1
             continue
         if mode[contact] == OPEN and problem.set[contact] != LINE:
-            moves = velocity[normal] > BARELY * yardstick.unit * root[normal]
+            size = yardstick.unit * root[normal]
+            moves = velocity[normal] >= -CLEAN * size and abs(velocity[normal]) > BARELY * size
             pressed += not (moves and pulled[contact] == 1)
         mode[contact] = STICK
         if abs(velocity[tangent]) > rest * root[tangent]:

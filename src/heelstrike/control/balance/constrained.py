@@ -8,9 +8,14 @@ they contribute are the columns found here.
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
-from heelstrike.dynamics.held import FREE, force_of_row, given, left_to_motors
+from heelstrike.compiler.straight_line import play
+from heelstrike.dynamics.held import HeldRows, force_of_row, given, left_to_motors
 from heelstrike.dynamics.kernels import (
     bias_force,
     mass_matrix,
@@ -18,9 +23,12 @@ from heelstrike.dynamics.kernels import (
     point_bias_acceleration,
 )
 from heelstrike.dynamics.places import point_columns
-from heelstrike.robot.model import Floats
+from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-from heelstrike.sim.controller.stance import hold_sole
+from heelstrike.sim.controller.stance import hold_by_structure, hold_sole
+from heelstrike.sim.controller.straight_line import flat_foot_arguments, flat_foot_programs
 
 
 class Constrained(Bundle):
@@ -48,51 +56,98 @@ class Constrained(Bundle):
 
 @kernel
 def constrain(
-    robot: ControlledRobot, state: ControlState, link: int, sole: Floats, on: Constrained
-) -> None:
+    robot: ControlledRobot, state: ControlState, foot: int, sole: Floats, programs: Integers,
+    on: Constrained,
+) -> None:  # fmt: skip
     """Find what depends on the accelerations of the joints while a foot is held at its sole."""
-    hold_sole(robot, state, link, sole)
-    find_motion(robot, on)
-    find_forces(robot, state, on)
+    model, kinematics, held, rest = robot.model, state.kinematics, robot.held, robot.unactuated
+    hold, passive = robot.flat_hold[foot], robot.passive
+    if programs[foot] != 0:
+        play(
+            programs[foot],
+            (model, hold, rest, sole, kinematics, state.q, state.v, held, passive, on),
+        )
+        return
+    hold_sole(robot, state, robot.foot_link[foot], sole)
+    find_motion(model, rest, held, on)
+    find_forces(model, rest, kinematics, state.q, state.v, held, passive, on)
 
 
 @kernel
-def find_motion(robot: ControlledRobot, on: Constrained) -> None:
+def constrain_tree(
+    model: Model, hold: Integers, rest: Integers, sole: Floats, kinematics: Workspace, q: Floats,
+    v: Floats, held: HeldRows, passive: Floats, on: Constrained,
+) -> None:  # fmt: skip
+    """Find the same of a tree, without a branch on a value, for straight-line code."""
+    hold_by_structure(model, hold, sole, kinematics, held)
+    find_motion(model, rest, held, on)
+    find_forces(model, rest, kinematics, q, v, held, passive, on)
+
+
+def constrained_programs(robot: Robot) -> Integers:
+    """Return the addresses of :func:`constrain_tree` on each foot, zero where there is none."""
+    if robot not in _PROGRAMS:
+        arguments = flat_foot_arguments(robot) | {
+            "rest": np.setdiff1d(np.arange(robot.nv), robot.model.actuator_joint),
+            "sole": np.zeros(2),
+            "on": Constrained.allocate(nv=robot.nv, nu=robot.nu),
+        }
+        unread = "on.mass", "on.force", "on.columns"
+        found = flat_foot_programs(robot, constrain_tree, arguments, unread)
+        _PROGRAMS[robot] = np.array(found, np.int64)
+    return _PROGRAMS[robot]
+
+
+_PROGRAMS: WeakKeyDictionary[Robot, Integers] = WeakKeyDictionary()
+
+
+@kernel
+def find_motion(model: Model, rest: Integers, held: HeldRows, on: Constrained) -> None:
     """Find `motion` and `drift`."""
-    held, driven = robot.held, robot.model.actuator_joint
-    for j in range(robot.nv):
-        row = held.row[j]
-        on.drift[j] = 0.0 if row == FREE else given(row, held)
-        for i in range(robot.nu):
-            on.motion[j, i] = 0.0 if row == FREE else -held.solved[row, driven[i]]
-    for i in range(robot.nu):
-        on.motion[driven[i], i] = 1.0
+    driven, motion, drift = model.actuator_joint, on.motion, on.drift
+    for j in range(model.nv):
+        drift[j] = 0.0
+        for i in range(model.nu):
+            motion[j, i] = 0.0
+    for k in range(rest.shape[0]):
+        row = held.row[rest[k]]
+        drift[rest[k]] = given(row, held)
+        for i in range(model.nu):
+            motion[rest[k], i] = -held.solved[row, driven[i]]
+    for i in range(model.nu):
+        motion[driven[i], i] = 1.0
 
 
 @kernel
-def find_forces(robot: ControlledRobot, state: ControlState, on: Constrained) -> None:
+def find_forces(
+    model: Model, rest: Integers, kinematics: Workspace, q: Floats, v: Floats, held: HeldRows,
+    passive: Floats, on: Constrained,
+) -> None:  # fmt: skip
     """Find wrench and torques by the motion, from the equations A v̇ + H = forces."""
-    rest, driven, held, force = robot.unactuated, robot.model.actuator_joint, robot.held, on.force
-    mass_matrix(robot.model, state.kinematics, on.mass)
-    bias_force(robot.model, state.kinematics, force)
-    passive_force(robot.model, state.q, state.v, robot.passive)
-    for j in range(robot.nv):
-        force[j] -= robot.passive[j]
+    driven, force, mass, drift, motion = (
+        model.actuator_joint, on.force, on.mass, on.drift, on.motion,
+    )  # fmt: skip
+    torque, wrench = on.torque, on.wrench
+    mass_matrix(model, kinematics, mass)
+    bias_force(model, kinematics, force)
+    passive_force(model, q, v, passive)
+    for j in range(model.nv):
+        force[j] -= passive[j]
         for k in range(rest.shape[0]):
-            force[j] += on.mass[j, rest[k]] * on.drift[rest[k]]
-    for j in range(robot.nu):
+            force[j] += mass[j, rest[k]] * drift[rest[k]]
+    for j in range(model.nu):
         on.hold[j] = left_to_motors(driven[j], force, held)
     for k in range(3):
         on.load[k] = force_of_row(k, force, held)
-    for i in range(robot.nu):
-        for j in range(robot.nv):
-            force[j] = on.mass[j, driven[i]]
+    for i in range(model.nu):
+        for j in range(model.nv):
+            force[j] = mass[j, driven[i]]
             for k in range(rest.shape[0]):
-                force[j] += on.mass[j, rest[k]] * on.motion[rest[k], i]
-        for j in range(robot.nu):
-            on.torque[j, i] = left_to_motors(driven[j], force, held)
+                force[j] += mass[j, rest[k]] * motion[rest[k], i]
+        for j in range(i + 1):  # Nᵀ A N is symmetric
+            torque[j, i] = torque[i, j] = left_to_motors(driven[j], force, held)
         for k in range(3):
-            on.wrench[k, i] = force_of_row(k, force, held)
+            wrench[k, i] = force_of_row(k, force, held)
 
 
 @kernel
@@ -100,13 +155,15 @@ def point_task(
     robot: ControlledRobot, state: ControlState, link: int, position: Floats, on: Constrained
 ) -> None:
     """Find `rows` and `shift` of a point of a link: its acceleration by those of the joints."""
-    point_columns(robot.model, state.kinematics, link, position, on.columns)
-    point_bias_acceleration(state.kinematics, link, position, on.shift)
+    columns, rest, driven = on.columns, robot.unactuated, robot.model.actuator_joint
+    shift, rows, drift, motion = on.shift, on.rows, on.drift, on.motion
+    point_columns(robot.model, state.kinematics, link, position, columns)
+    point_bias_acceleration(state.kinematics, link, position, shift)
     for k in range(3):
-        for j in range(robot.nv):
-            on.shift[k] += on.columns[j, k] * on.drift[j]
-        for i in range(robot.nu):
-            total = 0.0
-            for j in range(robot.nv):
-                total += on.columns[j, k] * on.motion[j, i]
-            on.rows[k, i] = total
+        for i in range(driven.shape[0]):
+            rows[k, i] = columns[driven[i], k]
+        for j in range(rest.shape[0]):
+            follows = columns[rest[j], k]
+            shift[k] += follows * drift[rest[j]]
+            for i in range(driven.shape[0]):
+                rows[k, i] += follows * motion[rest[j], i]

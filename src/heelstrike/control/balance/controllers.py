@@ -7,7 +7,9 @@ from math import sqrt
 
 import numpy as np
 
+from heelstrike.compiler.bundle import Bundle
 from heelstrike.control.arguments import check_gait, must_be, number_of
+from heelstrike.control.balance.constrained import constrained_programs
 from heelstrike.control.balance.footsteps import Planning
 from heelstrike.control.balance.law import keep_balance
 from heelstrike.control.balance.numbers import Legs, Parameters, Weights
@@ -180,6 +182,7 @@ class WholeBody(Law):
             planning=Planning(**planning),
             weights=Weights(**weights),
             legs=_legs(robot, gait, feet),
+            constrained=np.zeros(2, np.int64),
             adapts=int(self.adapts),
             **rest,
         )
@@ -193,6 +196,22 @@ class WholeBody(Law):
         }
         super().__init__(keep_balance, parameters, robot=robot, memory=begin)
         self.gait = gait
+
+    def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
+        """Return its parameters, and a memory to begin with, for a robot; all can be set.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot, whose straight-line code goes with the parameters.
+
+        Returns
+        -------
+        tuple of Bundle
+            Parameters and memory.
+        """
+        parameters, memory = super().numbers(robot)
+        return parameters.replaced(constrained=constrained_programs(robot)), memory
 
 
 class FootstepFeedback(WholeBody):

@@ -491,7 +491,7 @@ def keep_balance(
         decide(t, landed, tilt, parameters, memory)
     on, program = memory.on, memory.program
     under = press_where_it_touches(contacts, robot, parameters, tilt, memory)
-    constrain(robot, state, link, memory.sole, on)
+    constrain(robot, state, stance, memory.sole, parameters.constrained, on)
     clear(program)
     weights = parameters.weights
     add_pressure(weights.pressure, tilt, memory.plan.pressure, parameters.weight, on, program)

@@ -53,6 +53,8 @@ class Parameters(Bundle):
     weights: Weights = part(Weights)
     legs: Legs = part(Legs)
     """The gait, how landings are planned, how much tasks count, the legs."""
+    constrained: Integers = array(2, of=int, address=True)
+    """Addresses of the straight-line code of the robot on each foot, zero where there is none."""
     adapts: int = number(int)
     """Whether foothold and time are adapted; otherwise they are the gait's."""
     speed: float = number(float)

@@ -47,6 +47,11 @@ from heelstrike.robot.sole import sole
 from heelstrike.sim.controller import following, stance
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.raised import EndOfRun
+from heelstrike.sim.controller.straight_line import (
+    flat_foot_arguments,
+    flat_foot_holds,
+    flat_foot_programs,
+)
 
 NO_ENDING = -1
 """What `ControlledRobot.ending` is while the law lets the run go on."""
@@ -115,6 +120,10 @@ class ControlledRobot(Bundle):
     """Actuator of each coordinate, -1 for none."""
     held: HeldRows = part(HeldRows)
     """What a foot and the loops hold, of the last query that needed it."""
+    flat_foot: Integers = array("nf", of=int, address=True)
+    """Addresses of the straight-line code of :meth:`flat_foot_torque`, zero where there is none."""
+    flat_hold: Integers = array("nf", 4, of=int)
+    """What that holds: link of each foot, and the coordinate that each row is solved for."""
     shares: Floats = array("nu", "nu")
     """acceleration, force, passive, other, three, reaching, shares: Scratch of the queries."""
 
@@ -399,13 +408,20 @@ def robot_view(robot: Robot) -> ControlledRobot:
 _MOLDS: WeakKeyDictionary[Robot, Mold[ControlledRobot]] = WeakKeyDictionary()
 
 
+def _flat_foot(robot: Robot) -> Integers:
+    """Return the addresses of the straight-line code of the torques on each foot."""
+    arguments = flat_foot_arguments(robot)
+    programs = flat_foot_programs(robot, stance.supply_flat_foot, arguments, ("whole", "force"))
+    return np.array(programs, np.int64)
+
+
 def _laid_out(robot: Robot) -> ControlledRobot:
     driven = set(robot.model.actuator_joint.tolist())
     legs = leg_joints(robot)
     view = ControlledRobot.allocate(
         {**extents_of(robot), "loop_rows": count_rows(robot.model)}, model=robot.model,
         nf=len(robot.feet), free=robot.nv - len(driven), longest=max(map(len, legs), default=0),
-        mass=robot.total_mass,
+        mass=robot.total_mass, flat_foot=_flat_foot(robot),
     )  # fmt: skip
     view.motor[:] = -1
     view.motor[robot.model.actuator_joint] = np.arange(robot.nu)
@@ -420,4 +436,5 @@ def _laid_out(robot: Robot) -> ControlledRobot:
         view.contact_foot[list(foot.contacts)] = index
         view.leg_joint[index, : len(legs[index])] = legs[index]
     view.unactuated[:] = [j for j in range(robot.nv) if j not in driven]
+    view.flat_hold[:] = flat_foot_holds(robot)
     return view

@@ -18,19 +18,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.straight_line import play
 from heelstrike.dynamics.dense import solve_positive
 from heelstrike.dynamics.held import (
     FREE,
+    HeldRows,
     add_loops,
     add_place,
+    begin_solving,
     complete,
     keep_loops,
     keep_place,
     left_to_motors,
+    solve_row,
     solve_rows,
 )
 from heelstrike.dynamics.kernels import inverse_dynamics, passive_force
-from heelstrike.robot.model import Floats
+from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.controller.following import follow_held
 
 if TYPE_CHECKING:
@@ -184,6 +189,45 @@ def torques_for(
 
 
 @kernel
+def hold_by_structure(
+    model: Model, hold: Integers, position: Floats, kinematics: Workspace, held: HeldRows
+) -> None:
+    """Hold a flat foot at a point, of which the structure tells what each row is solved for.
+
+    For accelerations, as :func:`hold_sole`, and without a branch on a value. `hold` (4,) has the
+    link of the foot, and the coordinate of each row.
+    """
+    held.count = 0
+    add_place(model, kinematics, hold[0], position, 3, held)
+    keep_place(kinematics, hold[0], position, 3, 0, held)
+    begin_solving(held)
+    for row in range(3):
+        solve_row(row, hold[1 + row], held)
+
+
+@kernel
+def supply_flat_foot(
+    model: Model, hold: Integers, kinematics: Workspace, q: Floats, v: Floats,
+    acceleration: Floats, held: HeldRows, whole: Floats, force: Floats, passive: Floats,
+    torque: Floats,
+) -> None:  # fmt: skip
+    """Torques (nu,) that give the joints an acceleration (nu,) while a foot is held flat.
+
+    The same as by search, for straight-line code.
+    """
+    hold_by_structure(model, hold, kinematics.origin[hold[0]], kinematics, held)
+    for i in range(model.nu):
+        whole[model.actuator_joint[i]] = acceleration[i]
+    complete(held, whole)
+    inverse_dynamics(model, whole, kinematics, force)
+    passive_force(model, q, v, passive)
+    for j in range(model.nv):
+        force[j] -= passive[j]
+    for i in range(model.nu):
+        torque[i] = left_to_motors(model.actuator_joint[i], force, held)
+
+
+@kernel
 def flat_foot_torque(
     self: ControlledRobot, state: ControlState, foot: int, acceleration: Floats, torque: Floats
 ) -> None:
@@ -192,6 +236,15 @@ def flat_foot_torque(
     For robots whose coordinates without a motor follow from the others by the foot, closed loops
     and couplings; NaN for others. `torque` may be the array `acceleration`.
     """
+    if self.flat_foot[foot] != 0:
+        play(
+            self.flat_foot[foot],
+            (
+                self.model, self.flat_hold[foot], state.kinematics, state.q, state.v, acceleration,
+                self.held, self.acceleration, self.force, self.passive, torque,
+            ),
+        )  # fmt: skip
+        return
     link = self.foot_link[foot]
     hold_sole(self, state, link, state.kinematics.origin[link])
     torques_for(self, state, acceleration, torque)

@@ -41,6 +41,7 @@ from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
@@ -50,12 +51,12 @@ from heelstrike.sim.contacts.rows import (
     POINT,
     SECOND_FACE,
     STOP,
+    Rows,
     lay_out_rows,
 )
 from heelstrike.sim.contacts.writers import rate_of
-from heelstrike.sim.memory import Assembly, Memory
-from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import log_event, note_event
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.memory import Assembly
 from heelstrike.sim.time_stepping.corners import Corner
 from heelstrike.tolerances import CLOSED_GAP, NOTICEABLE_ENERGY
 
@@ -140,18 +141,19 @@ def call(entry: int, impact: Impact) -> None:
 
 
 @kernel
-def left_alone(count: int, memory: Memory) -> tuple[float, bool]:
+def left_alone(
+    count: int, candidate: Integers, gap: Floats, restitution: Floats
+) -> tuple[float, bool]:
     """What a relaxed step does not ask for: the deepest negative gap, and whether any bounces."""
     deepest, bounces = 0.0, False
     for place in range(count):
-        candidate = memory.assembly.candidate[place]
-        deepest = min(deepest, memory.rows.gap[candidate])
-        bounces = bounces or memory.surface.restitution[candidate] > 0.0
+        deepest = min(deepest, gap[candidate[place]])
+        bounces = bounces or restitution[candidate[place]] > 0.0
     return deepest, bounces
 
 
 @kernel
-def relax(bounds_gaps: bool, count: int, memory: Memory, impact: Impact) -> bool:
+def relax(bounds_gaps: bool, deepest: float, bounces: bool, steps: int, impact: Impact) -> bool:
     """Ask a step without an answer for less: no way out, no bounce; return if it asked for any.
 
     Without these the velocity that the step would have without contact is all that is in the way,
@@ -159,10 +161,9 @@ def relax(bounds_gaps: bool, count: int, memory: Memory, impact: Impact) -> bool
     bounded and none is deeper than rounding and turning explain. In a wedge that goes on all of it
     is explained: the step before has let nothing sink but by turning.
     """
-    deepest, bounces = left_alone(count, memory)
     leaves = impact.relaxed == 0 and bounces
     if bounds_gaps and impact.relaxed == 0 and deepest < 0.0:
-        leaves = impact.wedged == memory.tally.steps - 1 or deepest >= -WEDGED_BY
+        leaves = impact.wedged == steps - 1 or deepest >= -WEDGED_BY
     if leaves:
         impact.relaxed = 1
     return leaves
@@ -176,13 +177,13 @@ def stays_wedged(steps: int, impact: Impact) -> bool:
 
 
 @kernel
-def modes_change(memory: Memory) -> bool:
+def modes_change(assembly: Assembly, before: Integers) -> bool:
     """Whether anything opens, closes or slides otherwise than in the step before."""
     return (
-        changes(POINT, memory.assembly, memory.reaction.mode)
-        or changes(STOP, memory.assembly, memory.reaction.mode)
-        or changes(CONSTRAINT, memory.assembly, memory.reaction.mode)
-        or changes(SECOND_FACE, memory.assembly, memory.reaction.mode)
+        changes(POINT, assembly, before)
+        or changes(STOP, assembly, before)
+        or changes(CONSTRAINT, assembly, before)
+        or changes(SECOND_FACE, assembly, before)
     )
 
 
@@ -196,25 +197,29 @@ def changes(kind: int, assembly: Assembly, before: Integers) -> bool:
 
 
 @kernel
-def close_gaps(step: float, count: int, memory: Memory) -> None:
+def close_gaps(step: float, count: int, gap: Floats, assembly: Assembly) -> None:
     """Count negative gaps of the candidates as zero."""
     for place in range(count):
-        gap = memory.rows.gap[memory.assembly.candidate[place]]
-        memory.assembly.problem.free[2 * place] -= min(gap, 0.0) / step
+        assembly.problem.free[2 * place] -= min(gap[assembly.candidate[place]], 0.0) / step
 
 
 @kernel
-def note_wedge(model: Model, time: float, memory: Memory, impact: Impact, record: Record) -> None:
-    """Tell of a wedge that begins, by the contact point that is deepest in the ground."""
-    steps, gap = memory.tally.steps, memory.contacts.gap
-    memory.solver.tally.relaxed += 1
-    if impact.wedged != steps - 1:
-        deepest = 0
-        for contact in range(model.nc):
-            deepest = contact if gap[contact] < gap[deepest] else deepest
-        log_event(time, WEDGED, deepest, 0.0, 0.0, record)
+def deepest_point(gap: Floats) -> int:
+    """The contact point that is deepest in the ground."""
+    deepest = 0
+    for contact in range(gap.shape[0]):
+        deepest = contact if gap[contact] < gap[deepest] else deepest
+    return deepest
+
+
+@kernel
+def note_wedge(steps: int, impact: Impact) -> bool:
+    """Keep that this step is wedged; return whether the wedge begins with it."""
+    begins = impact.wedged != steps - 1
+    if begins:
         impact.since = steps
     impact.wedged = steps
+    return begins
 
 
 @dissolved_kernel
@@ -233,66 +238,81 @@ def would_close(step: float, place: int, problem: ContactProblem) -> bool:
 
 
 @dissolved_kernel
-def note_touching(step: float, count: int, memory: Memory, impact: Impact) -> None:
+def note_touching(
+    step: float, count: int, steps: int, assembly: Assembly, touching: Integers
+) -> None:
     """Keep which of the candidates touch at the end of this step."""
-    assembly = memory.assembly
     for place in range(count):
         if arrives(step, place, assembly.answer):
-            impact.touching[assembly.candidate[place]] = memory.tally.steps
+            touching[assembly.candidate[place]] = steps
 
 
 @dissolved_kernel
-def falls_into(step: float, problem: ContactProblem, memory: Memory, impact: Impact) -> bool:
-    """Whether an impact falls into the step; `problem` is that of the positions, solved."""
-    assembly, before = memory.assembly, memory.tally.steps - 1
+def falls_into(
+    step: float, before: int, gap: Floats, touching: Integers, problem: ContactProblem,
+    assembly: Assembly,
+) -> bool:  # fmt: skip
+    """Whether an impact falls into the step; `problem` is that of the positions, solved.
+
+    ``before`` is the step before, at whose end what was touching then had arrived.
+    """
     for place in range(problem.count):
         candidate = assembly.candidate[place]
-        now = memory.rows.gap[candidate]
+        now = gap[candidate]
         if now < np.inf and arrives(step, place, assembly.answer):
-            new = impact.touching[candidate] != before and would_close(step, place, problem)
+            new = touching[candidate] != before and would_close(step, place, problem)
             if now < -CLOSED_GAP or (new and now > CLOSED_GAP):
                 return True
     return False
 
 
 @kernel
-def find_members(step: float, problem: ContactProblem, memory: Memory, impact: Impact) -> int:
-    """List what takes part in the impact of a step; return how many that are."""
-    assembly, before = memory.assembly, memory.tally.steps - 1
+def find_members(
+    step: float, before: int, gap: Floats, touching: Integers, problem: ContactProblem,
+    assembly: Assembly, member: Integers,
+) -> int:  # fmt: skip
+    """List what takes part in the impact of a step; return how many that are.
+
+    As in :func:`falls_into`.
+    """
     members = 0
     for place in range(problem.count):
         candidate = assembly.candidate[place]
-        now = memory.rows.gap[candidate]
+        now = gap[candidate]
         takes_part = now == np.inf  # dry friction and loops are always there
         if not takes_part:
-            touched = impact.touching[candidate] == before
+            touched = touching[candidate] == before
             stays = touched or would_close(step, place, problem)
             takes_part = now <= CLOSED_GAP or (stays and arrives(step, place, assembly.answer))
         if takes_part:
-            impact.member[members] = place
+            member[members] = place
             members += 1
     return members
 
 
 @kernel
-def speed_before(model: Model, entry: int, memory: Memory) -> float:
+def speed_before(
+    model: Model, entry: int, v: Floats, rows: Rows, tree: Workspace, contacts: Contacts,
+    seconds: Contacts,
+) -> float:  # fmt: skip
     """Normal velocity of a contact point, on either face, or a constraint, as the step begins."""
-    if memory.rows.kind[entry] == CONSTRAINT:
-        return rate_of(memory.rows.owner[entry], 0, memory.v, memory.rows.outside)
-    point, tree = memory.rows.owner[entry], memory.equations.tree
-    if memory.rows.kind[entry] == POINT:
-        normal, _ = contact_velocity(model, tree, memory.contacts, point)
+    if rows.kind[entry] == CONSTRAINT:
+        return rate_of(rows.owner[entry], 0, v, rows.outside)
+    point = rows.owner[entry]
+    if rows.kind[entry] == POINT:
+        normal, _ = contact_velocity(model, tree, contacts, point)
     else:
-        normal, _ = contact_velocity(model, tree, memory.seconds, point)
+        normal, _ = contact_velocity(model, tree, seconds, point)
     return normal
 
 
 @kernel
 def pose_impact(
-    model: Model, step: float, members: int, problem: ContactProblem, memory: Memory, impact: Impact
-) -> None:
-    """Write the problem of the impact: what takes part, without the gaps, with restitution."""
-    assembly, its, restitution = memory.assembly, impact.problem, memory.surface.restitution
+    step: float, members: int, candidate: Integers, gap: Floats, mode: Integers,
+    problem: ContactProblem, impact: Impact,
+) -> None:  # fmt: skip
+    """Write the problem of the impact: what takes part, without the gaps, with its bounces."""
+    its = impact.problem
     for place in range(members):
         source = impact.member[place]
         for other in range(members):
@@ -301,19 +321,15 @@ def pose_impact(
                 for j in range(2):
                     entry = problem.delassus[2 * source + i, column + j]
                     its.delassus[2 * place + i, 2 * other + j] = entry
-        candidate = assembly.candidate[source]
-        normal, gap = problem.free[2 * source], memory.rows.gap[candidate]
-        if gap < np.inf:
-            normal -= (max(gap, 0.0) if impact.relaxed == 1 else gap) / step
-        impact.bounce[place] = 0.0
-        if impact.relaxed == 0 and restitution[candidate] > 0.0:
-            impact.bounce[place] = restitution[candidate] * speed_before(model, candidate, memory)
+        normal, now = problem.free[2 * source], gap[candidate[source]]
+        if now < np.inf:
+            normal -= (max(now, 0.0) if impact.relaxed == 1 else now) / step
         its.free[2 * place] = normal + impact.bounce[place]
         its.free[2 * place + 1] = problem.free[2 * source + 1]
         its.friction[place] = problem.friction[source]
         its.set[place] = problem.set[source]
         its.bound[place] = problem.bound[source]
-        impact.answer.mode[place] = assembly.answer.mode[source]
+        impact.answer.mode[place] = mode[source]
     its.count = members
 
 
@@ -383,38 +399,37 @@ def solve_restitution(
 
 
 @kernel
-def note_gain(
-    model: Model, end: float, step: float, impact: Impact, memory: Memory, record: Record
-) -> None:
-    """Tell of energy that restitution made, by the contact point with the largest impulse."""
-    force = memory.contacts.force
+def hardest_point(force: Floats) -> int:
+    """The contact point with the largest normal force, of (nc, 2)."""
     hardest = 0
-    for contact in range(model.nc):
+    for contact in range(force.shape[0]):
         hardest = contact if force[contact, 0] > force[hardest, 0] else hardest
-    note_event(end, ENERGY_GAIN, hardest, step, force, record)
-    memory.tally.energy_gain += impact.gain
+    return hardest
 
 
 @kernel
-def pose_way_out(step: float, problem: ContactProblem, memory: Memory, impact: Impact) -> None:
+def pose_way_out(
+    step: float, candidate: Integers, gap: Floats, velocity: Floats, problem: ContactProblem,
+    impact: Impact,
+) -> None:  # fmt: skip
     """Write the problem of what is to be added to the velocity of a wedge to push it out.
 
     Without friction; `problem` is that of the positions, solved with negative gaps counted as zero.
     """
-    assembly, its = memory.assembly, impact.problem
+    its = impact.problem
     rows = 2 * problem.count
     for row in range(rows):
         its.free[row] = 0.0
         for column in range(rows):
             its.delassus[row, column] = problem.delassus[row, column]
     for place in range(problem.count):
-        gap = min(memory.rows.gap[assembly.candidate[place]], 0.0)
+        deep = min(gap[candidate[place]], 0.0)
         its.friction[place] = its.bound[place] = 0.0
         its.set[place] = LINE if problem.set[place] == LINE else HALF_LINE
         impact.answer.mode[place] = STICK if problem.set[place] == LINE else OPEN
         if problem.set[place] in (CONE, HALF_LINE):
-            its.free[2 * place] = assembly.answer.velocity[2 * place] + gap / step
-            if gap < 0.0:
+            its.free[2 * place] = velocity[2 * place] + deep / step
+            if deep < 0.0:
                 impact.answer.mode[place] = STICK
     its.count = problem.count
 

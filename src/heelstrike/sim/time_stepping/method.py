@@ -102,22 +102,31 @@ from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
+from heelstrike.sim.record.recording import (
+    log_event,
+    note_event,
+    note_events,
+    note_extremes,
+    note_row_when_due,
+)
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.corners import join_forces, locate_corners
 from heelstrike.sim.time_stepping.doubts import hardly_told, too_light, too_stiff
 from heelstrike.sim.time_stepping.impact import (
+    ENERGY_GAIN,
     NEVER,
+    WEDGED,
     Impact,
     allocate_impact,
     call,
     close_gaps,
+    deepest_point,
     dismiss,
     falls_into,
     find_members,
+    hardest_point,
     left_alone,
     modes_change,
-    note_gain,
     note_touching,
     note_wedge,
     pose_impact,
@@ -125,6 +134,7 @@ from heelstrike.sim.time_stepping.impact import (
     relax,
     solve_impact,
     solve_restitution,
+    speed_before,
     stays_wedged,
 )
 from heelstrike.tolerances import CLOSED_GAP
@@ -590,14 +600,19 @@ def gather_delassus(
         )  # fmt: skip
     if near == count == usual.usual_points.shape[0]:
         return
-    for place in range(near):
-        row = 2 * usual_place[candidate[place]]
-        for other in range(near):
-            column = 2 * usual_place[candidate[other]]
-            for i in range(2):
-                for j in range(2):
-                    entry = usual.usual_problem.delassus[row + i, column + j]
-                    assembly.problem.delassus[2 * place + i, 2 * other + j] = entry
+    whole, delassus = usual.usual_problem.delassus, assembly.problem.delassus
+    if near == usual.usual_points.shape[0]:  # they are listed in the same order
+        for row in range(2 * near):
+            for column in range(2 * near):
+                delassus[row, column] = whole[row, column]
+    else:
+        for place in range(near):
+            row = 2 * usual_place[candidate[place]]
+            for other in range(near):
+                column = 2 * usual_place[candidate[other]]
+                for i in range(2):
+                    for j in range(2):
+                        delassus[2 * place + i, 2 * other + j] = whole[row + i, column + j]
     for place in range(near, assembly.until[DRY_JOINT]):
         add_joint(model, contacts, rows, near, place, equations, usual, assembly)
 
@@ -619,10 +634,10 @@ def add_joint(
         change[j] = 0.0
     change[joint] = sign
     solve_mass_matrix(model, equations, change)
+    empty = 4 * place + 1 - row
     for other in range(2 * place + 2):
-        for own in range(2 * place, 2 * place + 2):
-            delassus[own, other] = 0.0
-            delassus[other, own] = 0.0
+        delassus[empty, other] = 0.0
+        delassus[other, empty] = 0.0
     if near > 0:
         find_velocities(model, contacts, change, True, equations.tree, usual)
     for other in range(near):
@@ -632,9 +647,12 @@ def add_joint(
             delassus[2 * other + i, row] = entry
     for other in range(near, place + 1):
         column, its_joint, its_sign = joint_row(rows, assembly, other)
+        its_empty = 4 * other + 1 - column
         entry = its_sign * change[its_joint]
         delassus[row, column] = entry
         delassus[column, row] = entry
+        delassus[row, its_empty] = 0.0
+        delassus[its_empty, row] = 0.0
 
 
 @kernel
@@ -742,7 +760,8 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         status = solve_contact_kernel(work.order, problem, memory.solver, assembly.answer)
         solved = status == SOLVED
     resolves = solved and work.scheme == IMPACT_RESOLVED
-    if resolves and falls_into(step, problem, memory, impact):
+    gap, before = rows.gap, memory.tally.steps - 1
+    if resolves and falls_into(step, before, gap, impact.touching, problem, assembly):
         impact.happens = 1
         arriving = impact.arriving
         for j in range(model.nv):
@@ -750,8 +769,16 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         push_all(model, near, count, straight, memory, arriving)
         if impact.relaxed == 1:
             push_out(model, near, count, straight, problem, work, memory)
-        members = find_members(step, problem, memory, impact)
-        pose_impact(model, step, members, problem, memory, impact)
+        members = find_members(step, before, gap, impact.touching, problem, assembly, impact.member)
+        for place in range(members):
+            entry = assembly.candidate[impact.member[place]]
+            restitution = memory.surface.restitution[entry]
+            impact.bounce[place] = 0.0
+            if impact.relaxed == 0 and restitution > 0.0:
+                impact.bounce[place] = restitution * speed_before(
+                    model, entry, memory.v, rows, equations.tree, contacts, memory.seconds
+                )
+        pose_impact(step, members, assembly.candidate, gap, assembly.answer.mode, problem, impact)
         solved = solve_impact(work.order, members, problem, memory.solver, impact, assembly)
     push_all(model, near, count, straight, memory, memory.next_v)
     return solved
@@ -764,7 +791,9 @@ def push_out(
 ) -> None:  # fmt: skip
     """Let the positions of a wedge come out of the ground, where a way without friction leads."""
     impact, answer = work.impact, memory.assembly.answer
-    pose_way_out(work.step, problem, memory, impact)
+    pose_way_out(
+        work.step, memory.assembly.candidate, memory.rows.gap, answer.velocity, problem, impact
+    )
     solver, its = memory.solver, impact.answer
     if solve_contact_kernel(work.order, impact.problem, solver, its) == SOLVED:
         for row in range(2 * count):
@@ -860,6 +889,7 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
     that lasts at once.
     """
     assembly, impact = memory.assembly, work.impact
+    gap, restitution = memory.rows.gap, memory.surface.restitution
     again = True
     solved = True
     near = count = 0
@@ -889,17 +919,18 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
         note_group(LOOP, first, count, assembly)
         free_loops(count, memory.loops, memory.next_v, 0.5 * work.step, assembly)
         if at_once:
-            deepest, bounces = left_alone(count, memory)
+            deepest, bounces = left_alone(count, assembly.candidate, gap, restitution)
             if deepest == 0.0 and not bounces:  # the wedge is over
                 impact.relaxed = 0
         if impact.relaxed == 1 and is_linearised(work.scheme):
-            close_gaps(work.step, count, memory)
+            close_gaps(work.step, count, gap, assembly)
         if count > 0:
             solved = solve_candidates(model, near, count, work, memory)
         v = impact.arriving if impact.happens == 1 else memory.next_v
         if not solved:
-            again = relax(is_linearised(work.scheme), count, memory, impact)
-        elif at_once and impact.relaxed == 1 and modes_change(memory):
+            deepest, bounces = left_alone(count, assembly.candidate, gap, restitution)
+            again = relax(is_linearised(work.scheme), deepest, bounces, memory.tally.steps, impact)
+        elif at_once and impact.relaxed == 1 and modes_change(assembly, memory.reaction.mode):
             at_once, impact.relaxed = False, 0
         elif is_linearised(work.scheme):
             again = may_go_through(model, work, near, count, v, memory) and call_missed(
@@ -910,7 +941,7 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
     if impact.calls > 0:
         dismiss(impact)
     if work.scheme == IMPACT_RESOLVED:
-        note_touching(work.step, count, memory, impact)
+        note_touching(work.step, count, memory.tally.steps, assembly, impact.touching)
     note_answer(model, work.step, memory)
     if are_there(SECOND_FACE, assembly):
         join_forces(model, memory.seconds, memory.contacts)
@@ -926,7 +957,9 @@ def decide(
     solved = solve_step(model, scene.ground.curved == 1, clock.time, work, memory)
     note_extremes(model, memory)
     if work.impact.relaxed == 1:
-        note_wedge(model, clock.time, memory, work.impact, record)
+        memory.solver.tally.relaxed += 1
+        if note_wedge(memory.tally.steps, work.impact):
+            log_event(clock.time, WEDGED, deepest_point(memory.contacts.gap), 0.0, 0.0, record)
     first = record.events
     end = clock.start + (clock.index + 1) * work.step
     note_events(model, clock.time, end, work.step, memory, record)
@@ -936,7 +969,9 @@ def decide(
     )
     note_brakes(model, clock.time, work.step, record, memory.loops)
     if work.impact.gains == 1:
-        note_gain(model, end, work.step, work.impact, memory, record)
+        force = memory.contacts.force
+        note_event(end, ENERGY_GAIN, hardest_point(force), work.step, force, record)
+        memory.tally.energy_gain += work.impact.gain
     return DONE if solved else SOLVER_FAILED
 
 
