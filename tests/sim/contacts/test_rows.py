@@ -100,8 +100,8 @@ def test_kinds_that_a_robot_does_not_have_are_not_there() -> None:
     assert [int(n) for n in rows.end - rows.first] == [1, 0, 0, 1, 0, 0, 0]
 
 
-def test_gaps_of_points_on_both_faces_are_those_of_the_table() -> None:
-    """What finds the contact points writes the table's gaps."""
+def test_places_of_points_on_both_faces_are_those_of_the_table() -> None:
+    """What finds the contact points writes the table's gaps, places and normals."""
     memory = allocate_memory(robot_of_every_kind())
     rows = memory.rows
     assert np.isposinf(rows.gap).all()
@@ -109,6 +109,11 @@ def test_gaps_of_points_on_both_faces_are_those_of_the_table() -> None:
     memory.seconds.gap[:] = 3.0, 4.0
     np.testing.assert_array_equal(rows.gap[entries(POINT)], [1.0, 2.0])
     np.testing.assert_array_equal(rows.gap[entries(SECOND_FACE)], [3.0, 4.0])
+    for name in ("position", "normal"):
+        first, second = getattr(memory.contacts, name), getattr(memory.seconds, name)
+        first[:], second[:] = np.eye(2), -np.eye(2)
+        np.testing.assert_array_equal(getattr(rows, name)[entries(POINT)], np.eye(2))
+        np.testing.assert_array_equal(getattr(rows, name)[entries(SECOND_FACE)], -np.eye(2))
     assert np.isposinf(rows.gap[entries(STOP)]).all()
 
 

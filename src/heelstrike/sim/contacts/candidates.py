@@ -101,9 +101,12 @@ def write_rows(
         contact_rows(model, tree, contacts, rows.owner[assembly.candidate[place]], place, assembly)
     for place in range(assembly.begin[STOP], assembly.until[STOP]):
         stop = assembly.candidate[place]
-        write_unit_row(rows.owner[stop], 2 * place, rows.side[stop], assembly)
+        write_unit_row(
+            rows.owner[stop], 2 * place, rows.side[stop], assembly.leaf, assembly.jacobian
+        )
     for place in range(assembly.begin[DRY_JOINT], assembly.until[DRY_JOINT]):
-        write_unit_row(rows.owner[assembly.candidate[place]], 2 * place + 1, 1.0, assembly)
+        joint = rows.owner[assembly.candidate[place]]
+        write_unit_row(joint, 2 * place + 1, 1.0, assembly.leaf, assembly.jacobian)
     for place in range(assembly.begin[SECOND_FACE], assembly.until[SECOND_FACE]):
         contact_rows(model, tree, seconds, rows.owner[assembly.candidate[place]], place, assembly)
 
