@@ -36,7 +36,14 @@ from heelstrike.sim.contacts.geometry import (
     row_product,
 )
 from heelstrike.sim.contacts.loops import append_loops, free_loops, speed_along
-from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import (
+    CONSTRAINT,
+    DRY_JOINT,
+    SECOND_FACE,
+    STOP,
+    Rows,
+    is_of_ground,
+)
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.impact import heading
 from heelstrike.sim.event_driven.phase import Bridge, HeldRows, Impact, Modes, Motion, Phase
@@ -97,14 +104,16 @@ def gather_near(
         is_dry = kind == DRY_JOINT
         if is_dry and modes.closed[contact] == 0:
             continue
-        passes = kind in (POINT, SECOND_FACE) and modes.passing[owner] == 1
+        passes = is_of_ground(contact, rows) and modes.passing[owner] == 1
         if passes or (kind == SECOND_FACE and gap == np.inf):
             continue
         gap_rows(contact, count, model, tree, rows, leaf, jacobian)
         normal = row_product(jacobian, 2 * count, after)
         if not is_dry and gap > length * max(CLOSING_SPEED, -2.0 * normal):
             continue
-        free_gap_acceleration(contact, count, model, tree, rows, modes.face, rate, jacobian, free)
+        free_gap_acceleration(
+            contact, count, model, tree, rows, modes.face, modes.bend, rate, jacobian, free
+        )
         for row in range(2 * count, 2 * count + 2):
             free[row] = row_product(jacobian, row, v) + length * free[row]
         added[count] = 0.0
@@ -205,7 +214,7 @@ def keeps_face(contact: int, ground: GroundModel, rows: Rows, face: Integers) ->
     """Whether a candidate is a contact that will be on the same face at the end of a bridge."""
     if rows.kind[contact] == DRY_JOINT:
         return False
-    if rows.kind[contact] in (STOP, SECOND_FACE):
+    if rows.kind[contact] in (STOP, SECOND_FACE, CONSTRAINT):
         return True
     return face[contact] != NO_FACE or not has_corners(ground)
 
@@ -220,12 +229,12 @@ def put_in_place(
 
     The `count` contacts among the `total` candidates come before the loops.
     """
-    closed, face, tree, candidate = modes.closed, modes.face, equations.tree, assembly.candidate
+    face, tree, candidate = modes.face, equations.tree, assembly.candidate
     impulse, velocity = assembly.answer.impulse, assembly.answer.velocity
     for row in range(2 * total):
         kept[row] = impulse[row]
     for _ in range(2):
-        observe_rows(end, model, ground, closed, tree, rows, face, surface, loops)
+        observe_rows(end, model, ground, tree, rows, modes, surface, loops)
         size = 0
         for place in range(count):
             contact = candidate[place]
@@ -242,7 +251,7 @@ def put_in_place(
             contact = candidate[held.row[i] // 2]
             off = rows.gap[contact] if i < contacts else loops.rows.displacement[i - contacts]
             held.system[i, size] = -off
-        observe_rows(begin, model, ground, closed, tree, rows, face, surface, loops)
+        observe_rows(begin, model, ground, tree, rows, modes, surface, loops)
         solve_constraints(size, 0.0, assembly.problem.delassus, held)
         for row in range(2 * total):
             impulse[row] = 0.0
@@ -256,23 +265,23 @@ def put_in_place(
 @kernel
 def turn_rows(
     count: int, total: int, model: Model, ground: GroundModel, begin: Floats, end: Floats,
-    added: Floats, closed: Integers, tree: Workspace, rows: Rows, face: Integers, surface: Surface,
+    added: Floats, tree: Workspace, rows: Rows, modes: Modes, surface: Surface,
     assembly: Assembly, loops: Loops,
 ) -> None:  # fmt: skip
     """Let the free terms be those with which velocities at the end are what the problem says."""
     v, free, velocity = end[model.nq :], assembly.problem.free, assembly.answer.velocity
-    observe_rows(end, model, ground, closed, tree, rows, face, surface, loops)
+    observe_rows(end, model, ground, tree, rows, modes, surface, loops)
     for place in range(count, total):
         free[2 * place] += speed_along(place - count, loops, v) - velocity[2 * place]
     for place in range(count):
         contact = assembly.candidate[place]
-        if not keeps_face(contact, ground, rows, face):
+        if not keeps_face(contact, ground, rows, modes.face):
             continue
         normal, tangent = gap_velocity(contact, model, tree, rows, v)
         free[2 * place] += normal - (velocity[2 * place] - added[place])
-        if rows.kind[contact] != STOP:
+        if is_of_ground(contact, rows):
             free[2 * place + 1] += tangent - velocity[2 * place + 1]
-    observe_rows(begin, model, ground, closed, tree, rows, face, surface, loops)
+    observe_rows(begin, model, ground, tree, rows, modes, surface, loops)
 
 
 @kernel
@@ -308,8 +317,8 @@ def solve_bridge(
         )  # fmt: skip
         if attempt == 0:
             turn_rows(
-                count, total, model, ground, begin, end, added, modes.closed, equations.tree, rows,
-                modes.face, surface, assembly, loops,
+                count, total, model, ground, begin, end, added, equations.tree, rows, modes,
+                surface, assembly, loops,
             )  # fmt: skip
     return True
 
@@ -421,7 +430,7 @@ def adopt_end(
     evaluate_equations(model, q, v, equations)
     for point in range(model.nc):
         face[point] = NO_FACE
-    locate(q, model, ground, tree, closed, rows, face, surface)
+    locate(q, v, model, ground, tree, rows, modes, surface)
     for contact in range(modes.watched):
         kind, owner = rows.kind[contact], rows.owner[contact]
         modes.stuck[contact], slide[contact] = 0, 0

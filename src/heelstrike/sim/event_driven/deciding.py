@@ -10,7 +10,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.sets import INTERVAL, LINE
 from heelstrike.contact.workspace import ContactProblem
-from heelstrike.dynamics.kernels import forward_kinematics
+from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.latches import react
@@ -159,11 +159,12 @@ def begin_phase(
         note_residual(answer.residual, memory.tally)
     adopt_modes(count, assembly.candidate, answer.mode, rows, modes.closed, modes.slide, guess)
     begin, before = step.begin, decision.before
-    q = begin[: model.nq]
+    q, v = begin[: model.nq], begin[model.nq :]
     forward_kinematics(model, q, tree)
+    link_velocities(model, v, tree)
     begin_with_first(rows, guess, modes, work.impact.hit, work.bounces)
     choose_faces(model, ground, tree, modes.closed, modes.face, rows)
-    locate(q, model, ground, tree, modes.closed, rows, modes.face, surface)
+    locate(q, v, model, ground, tree, rows, modes, surface)
     form_groups(model, tree.angle, q, surface.friction, rows, modes)
     copy_state(begin, before)
     step.left, strayed, fastest = project(

@@ -170,9 +170,9 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
     was_closed, rows, loops = memory.reported.closed, memory.rows, memory.loops
     equations, assembly = memory.equations, memory.assembly
     candidate, jacobian, free = assembly.candidate, assembly.jacobian, assembly.problem.free
-    tree, rate, face = equations.tree, equations.rate, modes.face
+    tree, rate, face, bend = equations.tree, equations.rate, modes.face, modes.bend
     evaluate_equations(model, q, v, equations)
-    locate(q, model, ground, tree, modes.closed, rows, face, memory.surface)
+    locate(q, v, model, ground, tree, rows, modes, memory.surface)
     free_acceleration(
         model, state, memory.torque, rows, modes.slide, modes.breakaway, memory.pushes, equations,
         saddle.force,
@@ -182,7 +182,7 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
     write_candidates(count, candidate, model, tree, rows, assembly.leaf, jacobian)
     for place in range(count):
         contact = candidate[place]
-        free_gap_acceleration(contact, place, model, tree, rows, face, rate, jacobian, free)
+        free_gap_acceleration(contact, place, model, tree, rows, face, bend, rate, jacobian, free)
     total = append_loops(count, loops, assembly)
     free_loops(total, loops, rate, 1.0, assembly)
     if total > 0:  # the forces of what is closed act on the rest
@@ -198,7 +198,7 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
         if modes.closed[contact] == 1 or not touched:
             continue
         gap_rows(contact, total, model, tree, rows, assembly.leaf, jacobian)
-        free_gap_acceleration(contact, total, model, tree, rows, face, rate, jacobian, free)
+        free_gap_acceleration(contact, total, model, tree, rows, face, bend, rate, jacobian, free)
         normal, _ = gap_velocity(contact, model, tree, rows, v)
         pull = -free[2 * total]
         if not (pull > 0.0 and 0.0 < 2.0 * normal <= SHORTEST_BOUNCE * pull):

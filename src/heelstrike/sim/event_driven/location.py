@@ -73,8 +73,8 @@ def evaluate_within(part: float, length: float, with_forces: bool, within: Integ
         evaluate(scene, time, state, within.control, memory, phase, samples.slope)
     else:
         look(
-            state, scene.model, scene.ground, memory.equations.tree, memory.rows, memory.surface,
-            phase.modes, phase.watch,
+            state, scene.model, scene.ground, memory.equations.tree, memory.rows, phase.modes,
+            memory.surface, phase.watch,
         )  # fmt: skip
 
 

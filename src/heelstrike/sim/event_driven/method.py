@@ -17,6 +17,7 @@ from heelstrike.arguments import check_fields
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.contact.sets import ImpulseSet
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
@@ -89,6 +90,7 @@ class EventDriven(Method):
     which the robot moves, passes below the ground until it comes up again."""
 
     impulses_in_events: ClassVar[bool] = True
+    holds: ClassVar[frozenset[ImpulseSet]] = frozenset({ImpulseSet.LINE, ImpulseSet.HALF_LINE})
     python_period: ClassVar[float | None] = 1e-3
 
     def __post_init__(self) -> None:
@@ -135,7 +137,7 @@ class EventDriven(Method):
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
         others = 2 * robot.model.latches + robot.model.brakes
-        contacts = contact_count(robot.model)
+        contacts = contact_count(robot)
         return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contacts + others + 8
 
     def check(self, setting: Setting) -> None:
@@ -229,7 +231,7 @@ def begin(model: Model, ground: GroundModel, memory: Memory, work: Motion, recor
         step.begin[model.nq + i] = v[i]
     begin_rubbing(v, memory.breakaway, rows, modes, memory.reported)
     evaluate_equations(model, q, v, equations)
-    locate(q, model, ground, equations.tree, modes.closed, rows, modes.face, memory.surface)
+    locate(q, v, model, ground, equations.tree, rows, modes, memory.surface)
     code = meet_event(True, model, ground, memory, work, record)
     for i in range(model.nv):
         v[i] = step.begin[model.nq + i]
@@ -239,10 +241,10 @@ def begin(model: Model, ground: GroundModel, memory: Memory, work: Motion, recor
 @kernel
 def prepare(model: Model, ground: GroundModel, memory: Memory, work: Motion) -> None:
     """Kinematics, velocities and contact points of the state now."""
-    modes, q, tree = work.phase.modes, memory.q, memory.equations.tree
+    q, v, tree = memory.q, memory.v, memory.equations.tree
     forward_kinematics(model, q, tree)
-    link_velocities(model, memory.v, tree)
-    locate(q, model, ground, tree, modes.closed, memory.rows, modes.face, memory.surface)
+    link_velocities(model, v, tree)
+    locate(q, v, model, ground, tree, memory.rows, work.phase.modes, memory.surface)
 
 
 @kernel

@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
-from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
-from heelstrike.sim.contacts.rows import contact_count
+from heelstrike.sim.contacts.rows import contact_count, most_rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.continuous_extension import Extension
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
@@ -63,6 +62,8 @@ class Modes(Bundle):
     face: Integers = array("contacts", of=int)
     """Face of the ground that each closed contact point is on, -1 for none; the second that it is
     on, or could meet (:mod:`heelstrike.sim.event_driven.smooth.faces`)."""
+    bend: Floats = array("contacts")
+    """Curvature (1/m) of the way of the centre of each disc along smooth ground."""
 
 
 class Watch(Bundle):
@@ -343,7 +344,7 @@ class Integration(NamedTuple):
 def allocate_motion(robot: Robot) -> Motion:
     """Allocate the memory of an event-driven simulation of `robot`."""
     model = robot.model
-    contacts, loops = contact_count(model), most_rows(model)
+    contacts, loops = contact_count(robot), most_rows(robot)
     rows = 2 * contacts + loops
     extents = model.extents | {
         "contacts": contacts, "components": 2, "rows": rows, "unknowns": model.nv + rows,

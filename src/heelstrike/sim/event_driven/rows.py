@@ -8,7 +8,15 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.brakes import share_friction
 from heelstrike.sim.contacts.dry_friction import add_dry_force
 from heelstrike.sim.contacts.loops import note_loops, rows_of
-from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows, second_of
+from heelstrike.sim.contacts.rows import (
+    CONSTRAINT,
+    DRY_JOINT,
+    POINT,
+    SECOND_FACE,
+    STOP,
+    Rows,
+    second_of,
+)
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.continuous_extension import (
     BETWEEN,
@@ -148,20 +156,26 @@ def write_right(
     share_friction(model, modes.breakaway, friction_torque, record.brake_torque[row])
     for stop in range(rows.first[STOP], rows.end[STOP]):
         stop_torque[rows.owner[stop]] += rows.side[stop] * force[stop, 0]
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        record.constraint_force[row, rows.owner[entry], 0] = force[entry, 0]
     for point in range(rows.first[POINT], rows.end[POINT]):
-        second, slip = second_of(point, rows), 0.0
-        if modes.passing[point] == 0:
-            deepest = max(-rows.gap[point], -rows.gap[second])
-            memory.tally.penetration = max(memory.tally.penetration, deepest)
-        if lawful and modes.closed[point] == 1:
-            _, slip = gap_velocity(point, model, tree, rows, v)
-        if meets[point] == 1:
-            record.gap[row, point] = rows.gap[second]
-            _, slip = gap_velocity(second, model, tree, rows, v)
-        record.slip_velocity[row, point] = slip
+        slip, deepest = 0.0, -rows.gap[point]
         record.contact_force[row, point, 0] = force[point, 0]
         record.contact_force[row, point, 1] = force[point, 1]
-        record_corner(row, point, second, model, rows.normal, rows.position, force, meets, record)
+        if lawful and modes.closed[point] == 1:
+            _, slip = gap_velocity(point, model, tree, rows, v)
+        if scene.ground.concave == 1:
+            second = second_of(point, rows)
+            deepest = max(deepest, -rows.gap[second])
+            if meets[point] == 1:
+                record.gap[row, point] = rows.gap[second]
+                _, slip = gap_velocity(second, model, tree, rows, v)
+            record_corner(
+                row, point, second, model, rows.normal, rows.position, force, meets, record
+            )
+        record.slip_velocity[row, point] = slip
+        if modes.passing[point] == 0:
+            memory.tally.penetration = max(memory.tally.penetration, deepest)
     output.last_row = time
     period = output.period * output.every
     if period > 0.0 and abs(output.next_row * period - time) <= EVENT_TIME:

@@ -131,7 +131,7 @@ def end_at_event(length: float, taken: Integration) -> tuple[float, bool, bool]:
             memory.loops, taken.phase, step,
         ):  # fmt: skip
             return length, True, False
-        look(step.end, model, ground, tree, memory.rows, memory.surface, modes, watch)
+        look(step.end, model, ground, tree, memory.rows, modes, memory.surface, watch)
         if has_corners(ground):
             rate_corners(
                 model, ground, tree, modes.watched, memory.rows, modes.closed, modes.face, fired,

@@ -54,7 +54,7 @@ def pose_problem(
     problem, mode = assembly.problem, assembly.answer.mode
     for place in range(count):
         contact = assembly.candidate[place]
-        problem.set[place] = rows.set[rows.kind[contact]]
+        problem.set[place] = rows.set[contact]
         problem.friction[place] = friction[contact]
         mode[place] = STICK
         if accelerations:

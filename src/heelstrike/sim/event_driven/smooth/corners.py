@@ -14,12 +14,12 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.rows import STOP, Rows, second_of
+from heelstrike.sim.contacts.rows import CONSTRAINT, POINT, STOP, Rows, second_of
 from heelstrike.sim.event_driven.phase import Impact
 from heelstrike.sim.event_driven.steps import shortest_step
 from heelstrike.sim.memory import Reported
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event
+from heelstrike.sim.record.recording import CONSTRAINT_HOLDS, JOINT_STOP, TOUCHDOWN, log_event
 
 IMPACT = int(EventKind.IMPACT)
 
@@ -78,12 +78,13 @@ def report_impulses(
     and the point was not on the ground.
     """
     impulse, largest = impact.impulse, 0
-    for contact in range(rows.end[STOP]):
+    for contact in range(rows.end[CONSTRAINT]):
         normal = impulse[contact, 0]
-        if rows.kind[contact] == STOP:
+        if rows.kind[contact] != POINT:
             if normal != 0.0:  # it may pull, as a latch does
+                holds = JOINT_STOP if rows.kind[contact] == STOP else CONSTRAINT_HOLDS
                 reported.closed[contact] = 1
-                log_event(time, JOINT_STOP, rows.owner[contact], normal, 0.0, record)
+                log_event(time, holds, rows.owner[contact], normal, 0.0, record)
             continue
         second, told = second_of(contact, rows), kind
         largest = contact if normal > impulse[largest, 0] else largest

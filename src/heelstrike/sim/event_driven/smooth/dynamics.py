@@ -167,9 +167,9 @@ def list_pressing(
 
 @kernel
 def hold_by_saddle_point(
-    size: int, count: int, total: int, model: Model, rows: Rows, face: Integers, loop_bias: Floats,
-    latched: Integers, candidate: Integers, jacobian: Floats, tree: Workspace, matrix: Floats,
-    rate: Floats, answer: ContactAnswer, held: HeldRows, saddle: SaddlePoint,
+    size: int, count: int, total: int, model: Model, rows: Rows, face: Integers, bend: Floats,
+    loop_bias: Floats, latched: Integers, candidate: Integers, jacobian: Floats, tree: Workspace,
+    matrix: Floats, rate: Floats, answer: ContactAnswer, held: HeldRows, saddle: SaddlePoint,
 ) -> bool:  # fmt: skip
     """Contact forces that keep the modes, and the acceleration, from the full equations.
 
@@ -178,7 +178,7 @@ def hold_by_saddle_point(
     """
     nv, impulse, velocity = model.nv, answer.impulse, answer.velocity
     state_accelerations(
-        count, total, candidate, model, tree, rows, face, loop_bias, jacobian, saddle.bias
+        count, total, candidate, model, tree, rows, face, bend, loop_bias, jacobian, saddle.bias
     )
     mass_matrix(model, tree, matrix)
     write_equations(size, nv, matrix, jacobian, held, saddle.system)
@@ -220,7 +220,7 @@ def hold_closed(
     for place in range(count):
         contact = candidate[place]
         free_gap_acceleration(
-            contact, place, model, equations.tree, rows, modes.face, equations.rate,
+            contact, place, model, equations.tree, rows, modes.face, modes.bend, equations.rate,
             assembly.jacobian, free,
         )  # fmt: skip
         impulse[2 * place] = 0.0
@@ -236,7 +236,8 @@ def hold_closed(
     rank = solve_constraints(size, 1.0, assembly.problem.delassus, held)
     if is_delicate(size, rank, held.system):
         return hold_by_saddle_point(
-            size, count, total, model, rows, modes.face, loops.rows.bias, loops.held, candidate,
+            size, count, total, model, rows, modes.face, modes.bend, loops.rows.bias, loops.held,
+            candidate,
             assembly.jacobian, equations.tree, equations.mass_matrix, equations.rate,
             assembly.answer, held, saddle,
         )  # fmt: skip
@@ -254,34 +255,34 @@ def hold_closed(
 
 @kernel
 def observe_faces(
-    state: Floats, model: Model, ground: GroundModel, closed: Integers, tree: Workspace, rows: Rows,
-    face: Integers, surface: Surface,
+    state: Floats, model: Model, ground: GroundModel, tree: Workspace, rows: Rows, modes: Modes,
+    surface: Surface,
 ) -> None:  # fmt: skip
     """Kinematics, velocities, contact points and gaps of a state (q, v)."""
-    q = state[: model.nq]
+    q, v = state[: model.nq], state[model.nq :]
     forward_kinematics(model, q, tree)
-    link_velocities(model, state[model.nq :], tree)
-    locate(q, model, ground, tree, closed, rows, face, surface)
+    link_velocities(model, v, tree)
+    locate(q, v, model, ground, tree, rows, modes, surface)
 
 
 @kernel
 def observe_rows(
-    state: Floats, model: Model, ground: GroundModel, closed: Integers, tree: Workspace, rows: Rows,
-    face: Integers, surface: Surface, loops: Loops,
+    state: Floats, model: Model, ground: GroundModel, tree: Workspace, rows: Rows, modes: Modes,
+    surface: Surface, loops: Loops,
 ) -> None:  # fmt: skip
     """The same, and the rows of the loops."""
-    observe_faces(state, model, ground, closed, tree, rows, face, surface)
+    observe_faces(state, model, ground, tree, rows, modes, surface)
     if rows_of(loops) > 0:
         find_loops(model, state[: model.nq], state[model.nq :], tree, loops)
 
 
 @kernel
 def look(
-    state: Floats, model: Model, ground: GroundModel, tree: Workspace, rows: Rows, surface: Surface,
-    modes: Modes, watch: Watch,
+    state: Floats, model: Model, ground: GroundModel, tree: Workspace, rows: Rows, modes: Modes,
+    surface: Surface, watch: Watch,
 ) -> None:  # fmt: skip
     """Pose, contact points, and the event functions that need no forces, of a state (q, v)."""
-    observe_faces(state, model, ground, modes.closed, tree, rows, modes.face, surface)
+    observe_faces(state, model, ground, tree, rows, modes, surface)
     watch_geometry(model, ground, tree, state[model.nq :], rows, modes, watch.value, watch.rate)
 
 
@@ -301,7 +302,7 @@ def evaluate(
     equations, assembly, friction = memory.equations, memory.assembly, memory.surface.friction
     tree, rate = equations.tree, equations.rate
     evaluate_equations(model, q, v, equations)
-    locate(q, model, ground, tree, modes.closed, rows, modes.face, memory.surface)
+    locate(q, v, model, ground, tree, rows, modes, memory.surface)
     watch_geometry(model, ground, tree, v, rows, modes, watch.value, watch.rate)
     if control.continuous == 1:
         consult(scene.controller, time, q, v, model, memory, control, memory.command)

@@ -19,8 +19,9 @@ from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.places import velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contacts.candidates import locate_stops
+from heelstrike.sim.contacts.candidates import find_constraints, locate_stops
 from heelstrike.sim.contacts.faces import (
+    CURVE,
     NO_FACE,
     along_segment,
     center_of,
@@ -76,15 +77,21 @@ def locate_second(
 
 @kernel
 def locate(
-    q: Floats, model: Model, ground: GroundModel, tree: Workspace, closed: Integers, rows: Rows,
-    face: Integers, surface: Surface,
+    q: Floats, v: Floats, model: Model, ground: GroundModel, tree: Workspace, rows: Rows,
+    modes: Modes, surface: Surface,
 ) -> None:  # fmt: skip
-    """Gaps of points and stops, contact points, normals and ground coefficients of the state now.
+    """Gaps, contact points, normals and ground coefficients of the state now.
 
-    Its kinematics have been found.
+    Its kinematics and velocities have been found.
     """
+    closed, face = modes.closed, modes.face
     locate_contacts(model, ground, tree, rows, surface)
     locate_stops(q, rows)
+    if rows.outside.kernel.shape[0] > 0:
+        find_constraints(model, q, v, tree, rows)
+    if ground.curved == 1:
+        for point in range(model.nc):
+            face[point], modes.bend[point] = CURVE, surface.bend[point]
     if not has_corners(ground):
         return
     normals, normal = rows.normal, ground.normal

@@ -12,18 +12,23 @@ from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.places import bias_at, place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.candidates import write_own_rows
+from heelstrike.sim.contacts.faces import CURVE
 from heelstrike.sim.contacts.geometry import write_unit_row
-from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, STOP, Rows, is_of_ground
+from heelstrike.sim.contacts.writers import rate_of
 
 
 @kernel
 def gap_velocity(
     entry: int, model: Model, tree: Workspace, rows: Rows, v: Floats
 ) -> tuple[float, float]:
-    """Normal and tangential velocity of a contact point, on either face, or of a joint stop."""
+    """Normal and tangential velocity of a contact point, on either face, or of what has a gap."""
     owner = rows.owner[entry]
     if rows.kind[entry] == STOP:
         return rows.side[entry] * v[owner], 0.0
+    if rows.kind[entry] == CONSTRAINT:
+        return rate_of(owner, 0, v, rows.outside), 0.0
     place = place_of(tree, rows.position[entry])
     velocity = velocity_at(tree.velocity, model.contact_link[owner], place)
     return into_frame(rows.normal[entry], velocity)
@@ -34,10 +39,12 @@ def gap_rows(
     entry: int, place: int, model: Model, tree: Workspace, rows: Rows, leaf: Integers,
     jacobian: Floats,
 ) -> None:  # fmt: skip
-    """Write the Jacobian rows (normal, tangent) of a contact, stop or dry joint as a candidate."""
+    """Write the Jacobian rows (normal, tangent) of an entry as a candidate."""
     kind, owner = rows.kind[entry], rows.owner[entry]
     if kind == STOP:
         write_unit_row(owner, 2 * place, rows.side[entry], leaf, jacobian)
+    elif kind == CONSTRAINT:
+        write_own_rows(entry, place, rows, leaf, jacobian)
     elif kind == DRY_JOINT:
         write_unit_row(owner, 2 * place + 1, 1.0, leaf, jacobian)
     else:
@@ -58,10 +65,10 @@ def write_candidates(
 
 @dissolved_kernel
 def free_gap_acceleration(
-    entry: int, place: int, model: Model, tree: Workspace, rows: Rows, face: Integers, rate: Floats,
-    jacobian: Floats, free: Floats,
+    entry: int, place: int, model: Model, tree: Workspace, rows: Rows, face: Integers, bend: Floats,
+    rate: Floats, jacobian: Floats, free: Floats,
 ) -> None:  # fmt: skip
-    """Acceleration b = J v̇ + J̇ v of a contact, stop or dry joint, under v̇ = `rate`.
+    """Acceleration b = J v̇ + J̇ v of an entry, under v̇ = `rate`.
 
     Of a contact point it is that of the gap and of the sliding velocity: for a rolling disc the
     acceleration of its centre and not of the material point that touches the ground. The Jacobian
@@ -69,7 +76,9 @@ def free_gap_acceleration(
     """
     along_normal = 0.0
     along_tangent = 0.0
-    if rows.kind[entry] in (POINT, SECOND_FACE):
+    if rows.kind[entry] == CONSTRAINT:
+        along_normal = rows.outside.bias[rows.owner[entry], 0]
+    elif is_of_ground(entry, rows):
         point = rows.owner[entry]
         position, normal = rows.position[entry], rows.normal[entry]
         link, radius = model.contact_link[point], model.contact_radius[point]
@@ -77,9 +86,12 @@ def free_gap_acceleration(
         center = x - tree.pivot[0], z - tree.pivot[1]
         along_normal, along_tangent = into_frame(normal, bias_at(tree, link, center))
         along_tangent -= radius * tree.bias_acceleration[link, 0]
-        if face[entry] >= 0 and face[entry] % 2 == 1:  # the centre goes round a corner
+        curvature = bend[entry] if face[entry] == CURVE else 0.0
+        if face[entry] >= 0 and face[entry] % 2 == 1:
+            curvature = 1.0 / radius
+        if curvature != 0.0:  # the centre goes round a corner, or along a curve
             _, along = into_frame(normal, velocity_at(tree.velocity, link, center))
-            along_normal += 1.0 / radius * along * along
+            along_normal += curvature * along * along
     for j in range(model.nv):
         along_normal += jacobian[2 * place, j] * rate[j]
         along_tangent += jacobian[2 * place + 1, j] * rate[j]

@@ -6,11 +6,13 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, STOP, Rows
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, POINT, STOP, Rows, is_of_ground
 from heelstrike.sim.event_driven.phase import Modes
 from heelstrike.sim.event_driven.smooth.projection import tangential_place
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import (
+    CONSTRAINT_HOLDS,
+    CONSTRAINT_LETS_GO,
     JOINT_SLIP,
     JOINT_STICK,
     JOINT_STOP,
@@ -41,7 +43,7 @@ def adopt_modes(
         if mode == OPEN:
             closed[contact] = 0
             slide[contact] = 0
-        elif rows.kind[contact] == STOP:
+        elif rows.kind[contact] in (STOP, CONSTRAINT):
             continue
         elif mode == SLIP_FORWARD:
             slide[contact] = 1
@@ -59,21 +61,21 @@ def form_groups(
         modes.group[contact] = contact
         modes.carrier[contact] = 0
         modes.holder[contact] = 0
-        if rows.kind[contact] == STOP:
+        if rows.kind[contact] in (STOP, CONSTRAINT):
             modes.carrier[contact] = closed[contact]
         elif rows.kind[contact] == DRY_JOINT:
             modes.holder[contact] = 1 if closed[contact] == 1 and slide[contact] == 0 else 0
         elif closed[contact] == 1:
             join_group(contact, model, rows, modes)
     for leader in range(modes.watched):
-        if rows.kind[leader] in (STOP, DRY_JOINT):
+        if not is_of_ground(leader, rows):
             continue
         if closed[leader] == 1 and modes.group[leader] == leader:
             find_carriers(leader, rows, modes)
             if agree(leader, friction, modes) and slide[leader] == 0:
                 modes.holder[leader] = 1
     for contact in range(modes.watched):
-        if rows.kind[contact] == STOP:
+        if rows.kind[contact] in (STOP, CONSTRAINT):
             continue
         sticks = closed[contact] == 1 and slide[contact] == 0
         if sticks and stuck[contact] == 0:
@@ -93,7 +95,7 @@ def join_group(contact: int, model: Model, rows: Rows, modes: Modes) -> None:
     for other in range(contact):
         if modes.closed[other] == 0 or modes.group[other] != other:
             continue
-        if rows.kind[other] in (STOP, DRY_JOINT):
+        if not is_of_ground(other, rows):
             continue
         its_x, its_z = rows.normal[other, 0], rows.normal[other, 1]
         if model.contact_link[rows.owner[other]] != link:
@@ -172,6 +174,11 @@ def report_modes(
         elif kind[contact] == STOP:
             if landed and not starting:
                 log_event(time, JOINT_STOP, owner[contact], 0.0, 0.0, record)
+        elif kind[contact] == CONSTRAINT:
+            if landed and not starting:
+                log_event(time, CONSTRAINT_HOLDS, owner[contact], 0.0, 0.0, record)
+            elif was_closed[contact] == 1 and not touches:
+                log_event(time, CONSTRAINT_LETS_GO, owner[contact], 0.0, 0.0, record)
         elif kind[contact] == POINT:
             if was_closed[contact] == 1 and not touches:
                 log_event(time, LIFTOFF, contact, 0.0, 0.0, record)

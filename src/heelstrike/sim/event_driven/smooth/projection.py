@@ -9,9 +9,10 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import mass_matrix
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.faces import CURVE
 from heelstrike.sim.contacts.geometry import add_impulse, assemble_delassus, row_product, weigh
 from heelstrike.sim.contacts.loops import append_loops
-from heelstrike.sim.contacts.rows import DRY_JOINT, STOP, Rows
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, Rows
 from heelstrike.sim.event_driven.phase import HeldRows, Modes, Phase, SaddlePoint
 from heelstrike.sim.event_driven.smooth.dynamics import (
     list_closed,
@@ -45,11 +46,14 @@ def tangential_place(
 ) -> float:
     """Where a contact point is along the ground, less the length that its disc has rolled.
 
-    Of a joint with dry friction it is the position.
+    Of a joint with dry friction it is the position. On smooth ground nobody knows: there what
+    sticks is held by its velocity alone.
     """
     owner, position, normal = rows.owner[entry], rows.position[entry], rows.normal[entry]
     if rows.kind[entry] == DRY_JOINT:
         return q[owner]
+    if face[entry] == CURVE:
+        return 0.0
     radius = model.contact_radius[owner]
     rolled = radius * angle[model.contact_link[owner]]
     if face[entry] >= 0 and face[entry] % 2 == 1:
@@ -100,7 +104,7 @@ def list_sunk(count: int, rows: Rows, modes: Modes, fired: Integers, candidate: 
     What reaches the ground in this instant is none of them: it is the instant that is corrected.
     Returns how many candidates there are then.
     """
-    for contact in range(rows.end[STOP]):
+    for contact in range(rows.end[CONSTRAINT]):
         if modes.closed[contact] == 1 or fired[2 * contact] == 1 or modes.passing[contact] == 1:
             continue
         if -DEEP < rows.gap[contact] < -SHALLOW:
@@ -129,7 +133,7 @@ def project(
     system, row = held.system, held.row
     strayed, fastest = 0.0, 0.0
     for attempt in range(5):
-        observe_rows(state, model, ground, modes.closed, tree, rows, modes.face, surface, loops)
+        observe_rows(state, model, ground, tree, rows, modes, surface, loops)
         weigh(model, equations)
         count = list_closed(rows, modes, candidate, assembly.problem.bound)
         if attempt < 4:

@@ -114,7 +114,7 @@ def write_equations(
 @kernel
 def state_accelerations(
     count: int, total: int, candidate: Integers, model: Model, tree: Workspace, rows: Rows,
-    face: Integers, loop_bias: Floats, jacobian: Floats, bias: Floats,
+    face: Integers, bend: Floats, loop_bias: Floats, jacobian: Floats, bias: Floats,
 ) -> None:  # fmt: skip
     """State the problem of accelerations: J̇ v of the candidates, up to `total` those of loops.
 
@@ -122,7 +122,7 @@ def state_accelerations(
     """
     for place in range(count):
         free_gap_acceleration(
-            candidate[place], place, model, tree, rows, face, tree.zero, jacobian, bias
+            candidate[place], place, model, tree, rows, face, bend, tree.zero, jacobian, bias
         )
     for place in range(count, total):
         bias[2 * place] = loop_bias[place - count]
@@ -433,7 +433,8 @@ def solve_contacts(
     nothing is left where rounding of the matrix counts. Where the last evaluation took the full
     equations, the solvers are not asked unless the answer is not proven.
     """
-    saddle, held, slide, face = phase.saddle, phase.held, phase.modes.slide, phase.modes.face
+    saddle, held, slide = phase.saddle, phase.held, phase.modes.slide
+    face, bend = phase.modes.face, phase.modes.bend
     tree, matrix = memory.equations.tree, memory.equations.mass_matrix
     assembly, loops, rows = memory.assembly, memory.loops, memory.rows
     candidate, jacobian, bias = assembly.candidate, assembly.jacobian, saddle.bias
@@ -442,7 +443,7 @@ def solve_contacts(
     saddle.used = 0
     if accelerations and saddle.needed == 1:
         state_accelerations(
-            count, total, candidate, model, tree, rows, face, loops.rows.bias, jacobian, bias
+            count, total, candidate, model, tree, rows, face, bend, loops.rows.bias, jacobian, bias
         )
         mass_matrix(model, tree, matrix)
         pose_problem(count, total, True, friction, guess, rows, slide, loops.held, assembly)
@@ -462,7 +463,7 @@ def solve_contacts(
         return status
     if accelerations:
         state_accelerations(
-            count, total, candidate, model, tree, rows, face, loops.rows.bias, jacobian, bias
+            count, total, candidate, model, tree, rows, face, bend, loops.rows.bias, jacobian, bias
         )
     else:
         state_velocities(total, assembly.problem.free, saddle)

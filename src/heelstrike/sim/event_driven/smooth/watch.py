@@ -8,7 +8,8 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.writers import rate_of
 from heelstrike.sim.event_driven.phase import Modes, Watch
 from heelstrike.sim.event_driven.smooth.faces import has_corners, watch_corners
 from heelstrike.sim.event_driven.smooth.gaps import gap_velocity
@@ -83,6 +84,10 @@ def watch_geometry(
         if closed[contact] == 0:
             value[2 * contact] = rows.gap[contact]
             rate[2 * contact] = rows.side[contact] * v[rows.owner[contact]]
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        if closed[entry] == 0:
+            value[2 * entry] = rows.gap[entry]
+            rate[2 * entry] = rate_of(rows.owner[entry], 0, v, rows.outside)
     watch_faces(POINT, model, ground, tree, v, rows, closed, passing, slide, group, value, rate)
 
 
