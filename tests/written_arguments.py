@@ -18,7 +18,6 @@ from heelstrike.compiler.straight_line import play
 from heelstrike.robot.model import Model
 from heelstrike.sim.contacts.straight_line import KERNELS
 
-NOTHING: frozenset[str] = frozenset()
 NOWHERE: frozenset[tuple[str, ...]] = frozenset()
 
 
@@ -61,7 +60,7 @@ class _Reading(ast.NodeVisitor):
     """What of its arguments the names of a kernel stand for, what it touches, and what it writes.
 
     A name that is given an array or bundle stands for all that this may be, whatever else it is
-    given elsewhere.
+    given elsewhere. One that is given a tuple with names stands for each of what that is made of.
     """
 
     def __init__(self, kernel: Kernel) -> None:
@@ -70,7 +69,8 @@ class _Reading(ast.NodeVisitor):
         self.kinds = kinds_of(kernel)
         self.stands_for = {name: frozenset({(name,)}) for name in arguments_of(kernel)}
         self.given: dict[str, ast.expr] = {}
-        self.written: set[str] = set()
+        self.made: dict[str, dict[str, frozenset[Path]]] = {}
+        self.written: set[Path] = set()
         self.touched: set[Path] = set()
         known = -1
         while known != (known := sum(map(len, (*self.stands_for.values(), self.written)))):
@@ -189,16 +189,31 @@ class _Reading(ast.NodeVisitor):
             return
         names = arguments_of(kernel)
         for name, value in zip(names, values, strict=False):
+            if isinstance(value, ast.Name) and value.id in self.made:
+                self._hand_over_made(kernel, name, self.made[value.id])
+                continue
             handed = self.paths(value)
-            if name in written_by(kernel):
-                self._write_to(handed)
+            for written in writes_of(kernel):
+                if written[0] == name:
+                    self._write_to(frozenset(self._within(handed, written[1:])))
             if not handed or any(isinstance(each, ast.Slice) for each in ast.walk(value)):
                 self.visit(value)
-            for path in handed:
-                for touched in touched_by(kernel):
-                    if touched[0] == name:
-                        is_bundle = kind_at(self.kinds, path) is not None
-                        self.touched.add((*path, *touched[1:]) if is_bundle else path)
+            for touched in touched_by(kernel):
+                if touched[0] == name:
+                    self.touched |= self._within(handed, touched[1:])
+
+    def _within(self, paths: frozenset[Path], inside: Path) -> set[Path]:
+        """What is somewhere inside of paths that are bundles; the others by themselves."""
+        bundles = {path for path in paths if kind_at(self.kinds, path) is not None}
+        return {(*path, *inside) for path in bundles} | (paths - bundles)
+
+    def _hand_over_made(self, kernel: Kernel, name: str, made: dict[str, frozenset[Path]]) -> None:
+        """What a kernel does with a tuple that was made here it does with what is in it."""
+        for found, known in ((touched_by(kernel), self.touched), (writes_of(kernel), self.written)):
+            for path in found:
+                if path[0] == name:
+                    fields = path[1:2] or tuple(made)
+                    known.update(*(self._within(made[field], path[2:]) for field in fields))
 
     def _assign(self, target: ast.expr, value: ast.expr) -> None:
         if isinstance(target, ast.Tuple | ast.List):
@@ -207,6 +222,9 @@ class _Reading(ast.NodeVisitor):
                 self._assign(each, part)
         elif isinstance(target, ast.Name):
             self.given.setdefault(target.id, value)
+            if isinstance(value, ast.Call) and self._makes_a_tuple(value):
+                names = members_of(self._called(value.func))
+                self.made[target.id] = dict(zip(names, map(self.paths, value.args), strict=True))
             known = self.stands_for.get(target.id, NOWHERE)
             self.stands_for[target.id] = known | self.paths(value)
         else:
@@ -217,7 +235,7 @@ class _Reading(ast.NodeVisitor):
             self._write_to(self.paths(target))
 
     def _write_to(self, paths: frozenset[Path]) -> None:
-        self.written |= {path[0] for path in paths}
+        self.written |= paths
 
 
 def _each_of(value: ast.expr) -> list[ast.expr]:
@@ -302,10 +320,15 @@ def _read(kernel: Kernel) -> _Reading | None:
     return _readings[kernel]
 
 
+def writes_of(kernel: Kernel) -> frozenset[Path]:
+    """Return what of its arguments a kernel writes to, itself or by what it calls."""
+    reading = _read(kernel)
+    return NOWHERE if reading is None else frozenset(reading.written)
+
+
 def written_by(kernel: Kernel) -> frozenset[str]:
     """Return the names of the arguments that a kernel writes to, itself or by what it calls."""
-    reading = _read(kernel)
-    return NOTHING if reading is None else frozenset(reading.written & set(arguments_of(kernel)))
+    return frozenset(path[0] for path in writes_of(kernel)) & set(arguments_of(kernel))
 
 
 def touched_by(kernel: Kernel) -> frozenset[Path]:

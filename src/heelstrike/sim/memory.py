@@ -270,6 +270,13 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
 _MOLDS: WeakKeyDictionary[Robot, Mold[Memory]] = WeakKeyDictionary()
 
 
+def _contacts_of(kind: int, rows: Rows, extents: dict[str, int]) -> Contacts:
+    """Return the contact points on one of their faces, whose places are those of the table."""
+    its = slice(rows.first[kind], rows.end[kind])
+    gap, position, normal = rows.gap[its], rows.position[its], rows.normal[its]
+    return Contacts.allocate(extents, gap=gap, position=position, normal=normal)
+
+
 def _laid_out(robot: Robot) -> Memory:
     nc, model = robot.nc, robot.model
     rows = lay_out_rows(robot)
@@ -294,10 +301,8 @@ def _laid_out(robot: Robot) -> Memory:
         breakaway=model.dry_friction.copy(),
         rows=rows,
         equations=Equations.allocate(extents, programs=programs),
-        contacts=Contacts.allocate(extents, gap=rows.gap[rows.first[POINT] : rows.end[POINT]]),
-        seconds=Contacts.allocate(
-            extents, gap=rows.gap[rows.first[SECOND_FACE] : rows.end[SECOND_FACE]]
-        ),
+        contacts=_contacts_of(POINT, rows, extents),
+        seconds=_contacts_of(SECOND_FACE, rows, extents),
         assembly=assembly,
         solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
         usual=UsualPoints.allocate(

@@ -55,13 +55,13 @@ def robot_of_every_kind() -> Robot:
 
 
 def entries(kind: int) -> slice:
-    rows = lay_out_rows(robot_of_every_kind().model)
+    rows = lay_out_rows(robot_of_every_kind())
     return slice(int(rows.first[kind]), int(rows.end[kind]))
 
 
 def test_entries_go_kind_by_kind_without_a_gap() -> None:
-    rows = lay_out_rows(robot_of_every_kind().model)
-    assert [int(n) for n in rows.end - rows.first] == [2, 4, 2, 2, 2, 1, 2]
+    rows = lay_out_rows(robot_of_every_kind())
+    assert [int(n) for n in rows.end - rows.first] == [2, 4, 0, 2, 2, 2, 1, 0, 2]
     assert rows.first[POINT] == 0  # points have the numbers of `Contacts`
     np.testing.assert_array_equal(rows.first[1:], rows.end[:-1])
     assert rows.end[-1] == len(rows.kind)
@@ -71,7 +71,7 @@ def test_entries_go_kind_by_kind_without_a_gap() -> None:
 
 def test_each_entry_says_of_what_it_is() -> None:
     robot = robot_of_every_kind()
-    rows = lay_out_rows(robot.model)
+    rows = lay_out_rows(robot)
     hip, knee, arm, hand = (robot.joint_index(name) for name in ("hip", "knee", "arm", "hand"))
     owners = {
         POINT: [0, 1], STOP: [hip, knee, knee, arm], DRY_JOINT: [arm, hand],
@@ -86,22 +86,23 @@ def test_each_entry_says_of_what_it_is() -> None:
     assert (rows.kind[latch], rows.owner[latch], rows.side[latch]) == (STOP, knee, -1.0)
 
 
-def test_kinds_have_their_sets_and_numbers_of_components() -> None:
-    rows = lay_out_rows(robot_of_every_kind().model)
-    assert list(rows.set) == [CONE, HALF_LINE, INTERVAL, CONE, LINE, LINE, LINE]
-    assert list(rows.components) == [2, 1, 1, 2, 1, 1, 1]
+def test_entries_have_the_sets_of_their_kinds() -> None:
+    rows = lay_out_rows(robot_of_every_kind())
+    sets = {POINT: CONE, STOP: HALF_LINE, DRY_JOINT: INTERVAL, SECOND_FACE: CONE, LOOP: LINE}
+    for kind, its in (sets | {COUPLING: LINE, BRAKE: LINE}).items():
+        assert (rows.set[entries(kind)] == its).all(), KINDS[kind].name
 
 
 def test_kinds_that_a_robot_does_not_have_are_not_there() -> None:
     build = RobotBuilder("ball")
     build.floating_base("ball", mass=1.0, inertia=0.1)
     build.contact("ball", (0.0, 0.0), radius=0.1)
-    rows = lay_out_rows(build.build().model)
-    assert [int(n) for n in rows.end - rows.first] == [1, 0, 0, 1, 0, 0, 0]
+    rows = lay_out_rows(build.build())
+    assert [int(n) for n in rows.end - rows.first] == [1, 0, 0, 0, 1, 0, 0, 0, 0]
 
 
-def test_gaps_of_points_on_both_faces_are_those_of_the_table() -> None:
-    """What finds the contact points writes the table's gaps."""
+def test_places_of_points_on_both_faces_are_those_of_the_table() -> None:
+    """What finds the contact points writes the table's gaps, places and normals."""
     memory = allocate_memory(robot_of_every_kind())
     rows = memory.rows
     assert np.isposinf(rows.gap).all()
@@ -109,6 +110,11 @@ def test_gaps_of_points_on_both_faces_are_those_of_the_table() -> None:
     memory.seconds.gap[:] = 3.0, 4.0
     np.testing.assert_array_equal(rows.gap[entries(POINT)], [1.0, 2.0])
     np.testing.assert_array_equal(rows.gap[entries(SECOND_FACE)], [3.0, 4.0])
+    for name in ("position", "normal"):
+        first, second = getattr(memory.contacts, name), getattr(memory.seconds, name)
+        first[:], second[:] = np.eye(2), -np.eye(2)
+        np.testing.assert_array_equal(getattr(rows, name)[entries(POINT)], np.eye(2))
+        np.testing.assert_array_equal(getattr(rows, name)[entries(SECOND_FACE)], -np.eye(2))
     assert np.isposinf(rows.gap[entries(STOP)]).all()
 
 

@@ -92,9 +92,9 @@ def observe_sides(
         face, other = corners.first[point], corners.second[point]
         if other == NO_FACE:
             continue
-        locate_on_face(model, ground, tree, point, face, memory.contacts)
+        locate_on_face(model, ground, tree, point, face, point, memory.contacts)
         take_surface(model, ground, point, point, face, memory.surface)
-        locate_on_face(model, ground, tree, point, other, seconds)
+        locate_on_face(model, ground, tree, point, other, point, seconds)
         friction = ground.friction[other // 2 - other % 2]
         corners.friction[point] = model.friction_scale[point] * friction
 

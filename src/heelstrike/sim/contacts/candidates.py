@@ -12,7 +12,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, STICK
 from heelstrike.contact.sets import INTERVAL
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.geometry import EVERYWHERE, contact_rows, write_unit_row
 from heelstrike.sim.contacts.latches import hold
 from heelstrike.sim.contacts.loops import note_loops
@@ -111,14 +111,13 @@ def find_constraints(model: Model, q: Floats, v: Floats, tree: Workspace, rows: 
 
 
 @kernel
-def write_own_rows(entry: int, place: int, rows: Rows, assembly: Assembly) -> None:
+def write_own_rows(entry: int, place: int, rows: Rows, leaf: Integers, jacobian: Floats) -> None:
     """Write the rows that the kernel of a constraint wrote as those of a candidate."""
-    jacobian, its, rubs = assembly.jacobian, rows.outside.jacobian, rows.set[entry] == INTERVAL
-    own = rows.owner[entry]
+    its, rubs, own = rows.outside.jacobian, rows.set[entry] == INTERVAL, rows.owner[entry]
     for j in range(jacobian.shape[1]):
         jacobian[2 * place, j] = 0.0 if rubs else its[own, 0, j]
         jacobian[2 * place + 1, j] = its[own, 0 if rubs else 1, j]
-    assembly.leaf[place] = EVERYWHERE
+    leaf[place] = EVERYWHERE
 
 
 @kernel
@@ -134,11 +133,14 @@ def write_rows(
         contact_rows(model, tree, contacts, rows.owner[assembly.candidate[place]], place, assembly)
     for place in range(assembly.begin[STOP], assembly.until[STOP]):
         stop = assembly.candidate[place]
-        write_unit_row(rows.owner[stop], 2 * place, rows.side[stop], assembly)
+        side = rows.side[stop]
+        write_unit_row(rows.owner[stop], 2 * place, side, assembly.leaf, assembly.jacobian)
     for place in range(assembly.begin[CONSTRAINT], assembly.until[CONSTRAINT]):
-        write_own_rows(assembly.candidate[place], place, rows, assembly)
+        entry = assembly.candidate[place]
+        write_own_rows(entry, place, rows, assembly.leaf, assembly.jacobian)
     for place in range(assembly.begin[DRY_JOINT], assembly.until[DRY_JOINT]):
-        write_unit_row(rows.owner[assembly.candidate[place]], 2 * place + 1, 1.0, assembly)
+        joint = rows.owner[assembly.candidate[place]]
+        write_unit_row(joint, 2 * place + 1, 1.0, assembly.leaf, assembly.jacobian)
     for place in range(assembly.begin[SECOND_FACE], assembly.until[SECOND_FACE]):
         contact_rows(model, tree, seconds, rows.owner[assembly.candidate[place]], place, assembly)
 

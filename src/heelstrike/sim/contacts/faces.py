@@ -16,6 +16,7 @@ from heelstrike.contact.ground import GroundModel, line_contact, turn_at
 from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
+from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import Surface
 from heelstrike.tolerances import STRAIGHT_GROUND
@@ -148,7 +149,7 @@ def second_face(
 
 
 @kernel
-def center_of(model: Model, contacts: Contacts, point: int) -> tuple[float, float]:
+def center_of(model: Model, contacts: Contacts | Rows, point: int) -> tuple[float, float]:
     """Where the centre of the disc of a contact point is."""
     position, normal = contacts.position[point], contacts.normal[point]
     radius = model.contact_radius[point]
@@ -157,10 +158,14 @@ def center_of(model: Model, contacts: Contacts, point: int) -> tuple[float, floa
 
 @kernel
 def locate_on_face(
-    model: Model, ground: GroundModel, tree: Workspace, point: int, face: int, contacts: Contacts
-) -> None:
-    """Contact point, gap and normal of a disc on a face, wherever it is along it."""
-    place, normal = contacts.position[point], contacts.normal[point]
+    model: Model, ground: GroundModel, tree: Workspace, point: int, face: int, entry: int,
+    contacts: Contacts | Rows,
+) -> None:  # fmt: skip
+    """Contact point, gap and normal of a disc on a face, wherever it is along it.
+
+    They are written as those of an `entry`.
+    """
+    place, normal = contacts.position[entry], contacts.normal[entry]
     radius = model.contact_radius[point]
     point_position(tree, model.contact_link[point], model.contact_position[point], place)
     if face % 2 == 0:
@@ -170,7 +175,7 @@ def locate_on_face(
         distance = math.sqrt((place[0] - corner[0]) ** 2 + (place[1] - corner[1]) ** 2)
         normal[0] = (place[0] - corner[0]) / distance
         normal[1] = (place[1] - corner[1]) / distance
-    contacts.gap[point] = distance - radius
+    contacts.gap[entry] = distance - radius
     place[0] -= radius * normal[0]
     place[1] -= radius * normal[1]
 

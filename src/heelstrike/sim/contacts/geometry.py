@@ -22,7 +22,8 @@ from heelstrike.dynamics.kernels import (
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.spatial import plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.contacts.straight_line import EQUATIONS, SOLVE
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import Assembly, Equations, Memory, Surface
@@ -33,7 +34,7 @@ EVERYWHERE = -1
 
 @kernel
 def locate_contacts(
-    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, surface: Surface
+    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts | Rows, surface: Surface
 ) -> None:
     """Contact points, gaps, normals and coefficients of the state now (eq. 6, 7)."""
     for i in range(model.nc):
@@ -99,17 +100,17 @@ def row_product(jacobian: Floats, row: int, v: Floats) -> float:
 
 
 @kernel
-def write_unit_row(joint: int, row: int, sign: float, assembly: Assembly) -> None:
+def write_unit_row(joint: int, row: int, sign: float, leaf: Integers, jacobian: Floats) -> None:
     """Write the Jacobian rows of the candidate of `row`, of which this is the velocity of a joint.
 
     The other row of the two is zero.
     """
-    place, jacobian = row // 2, assembly.jacobian
+    place = row // 2
     for j in range(jacobian.shape[1]):
         jacobian[2 * place, j] = 0.0
         jacobian[2 * place + 1, j] = 0.0
     jacobian[row, joint] = sign
-    assembly.leaf[place] = joint
+    leaf[place] = joint
 
 
 @dissolved_kernel

@@ -89,6 +89,10 @@ class Rows(Bundle):
     gap: Floats = array("entries")
     """How far each is from what would hold it (m, rad), infinite if it has no gap: of points and
     second faces as they were located last, of stops as somebody wrote it."""
+    position: Floats = array("entries", "axes")
+    normal: Floats = array("entries", "axes")
+    """position, normal: Where each contact point is on its face, and the normal of that, of points
+    and second faces as they were located last."""
     latch_stop: Integers = array("latches", of=int)
     """The stop that each latch is."""
     outside: Writers = part(Writers)
@@ -151,6 +155,7 @@ def lay_out_rows(robot: Robot) -> Rows:
         kinds=len(KINDS),
         entries=int(end[-1]),
         latches=model.latches,
+        axes=model.axes,
         first=first,
         end=end,
         set=np.repeat([kind.set for kind in KINDS], sizes),

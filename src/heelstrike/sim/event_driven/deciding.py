@@ -7,36 +7,28 @@ so the problem is put a moment ahead; where it has no solution velocities jump w
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
-from heelstrike.contact.sets import LINE
+from heelstrike.contact.sets import INTERVAL, LINE
+from heelstrike.contact.workspace import ContactProblem
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.candidates import find_constraints
 from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import rows_of
-from heelstrike.sim.contacts.rows import (
-    CONSTRAINT,
-    DRY_JOINT,
-    POINT,
-    STOP,
-    Rows,
-)
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.impact import collide
-from heelstrike.sim.event_driven.phase import Impact, Modes, Motion, Phase, Step, Watch
+from heelstrike.sim.event_driven.phase import Modes, Motion, Watch
 from heelstrike.sim.event_driven.rows import write_row
-from heelstrike.sim.event_driven.smooth.corners import is_struck, log_impulse
-from heelstrike.sim.event_driven.smooth.dynamics import evaluate
-from heelstrike.sim.event_driven.smooth.faces import choose_faces, locate
+from heelstrike.sim.event_driven.smooth.corners import report_impulses
+from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate
+from heelstrike.sim.event_driven.smooth.faces import begin_with_first, choose_faces, locate
 from heelstrike.sim.event_driven.smooth.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.smooth.projection import is_in_place, project
-from heelstrike.sim.event_driven.smooth.saddle_point import solve_accelerations
+from heelstrike.sim.event_driven.smooth.saddle_point import solve_contacts
 from heelstrike.sim.frame import Scene
-from heelstrike.sim.memory import Assembly, Memory
+from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import CONSTRAINT_HOLDS, JOINT_STOP, log_event, note_residual
+from heelstrike.sim.record.recording import log_event, note_residual
 from heelstrike.tolerances import CLOSED_GAP
 
 PAINLEVE = int(EventKind.PAINLEVE)
@@ -101,115 +93,83 @@ def is_unclear(ahead: float, watch: Watch) -> bool:
 
 
 @kernel
-def jump(
-    model: Model, nudge: float, memory: Memory, phase: Phase, step: Step, impact: Impact,
-    plastic: Integers, record: Record,
-) -> bool:  # fmt: skip
+def jump(model: Model, nudge: float, memory: Memory, work: Motion, record: Record) -> bool:
     """Let velocities jump without a collision (Painlevé's paradox); return success."""
-    modes = phase.modes
-    begin, before = step.begin, impact.before
-    for i in range(begin.shape[0]):
-        before[i] = begin[i]
+    modes, step, impact, plastic = work.phase.modes, work.step, work.impact, work.bounces.plastic
+    copy_state(step.begin, impact.before)
     for contact in range(modes.watched):
         impact.hit[contact] = 0
         plastic[contact] = modes.closed[contact]
-    solved, _, _ = collide(model, nudge, plastic, memory, phase, impact, step.begin)
+    solved, _, _ = collide(model, nudge, memory, work)
     for contact in range(modes.watched):
         plastic[contact] = 0
-    for contact in range(memory.rows.end[CONSTRAINT]):
-        if not solved:
-            continue
-        if memory.rows.kind[contact] == CONSTRAINT and impact.impulse[contact, 0] > 0.0:
-            number = memory.rows.owner[contact]
-            impulse = impact.impulse[contact, 0]
-            log_event(step.time, CONSTRAINT_HOLDS, number, impulse, 0.0, record)
-        if memory.rows.kind[contact] == STOP and impact.impulse[contact, 0] > 0.0:
-            joint = memory.rows.owner[contact]
-            log_event(step.time, JOINT_STOP, joint, impact.impulse[contact, 0], 0.0, record)
-        elif memory.rows.kind[contact] == POINT and is_struck(
-            contact, memory.rows, phase.faces.paired, impact.impulse
-        ):
-            log_impulse(
-                PAINLEVE, contact, memory.contacts, memory.rows, memory.seconds, phase.faces.paired,
-                step.time, impact, record,
-            )  # fmt: skip
-    if not solved:
-        for i in range(begin.shape[0]):
-            begin[i] = before[i]
+    if solved:
+        report_impulses(PAINLEVE, step.time, memory.rows, impact, memory.reported, record)
+    else:
+        copy_state(impact.before, step.begin)
     return bool(solved)
 
 
 @kernel
 def leave_if_possible(
-    count: int, friction: Floats, rows: Rows, slide: Integers, time: float, assembly: Assembly,
-    record: Record,
+    count: int, candidate: Integers, problem: ContactProblem, friction: Floats, owner: Integers,
+    slide: Integers, time: float, mode: Integers, record: Record,
 ) -> None:  # fmt: skip
-    """Let all points leave the ground, if that is one of several solutions."""
-    free, delassus = assembly.problem.free, assembly.problem.delassus
+    """Let all points leave the ground, if that is one of several solutions.
+
+    `mode` are those of the candidates, `owner` of what each entry of the table is.
+    """
+    free, delassus = problem.free, problem.delassus
     several = False
     apart = True
     for place in range(count):
-        contact, row = assembly.candidate[place], 2 * place
-        if rows.kind[contact] == DRY_JOINT:
+        contact, row = candidate[place], 2 * place
+        if problem.set[place] == INTERVAL:
             continue
         apart = apart and free[row] >= 0.0
         lean = -slide[contact] * friction[contact]
         if delassus[row, row] + lean * delassus[row, row + 1] <= 0.0:
             # Pressing it harder would push it into the ground: there are other solutions.
             several = True
-            point = rows.owner[contact]
-            log_event(time, PAINLEVE, point, 0.0, 0.0, record)
+            log_event(time, PAINLEVE, owner[contact], 0.0, 0.0, record)
     if several and apart:
         for place in range(count):
-            contact = assembly.candidate[place]
-            is_dry = rows.kind[contact] == DRY_JOINT
-            if not is_dry and assembly.problem.set[place] != LINE:
-                assembly.answer.mode[place] = OPEN
+            if problem.set[place] not in (INTERVAL, LINE):
+                mode[place] = OPEN
 
 
 @kernel
 def begin_phase(
-    model: Model, ground: GroundModel, count: int, memory: Memory, work: Motion, record: Record
+    scene: Scene, count: int, control: Control, memory: Memory, work: Motion, record: Record
 ) -> bool:
-    """Begin a phase with the modes that the acceleration-level problem has found.
+    """Begin a phase with the modes that the acceleration-level problem has found, and evaluate it.
 
-    Returns false if the state is not one of such modes.
+    Returns false if the state is not one of such modes, or the forces contradict them.
     """
-    phase = work.phase
-    step, series, decision = work.step, work.series, work.decision
-    assembly, friction = memory.assembly, memory.surface.friction
-    if rows_of(memory.loops) == 0:  # with loops neither matrix nor free term tell enough
+    phase, step, series, decision = work.phase, work.step, work.series, work.decision
+    modes, rows, assembly, surface = phase.modes, memory.rows, memory.assembly, memory.surface
+    model, ground, equations, loops = scene.model, scene.ground, memory.equations, memory.loops
+    answer, guess, tree = assembly.answer, memory.reaction.mode, equations.tree
+    if rows_of(loops) == 0:  # with loops neither matrix nor free term tell enough
         leave_if_possible(
-            count, friction, memory.rows, phase.modes.slide, step.time, assembly, record
-        )
+            count, assembly.candidate, assembly.problem, surface.friction, rows.owner, modes.slide,
+            step.time, answer.mode, record,
+        )  # fmt: skip
     if count > 0:
-        note_residual(assembly.answer.residual, memory.tally)
-    adopt_modes(count, assembly, memory.rows, phase.modes, memory.reaction.mode)
-    tree, contacts = memory.equations.tree, memory.contacts
-    forward_kinematics(model, step.begin[: model.nq], tree)
-    if memory.rows.outside.kernel.shape[0] > 0:
-        q, v = step.begin[: model.nq], step.begin[model.nq :]
-        link_velocities(model, v, tree)
-        find_constraints(model, q, v, tree, memory.rows)
-    choose_faces(
-        model, ground, tree, memory.rows, memory.reaction.mode, phase.modes, phase.faces,
-        work.impact.hit, work.bounces,
-    )  # fmt: skip
-    locate(
-        model, ground, tree, memory.rows, phase.modes, memory.seconds, phase.faces, contacts,
-        memory.surface,
-    )  # fmt: skip
-    form_groups(
-        model, tree.angle, contacts, friction, memory.rows, memory.seconds, phase.faces.face,
-        step.begin, phase.modes,
-    )  # fmt: skip
+        note_residual(answer.residual, memory.tally)
+    adopt_modes(count, assembly.candidate, answer.mode, rows, modes.closed, modes.slide, guess)
     begin, before = step.begin, decision.before
-    for i in range(begin.shape[0]):
-        before[i] = begin[i]
+    q, v = begin[: model.nq], begin[model.nq :]
+    forward_kinematics(model, q, tree)
+    link_velocities(model, v, tree)
+    begin_with_first(rows, guess, modes, work.impact.hit, work.bounces)
+    choose_faces(model, ground, tree, modes.closed, modes.face, rows)
+    locate(q, v, model, ground, tree, rows, modes, surface)
+    form_groups(model, tree.angle, q, surface.friction, rows, modes)
+    copy_state(begin, before)
     step.left, strayed, fastest = project(
-        model, ground, memory.rows, memory.equations, contacts, memory.surface, assembly,
-        memory.loops, memory.seconds, phase, begin,
-    )  # fmt: skip
+        model, ground, equations, rows, surface, assembly, loops, phase, begin
+    )
     closest, slip = (ON_THE_GROUND, FITTING) if decision.started == BEGUN else (CLOSED_GAP, UNSEEN)
     if series.last_end == step.time:
         slip += BRIDGED * min(series.length, LONG_BRIDGE)
@@ -217,17 +177,19 @@ def begin_phase(
     for i in range(begin.shape[0]):
         fits = fits and abs(begin[i] - before[i]) <= slip * (1.0 + abs(before[i]))
     if not fits:
-        for i in range(begin.shape[0]):
-            begin[i] = before[i]
-        fits = is_in_place(strayed, fastest)
+        copy_state(before, begin)
         step.left = strayed
-    if fits:
-        first = record.events
-        report_modes(
-            step.time, decision.started == BEGUN, memory.rows, phase.modes, memory.reported, record,
-        )  # fmt: skip
-        react(model, first, begin[: model.nq], record, memory.loops)
-    return fits
+        if not is_in_place(strayed, fastest):
+            return False
+    first, reported = record.events, memory.reported
+    report_modes(
+        step.time, decision.started == BEGUN, modes.watched, rows.kind, rows.owner, modes.closed,
+        modes.slide, reported.closed, reported.slipping, record,
+    )  # fmt: skip
+    react(model, first, q, record, loops)
+    decision.forced = decision.jammed = 0
+    evaluate(scene, step.time, begin, control, memory, phase, step.slopes[0])
+    return not contradicts_itself(modes, phase.watch, phase.forces.deficient)
 
 
 @kernel
@@ -243,9 +205,7 @@ def decide_modes(
     point (`jammed`), the velocities jump without a collision (Painlevé's paradox). Where it has
     several, the points leave the ground if that is one of them.
     """
-    phase = work.phase
-    step, decision = work.step, work.decision
-    model = scene.model
+    phase, step, decision, model = work.phase, work.step, work.decision, scene.model
     forced, jammed = decision.forced == 1, decision.jammed == 1
     ahead = FIRST_LOOK if forced else 0.0
     nudge = NUDGE
@@ -264,21 +224,17 @@ def decide_modes(
                 continue
         count = phase.forces.count
         if not jammed and count > 0:
-            status = solve_accelerations(count, model, decision.state, memory, phase)
-            jammed = status != SOLVED
+            jammed = solve_contacts(count, True, model, memory, phase) != SOLVED
             if jammed and ahead > 0.0:
                 ahead = 0.0
                 continue
         if not jammed:
-            return begin_phase(model, scene.ground, count, memory, work, record)
+            return begin_phase(scene, count, control, memory, work, record)
         jammed = False
         if work.output.last_row < step.time:
-            write_row(
-                scene, step.time, step.begin, False, step, work.impact, control, memory, phase,
-                work.output, record,
-            )  # fmt: skip
+            write_row(scene, False, control, memory, work, record)
         evaluate(scene, step.time, step.begin, control, memory, phase, decision.slope)
-        if not jump(model, nudge, memory, phase, step, work.impact, work.bounces.plastic, record):
+        if not jump(model, nudge, memory, work, record):
             return False
         nudge = min(HARDER * nudge, HARDEST)
     return False

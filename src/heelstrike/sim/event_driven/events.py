@@ -8,29 +8,22 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import momentum
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Integers, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.faces import locate_on_face, take_surface
 from heelstrike.sim.contacts.latches import react
-from heelstrike.sim.contacts.rows import (
-    DRY_JOINT,
-    POINT,
-    SECOND_FACE,
-    Rows,
-    second_of,
-)
-from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, Rows, second_of
 from heelstrike.sim.event_driven.deciding import BEGUN, ON_THE_GROUND, WALKING
 from heelstrike.sim.event_driven.impact import REST, SHORTEST_BOUNCE, heading, strike
 from heelstrike.sim.event_driven.location import GAP_NOISE, TOGETHER
-from heelstrike.sim.event_driven.phase import Bounces, Decision, Faces, Impact, Modes, Phase, Step
-from heelstrike.sim.event_driven.smooth.corners import impulse_of
+from heelstrike.sim.event_driven.phase import Modes, Motion
+from heelstrike.sim.event_driven.smooth.corners import joined
 from heelstrike.sim.event_driven.smooth.faces import (
     is_at_second,
     leave_second_face,
     stand_on_face,
     turn_corner,
 )
-from heelstrike.sim.event_driven.smooth.gaps import gap_now, gap_velocity
+from heelstrike.sim.event_driven.smooth.gaps import gap_velocity
 from heelstrike.sim.frame import DONE
 from heelstrike.sim.memory import Memory, Surface
 from heelstrike.sim.record.record import Record
@@ -44,40 +37,40 @@ LYING = 3
 
 
 @kernel
-def behind(contact: int, direction: float, contacts: Contacts, modes: Modes) -> bool:
-    """Whether a point is behind one on the ground and, by the rule, may pass below it.
+def behind(point: int, direction: float, nc: int, rows: Rows, closed: Integers) -> bool:
+    """Whether a point is behind one on the ground, where the rule may let it pass below.
 
     Feet of legs of one length reach the ground where they pass each other: a foot beside the other
     is not ahead of it, whatever rounding says.
     """
     forward = -1.0 if direction < 0.0 else 1.0
-    for other in range(contacts.gap.shape[0]):
-        ahead = contacts.position[other, 0] - contacts.position[contact, 0]
-        if modes.closed[other] == 1 and forward * ahead > -BESIDE:
-            return modes.let_pass == 1
+    for other in range(nc):
+        ahead = rows.position[other, 0] - rows.position[point, 0]
+        if closed[other] == 1 and forward * ahead > -BESIDE:
+            return True
     return False
 
 
 @kernel
 def turns_over(
-    model: Model, ground: GroundModel, tree: Workspace, contact: int, rows: Rows,
-    contacts: Contacts, surface: Surface, seconds: Contacts, modes: Modes, faces: Faces,
-    fired: Integers,
+    contact: int, model: Model, ground: GroundModel, tree: Workspace, watched: int, rows: Rows,
+    closed: Integers, slide: Integers, stuck: Integers, face: Integers, fired: Integers,
+    surface: Surface,
 ) -> bool:  # fmt: skip
     """Let a point that has come to the end of its face go over to the next; tell whether it has."""
-    if rows.kind[contact] != POINT or fired[2 * modes.watched + contact] == 0:
+    corner = 2 * watched + contact
+    if rows.kind[contact] != POINT or fired[corner] == 0:
         return False
-    fired[2 * modes.watched + contact] = 0
-    two_faces = faces.paired == 1 and modes.closed[second_of(contact, rows)]
+    fired[corner] = 0
+    two_faces = ground.concave == 1 and closed[second_of(contact, rows)] == 1
     if two_faces and leave_second_face(
-        model, ground, tree, contact, contacts, rows, surface, seconds, modes, faces.face, fired
+        contact, model, ground, tree, rows, closed, slide, stuck, face, fired, surface
     ):
         return False
-    if turn_corner(model, ground, contact, contacts, modes.stuck, faces):
-        face = faces.face[contact]
-        locate_on_face(model, ground, tree, contact, face, contacts)
-        take_surface(model, ground, contact, contact, face, surface)
-        modes.closed[contact] = 0
+    if turn_corner(contact, model, ground, rows, stuck, face):
+        locate_on_face(model, ground, tree, contact, face[contact], contact, rows)
+        take_surface(model, ground, contact, contact, face[contact], surface)
+        closed[contact] = 0
     return True
 
 
@@ -93,8 +86,8 @@ def touches_at_start(contact: int, gap: float, rows: Rows, modes: Modes) -> bool
 @kernel
 def find_what_happened(
     starting: bool, direction: float, model: Model, ground: GroundModel, tree: Workspace,
-    rows: Rows, step: Step, contacts: Contacts, surface: Surface, seconds: Contacts, phase: Phase,
-    hit: Integers, bounces: Bounces,
+    time: float, v: Floats, last_blow: float, rows: Rows, surface: Surface, modes: Modes,
+    fired: Integers, hit: Integers, accumulation: Floats,
 ) -> tuple[bool, bool]:  # fmt: skip
     """Tell what ended the step: whether an impact, or contact forces at their limits.
 
@@ -102,32 +95,24 @@ def find_what_happened(
     that stop are at rest; an impact goes through those that touch without force. At the start of a
     run every point near the ground touches it.
     """
-    modes, watch = phase.modes, phase.watch
-    strikes = False
-    forced = False
+    strikes = forced = False
     rest = ON_THE_GROUND if starting else REST
     for contact in range(modes.watched):
         hit[contact] = 0
-        first = watch.fired[2 * contact] == 1
-        second = watch.fired[2 * contact + 1] == 1
+        first, second = fired[2 * contact] == 1, fired[2 * contact + 1] == 1
         turns = turns_over(
-            model, ground, tree, contact, rows, contacts, surface, seconds, modes, phase.faces,
-            watch.fired,
+            contact, model, ground, tree, modes.watched, rows, modes.closed, modes.slide,
+            modes.stuck, modes.face, fired, surface,
         )  # fmt: skip
         kind = rows.kind[contact]
         if kind == SECOND_FACE:
             point = rows.owner[contact]
             if modes.closed[point] == 0 and hit[point] == 0:
                 continue  # it is met from the other face only
-            stand_on_face(
-                model, ground, tree, point, contacts, rows, modes.closed, surface, seconds,
-                phase.faces,
-            )  # fmt: skip
-            if seconds.gap[point] == np.inf:
+            stand_on_face(point, model, ground, tree, modes.closed, rows, modes.face, surface)
+            if rows.gap[contact] == np.inf:
                 continue
-            if starting and not is_at_second(
-                model, ground, point, rest, contacts, rows, phase.faces
-            ):
+            if starting and not is_at_second(point, model, ground, rest, rows, modes.face):
                 continue
         if modes.closed[contact] == 1:
             if second and modes.slide[contact] != 0:
@@ -139,8 +124,8 @@ def find_what_happened(
             continue
         if kind == DRY_JOINT:
             continue
-        gap = gap_now(contact, rows, step.begin)
-        normal, tangent = gap_velocity(contact, model, contacts, tree, rows, seconds, step.begin)
+        gap = rows.gap[contact]
+        normal, tangent = gap_velocity(contact, model, tree, rows, v)
         if starting:
             first = touches_at_start(contact, gap, rows, modes) and normal <= rest
         may_pass = first and not starting and kind == POINT
@@ -148,7 +133,11 @@ def find_what_happened(
             first = normal <= rest
         if modes.passing[contact] == 1:
             modes.passing[contact] = 0 if first else 1
-        elif may_pass and behind(contact, direction, contacts, modes):
+        elif (
+            may_pass
+            and modes.let_pass == 1
+            and behind(contact, direction, model.nc, rows, modes.closed)
+        ):
             modes.passing[contact] = 1
         elif normal < -rest and (first or gap <= TOGETHER):
             hit[contact] = 1
@@ -159,11 +148,11 @@ def find_what_happened(
             modes.slide[contact] = 0
             if abs(tangent) > rest:
                 modes.slide[contact] = 1 if tangent > 0.0 else -1
-            if step.time - bounces.last_blow < SHORTEST_BOUNCE:  # too low a bounce to be followed
-                bounces.accumulation[contact] = step.time
+            if time - last_blow < SHORTEST_BOUNCE:  # too low a bounce to be followed
+                accumulation[contact] = time
         elif gap <= TOGETHER and normal <= rest:
             hit[contact] = UNPRESSED
-            if abs(gap) <= GAP_NOISE and rows.kind[contact] != SECOND_FACE:
+            if abs(gap) <= GAP_NOISE and kind != SECOND_FACE:
                 hit[contact] = LYING
                 modes.slide[contact] = heading(tangent)
     for contact in range(modes.watched):
@@ -176,32 +165,32 @@ def find_what_happened(
 
 @kernel
 def meet_event(
-    starting: bool, model: Model, ground: GroundModel, memory: Memory, phase: Phase, step: Step,
-    impact: Impact, bounces: Bounces, decision: Decision, record: Record,
-) -> int:  # fmt: skip
+    starting: bool, model: Model, ground: GroundModel, memory: Memory, work: Motion, record: Record
+) -> int:
     """Deal with what ended the step: impacts change velocities, all else is left to be decided.
 
     The equations of now have been evaluated.
     """
-    contacts, tree, direction = memory.contacts, memory.equations.tree, impact.momentum
+    phase, step, impact, decision = work.phase, work.step, work.impact, work.decision
+    tree, direction, rows, hit = memory.equations.tree, impact.momentum, memory.rows, impact.hit
     momentum(model, tree, direction)
-    first = record.events
+    first, shown = record.events, memory.contacts.force
     strikes, forced = find_what_happened(
-        starting, direction[0], model, ground, tree, memory.rows, step, contacts, memory.surface,
-        memory.seconds, phase, impact.hit, bounces,
+        starting, direction[0], model, ground, tree, step.time, step.begin[model.nq :],
+        work.bounces.last_blow, rows, memory.surface, phase.modes, phase.watch.fired, hit,
+        work.bounces.accumulation,
     )  # fmt: skip
-    if strikes and not strike(model, ground, memory, phase, step, impact, bounces, record):
+    if strikes and not strike(model, ground, memory, work, record):
         decision.bridging = 1
     elif strikes:
         # The controller shall know before the modes are decided under its torques.
-        for contact in range(model.nc):
-            if impact.hit[contact] == 1 and impact.impulse[contact, 0] > 0.0:
-                force = impulse_of(
-                    contact, contacts, memory.rows, memory.seconds, phase.faces.paired, impact
+        for point in range(model.nc):
+            if hit[point] == 1 and impact.impulse[point, 0] > 0.0:
+                shown[point, 0], shown[point, 1] = joined(
+                    point, second_of(point, rows), impact.impulse, rows.normal, impact.meets
                 )
-                contacts.force[contact, 0], contacts.force[contact, 1] = force
         react(model, first, step.begin[: model.nq], record, memory.loops)
-    for point in range(impact.meets.shape[0]):
+    for point in range(model.nc):
         impact.meets[point] = 0
     decision.started = BEGUN if starting else WALKING
     decision.undecided = 1

@@ -9,7 +9,6 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.candidates import find_constraints
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -17,31 +16,24 @@ from heelstrike.sim.contacts.geometry import (
     row_product,
 )
 from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
-from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, POINT, STOP, Rows
-from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.phase import Bounces, Impact, Modes, Phase, Step
+from heelstrike.sim.contacts.rows import DRY_JOINT, Rows, second_of
+from heelstrike.sim.event_driven.phase import Modes, Motion
 from heelstrike.sim.event_driven.smooth.candidates import free_acceleration
-from heelstrike.sim.event_driven.smooth.corners import is_struck, log_impulse
-from heelstrike.sim.event_driven.smooth.dynamics import gather_closed
+from heelstrike.sim.event_driven.smooth.corners import IMPACT, log_impulse, report_impulses
+from heelstrike.sim.event_driven.smooth.dynamics import copy_state, list_closed
 from heelstrike.sim.event_driven.smooth.faces import locate
-from heelstrike.sim.event_driven.smooth.gaps import free_gap_acceleration, gap_rows, gap_velocity
-from heelstrike.sim.event_driven.smooth.saddle_point import (
-    add_impulses,
-    solve_accelerations,
-    solve_velocities,
+from heelstrike.sim.event_driven.smooth.gaps import (
+    free_gap_acceleration,
+    gap_rows,
+    gap_velocity,
+    write_candidates,
 )
+from heelstrike.sim.event_driven.smooth.saddle_point import solve_contacts
 from heelstrike.sim.memory import Memory, Reported
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import (
-    CONSTRAINT_HOLDS,
-    JOINT_STOP,
-    TOUCHDOWN,
-    log_event,
-    note_residual,
-)
+from heelstrike.sim.record.recording import note_residual
 from heelstrike.tolerances import NOTICEABLE_ENERGY
 
-IMPACT = int(EventKind.IMPACT)
 ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
 
 # Velocities (m/s) up to which a point on the ground is at rest: what a contact problem is certified
@@ -79,63 +71,73 @@ def clear_rounding(first: int, end: int, free: Floats) -> None:
 
 
 @kernel
-def collide(
-    model: Model, nudge: float, plastic: Integers, memory: Memory, phase: Phase, impact: Impact,
-    state: Floats,
-) -> tuple[bool, float, float]:  # fmt: skip
-    """Let the points on the ground, and those that reach it now, change the velocities of `state`.
+def list_hit(rows: Rows, modes: Modes, hit: Integers, candidate: Integers) -> int:
+    """List the contacts of an impact, closed or hit, as candidates; return their number.
 
-    The equations of `state` have been evaluated. Normal velocities w and impulses p obey
+    Dry friction of the joints is a finite force, and takes no part.
+    """
+    count = 0
+    for contact in range(modes.watched):
+        takes_part = modes.closed[contact] == 1 or hit[contact] != 0
+        if takes_part and rows.kind[contact] != DRY_JOINT:
+            candidate[count] = contact
+            count += 1
+    return count
+
+
+@kernel
+def collide(model: Model, nudge: float, memory: Memory, work: Motion) -> tuple[bool, float, float]:
+    """Let the points on the ground, and those that reach it now, change the velocities now.
+
+    The equations of now have been evaluated. Normal velocities w and impulses p obey
     ``w⁺ + e w⁻ ≥ 0 ⟂ p ≥ 0``, tangential ones Coulomb's law. All points are taken to approach the
     ground faster by `nudge`: where zero impulse is one solution of several, that singles out
-    another. Dry friction of the joints is a finite force, and takes no part.
+    another.
 
     Returns whether it was solved, the energy it made (J), and what went through the contacts. The
     impulses go to ``impact.impulse``; ``modes.closed`` and ``modes.slide`` become
     those after the impact.
     """
-    modes = phase.modes
-    v = state[model.nq :]
-    equations, assembly = memory.equations, memory.assembly
-    jacobian, free, impulse = assembly.jacobian, assembly.problem.free, assembly.answer.impulse
-    count = 0
+    phase, impact, plastic, begin = work.phase, work.impact, work.bounces.plastic, work.step.begin
+    modes, saddle, v, rows = phase.modes, phase.saddle, begin[model.nq :], memory.rows
+    equations, assembly, loops = memory.equations, memory.assembly, memory.loops
+    candidate, jacobian = assembly.candidate, assembly.jacobian
+    free, impulse = assembly.problem.free, assembly.answer.impulse
     for contact in range(modes.watched):
         impact.impulse[contact, 0] = 0.0
         impact.impulse[contact, 1] = 0.0
-        if memory.rows.kind[contact] == DRY_JOINT:
-            continue
-        if modes.closed[contact] == 0 and impact.hit[contact] == 0:
-            continue
-        gap_rows(
-            model, equations.tree, memory.contacts, memory.rows, memory.seconds, contact, count,
-            assembly,
-        )  # fmt: skip
-        normal = row_product(jacobian, 2 * count, v)
+    count = list_hit(rows, modes, impact.hit, candidate)
+    if count + rows_of(loops) == 0:
+        return True, 0.0, 0.0
+    write_candidates(count, candidate, model, equations.tree, rows, assembly.leaf, jacobian)
+    for place in range(count):
+        contact = candidate[place]
+        normal = row_product(jacobian, 2 * place, v)
         if normal < 0.0 and plastic[contact] == 0:
             normal += memory.surface.restitution[contact] * normal
-        free[2 * count] = normal - nudge
-        free[2 * count + 1] = row_product(jacobian, 2 * count + 1, v)
-        assembly.candidate[count] = contact
-        count += 1
-    if count + rows_of(memory.loops) == 0:
-        return True, 0.0, 0.0
-    find_loops(model, state[: model.nq], v, equations.tree, memory.loops)
-    total = append_loops(count, memory.loops, assembly)
-    free_loops(total, memory.loops, v, 0.0, assembly)
+        free[2 * place] = normal - nudge
+        free[2 * place + 1] = row_product(jacobian, 2 * place + 1, v)
+    find_loops(model, begin[: model.nq], v, equations.tree, loops)
+    total = append_loops(count, loops, assembly)
+    free_loops(total, loops, v, 0.0, assembly)
     clear_rounding(count, total, free)
     assemble_delassus(model, total, equations, assembly)
-    status = solve_velocities(count, model, memory, phase)
+    status = solve_contacts(count, False, model, memory, phase)
     note_residual(assembly.answer.residual, memory.tally)
     made = 0.0
     through = 0.0
     for row in range(2 * total):
-        work = impulse[row] * row_product(jacobian, row, v)
-        made += work
-        through += abs(work)
-    note_loops(memory.rows, total, 1.0, impulse, memory.loops)
-    add_impulses(model, assembly, phase.saddle, equations, v)
+        added = impulse[row] * row_product(jacobian, row, v)
+        made += added
+        through += abs(added)
+    note_loops(rows, total, 1.0, impulse, loops)
+    if saddle.used == 1:
+        for j in range(model.nv):
+            v[j] += saddle.unknown[j]
+    else:
+        add_impulse(model, assembly, total, equations, v)
     for place in range(count):
-        contact = assembly.candidate[place]
+        contact = candidate[place]
         normal = row_product(jacobian, 2 * place, v)
         tangent = row_product(jacobian, 2 * place + 1, v)
         pressing, rubbing = impulse[2 * place] * normal, impulse[2 * place + 1] * tangent
@@ -147,81 +149,58 @@ def collide(
         modes.closed[contact] = 1 if rests else 0
         modes.slide[contact] = heading(tangent) if rests else 0
     for row in range(2 * count, 2 * total):  # what brakes take is not made by contacts at rest
-        work = impulse[row] * row_product(jacobian, row, v)
-        made += work
-        through += abs(work)
-    for contact in range(memory.rows.first[DRY_JOINT], memory.rows.end[DRY_JOINT]):
-        modes.slide[contact] = modes.closed[contact] * heading(v[memory.rows.owner[contact]])
+        added = impulse[row] * row_product(jacobian, row, v)
+        made += added
+        through += abs(added)
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        modes.slide[dry] = modes.closed[dry] * heading(v[rows.owner[dry]])
     return status == SOLVED, 0.5 * made, 0.5 * through
 
 
 @kernel
-def adopt_accelerations(
-    count: int, model: Model, state: Floats, memory: Memory, phase: Phase
-) -> None:
-    """Let the forces of the closed contacts act on the accelerations, which are free ones."""
-    saddle = phase.saddle
-    assembly, equations, rate = memory.assembly, memory.equations, memory.equations.rate
-    solve_accelerations(count, model, state, memory, phase)
-    if saddle.used == 0:
-        add_impulse(model, assembly, assembly.problem.count, equations, rate)
-        return
-    for i in range(model.nv):
-        rate[i] = saddle.unknown[i]
-
-
-@kernel
-def short_bounces(
-    model: Model, ground: GroundModel, state: Floats, time: float, hit: Integers, memory: Memory,
-    phase: Phase, bounces: Bounces,
-) -> bool:  # fmt: skip
+def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motion) -> bool:
     """Mark the points that would come down again too soon to follow; return whether there are any.
 
     Their bounces are taken to go on shrinking in the ratio of the next to the last; the geometric
     series gives the time at which they end.
     """
-    modes = phase.modes
-    was_closed = memory.reported.closed
-    contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
-    evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
-    if memory.rows.outside.kernel.shape[0] > 0:
-        find_constraints(model, state[: model.nq], state[model.nq :], equations.tree, memory.rows)
-    locate(
-        model, ground, equations.tree, memory.rows, modes, memory.seconds, phase.faces, contacts,
-        memory.surface,
+    phase, bounces, hit = work.phase, work.bounces, work.impact.hit
+    time, state = work.step.time, work.step.begin
+    modes, saddle, q, v = phase.modes, phase.saddle, state[: model.nq], state[model.nq :]
+    was_closed, rows, loops = memory.reported.closed, memory.rows, memory.loops
+    equations, assembly = memory.equations, memory.assembly
+    candidate, jacobian, free = assembly.candidate, assembly.jacobian, assembly.problem.free
+    tree, rate, face, bend = equations.tree, equations.rate, modes.face, modes.bend
+    evaluate_equations(model, q, v, equations)
+    locate(q, v, model, ground, tree, rows, modes, memory.surface)
+    free_acceleration(
+        model, state, memory.torque, rows, modes.slide, modes.breakaway, memory.pushes, equations,
+        saddle.force,
     )  # fmt: skip
-    free_acceleration(model, state, memory.torque, memory.rows, modes, memory.pushes, equations)
-    loop_rows = rows_of(memory.loops)
-    find_loops(model, state[: model.nq], state[model.nq :], equations.tree, memory.loops)
-    count = gather_closed(
-        model, contacts, memory.rows, memory.seconds, modes, memory.loops, equations, assembly
-    )
+    find_loops(model, q, v, tree, loops)
+    count = list_closed(rows, modes, candidate, assembly.problem.bound)
+    write_candidates(count, candidate, model, tree, rows, assembly.leaf, jacobian)
     for place in range(count):
-        contact = assembly.candidate[place]
-        free_gap_acceleration(
-            model, contacts, equations, contact, place, memory.rows, memory.seconds,
-            modes.breakaway, phase.faces, assembly,
-        )  # fmt: skip
-    total = count + loop_rows
-    free_loops(total, memory.loops, equations.rate, 1.0, assembly)
-    if total > 0:
-        adopt_accelerations(count, model, state, memory, phase)
+        contact = candidate[place]
+        free_gap_acceleration(contact, place, model, tree, rows, face, bend, rate, jacobian, free)
+    total = append_loops(count, loops, assembly)
+    free_loops(total, loops, rate, 1.0, assembly)
+    if total > 0:  # the forces of what is closed act on the rest
+        assemble_delassus(model, total, equations, assembly)
+        solve_contacts(count, True, model, memory, phase)
+        if saddle.used == 0:
+            add_impulse(model, assembly, total, equations, rate)
+        for i in range(model.nv if saddle.used == 1 else 0):
+            rate[i] = saddle.unknown[i]
     found = False
     for contact in range(modes.watched):
         touched = hit[contact] == 1 or was_closed[contact] == 1
         if modes.closed[contact] == 1 or not touched:
             continue
-        gap_rows(
-            model, equations.tree, contacts, memory.rows, memory.seconds, contact, total, assembly
-        )
-        free_gap_acceleration(
-            model, contacts, equations, contact, total, memory.rows, memory.seconds,
-            modes.breakaway, phase.faces, assembly,
-        )  # fmt: skip
-        normal, _ = gap_velocity(
-            contact, model, contacts, equations.tree, memory.rows, memory.seconds, state
-        )
-        pull = -assembly.problem.free[2 * total]
+        gap_rows(contact, total, model, tree, rows, assembly.leaf, jacobian)
+        free_gap_acceleration(contact, total, model, tree, rows, face, bend, rate, jacobian, free)
+        normal, _ = gap_velocity(contact, model, tree, rows, v)
+        pull = -free[2 * total]
         if not (pull > 0.0 and 0.0 < 2.0 * normal <= SHORTEST_BOUNCE * pull):
             continue
         bounce = 2.0 * normal / pull
@@ -240,8 +219,7 @@ def short_bounces(
 @kernel
 def restore(before: Floats, reported: Reported, rows: Rows, modes: Modes, begin: Floats) -> None:
     """Go back to the state and the modes before an impact."""
-    for i in range(before.shape[0]):
-        begin[i] = before[i]
+    copy_state(before, begin)
     for contact in range(modes.watched):
         if rows.kind[contact] != DRY_JOINT:
             modes.closed[contact] = reported.closed[contact]
@@ -249,84 +227,35 @@ def restore(before: Floats, reported: Reported, rows: Rows, modes: Modes, begin:
 
 
 @kernel
-def strike(
-    model: Model, ground: GroundModel, memory: Memory, phase: Phase, step: Step, impact: Impact,
-    bounces: Bounces, record: Record,
-) -> bool:  # fmt: skip
+def strike(model: Model, ground: GroundModel, memory: Memory, work: Motion, record: Record) -> bool:
     """Let the points in ``impact.hit`` meet the ground now, and report it; return success.
 
     The equations of now have been evaluated. ``memory.reported`` still holds the modes from before.
     """
-    modes = phase.modes
-    state, before, reported = step.begin, impact.before, memory.reported
-    time, contacts = step.time, memory.contacts
-    for i in range(state.shape[0]):
-        before[i] = state[i]
+    modes, impact, bounces = work.phase.modes, work.impact, work.bounces
+    rows, hit, reported = memory.rows, impact.hit, memory.reported
+    state, before, time = work.step.begin, impact.before, work.step.time
+    copy_state(state, before)
     made = through = 0.0
     for attempt in range(2):
-        solved, made, through = collide(model, 0.0, bounces.plastic, memory, phase, impact, state)
+        solved, made, through = collide(model, 0.0, memory, work)
         if not solved:
-            restore(before, reported, memory.rows, modes, step.begin)
+            restore(before, reported, rows, modes, state)
             return False
-        if attempt == 1 or not short_bounces(
-            model, ground, state, step.time, impact.hit, memory, phase, bounces
-        ):
+        if attempt == 1 or not short_bounces(model, ground, memory, work):
             break
-        restore(before, reported, memory.rows, modes, step.begin)
+        restore(before, reported, rows, modes, state)
     bounces.last_blow = time
     for contact in range(modes.watched):
         if bounces.plastic[contact] != 0 and modes.closed[contact] == 0:
             # Others throw it up again, and it is followed.
             bounces.accumulation[contact] = np.inf
         bounces.plastic[contact] = 0
-        if impact.hit[contact] == 1:
+        if hit[contact] == 1:
             bounces.last_impact[contact] = time
-    made_at = report_impacts(
-        time, contacts, memory.rows, memory.seconds, phase.faces.paired, step, impact, reported,
-        record,
-    )  # fmt: skip
+    made_at = report_impulses(IMPACT, time, rows, impact, reported, record)
     if made > NOTICEABLE_ENERGY * through:
         memory.tally.energy_gain += made
-        log_impulse(
-            ENERGY_GAIN, made_at, contacts, memory.rows, memory.seconds, phase.faces.paired,
-            step.time, impact, record,
-        )  # fmt: skip
+        second = second_of(made_at, rows)
+        log_impulse(ENERGY_GAIN, made_at, second, time, rows.normal, impact, record)
     return True
-
-
-@kernel
-def report_impacts(
-    time: float, contacts: Contacts, rows: Rows, seconds: Contacts, paired: int, step: Step,
-    impact: Impact, reported: Reported, record: Record,
-) -> int:  # fmt: skip
-    """Append the impulses of an impact to the events; return the point with the largest."""
-    impulse = impact.impulse
-    largest = 0
-    for contact in range(rows.end[CONSTRAINT]):
-        normal = impulse[contact, 0]
-        struck = (
-            is_struck(contact, rows, paired, impact.impulse)
-            if rows.kind[contact] == POINT
-            else normal != 0.0
-        )
-        if rows.kind[contact] == POINT and normal > impulse[largest, 0]:
-            largest = contact
-        if not struck:  # a stop may pull, as a latch does
-            continue
-        landed = reported.closed[contact] == 0
-        reported.closed[contact] = 1
-        if rows.kind[contact] == CONSTRAINT:
-            number = rows.owner[contact]
-            log_event(time, CONSTRAINT_HOLDS, number, normal, 0.0, record)
-            continue
-        if rows.kind[contact] == STOP:
-            joint = rows.owner[contact]
-            log_event(time, JOINT_STOP, joint, normal, 0.0, record)
-            continue
-        if landed:
-            reported.slipping[contact] = 0
-        log_impulse(
-            TOUCHDOWN if landed else IMPACT, contact, contacts, rows, seconds, paired, step.time,
-            impact, record,
-        )  # fmt: skip
-    return largest

@@ -12,13 +12,10 @@ import math
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.contacts.faces import center_of, nearest_face
-from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.dormand_prince import interpolate
-from heelstrike.sim.event_driven.phase import Modes, Phase, Samples, Step
+from heelstrike.sim.event_driven.phase import Integration, Modes, Samples
 from heelstrike.sim.event_driven.smooth.dynamics import evaluate, look
 from heelstrike.sim.event_driven.smooth.faces import has_corners
-from heelstrike.sim.frame import Scene
-from heelstrike.sim.memory import Memory
 
 NO_EVENT = 2.0
 """A fraction of a step beyond its end."""
@@ -66,22 +63,28 @@ def copy_events(value: Floats, rate: Floats, kept_value: Floats, kept_rate: Floa
 
 
 @kernel
-def evaluate_within(
-    scene: Scene, part: float, length: float, with_forces: bool, control: Control, memory: Memory,
-    phase: Phase, step: Step,
-) -> None:  # fmt: skip
+def evaluate_within(part: float, length: float, with_forces: bool, within: Integration) -> None:
     """Event functions at a fraction of the step, with forces or only those that need none."""
-    samples = step.samples
-    interpolate(part, step.begin, step.dense, samples.state)
+    scene, memory, phase, step = within.scene, within.memory, within.phase, within.step
+    samples, state = step.samples, step.samples.state
+    interpolate(part, step.begin, step.dense, state)
     if with_forces:
-        time, slope = step.time + part * length, samples.slope
-        evaluate(scene, time, samples.state, control, memory, phase, slope)
+        time = step.time + part * length
+        evaluate(scene, time, state, within.control, memory, phase, samples.slope)
     else:
         look(
-            scene.model, scene.ground, samples.state, phase.modes, memory.rows,
-            memory.equations.tree, memory.contacts, memory.surface, memory.seconds, phase.faces,
-            phase.watch,
+            state, scene.model, scene.ground, memory.equations.tree, memory.rows, phase.modes,
+            memory.surface, phase.watch,
         )  # fmt: skip
+
+
+@kernel
+def look_at_sample(function: int, part: float, length: float, within: Integration) -> None:
+    """Let the sample of an event function be that at a fraction of the step."""
+    evaluate_within(part, length, False, within)
+    watch, samples = within.phase.watch, within.step.samples
+    samples.sample[function] = watch.value[function]
+    samples.sample_rate[function] = watch.rate[function]
 
 
 @kernel
@@ -108,8 +111,8 @@ def noise(function: int, modes: Modes, weight: float, samples: Samples) -> float
 
 @kernel
 def find_root(
-    scene: Scene, function: int, turn: float, bracket: tuple[float, float, float, float],
-    length: float, control: Control, memory: Memory, phase: Phase, step: Step,
+    function: int, turn: float, bracket: tuple[float, float, float, float], length: float,
+    within: Integration,
 ) -> float:  # fmt: skip
     """Fraction of the step at which an event function first changes sign, or turns round.
 
@@ -118,9 +121,11 @@ def find_root(
     speed. Regula falsi that halves the interval every third time. An event function that is zero at
     `low`, where its phase begins, is first followed back from `high` to where it is positive.
     """
-    watch = phase.watch
+    watch = within.phase.watch
     low, low_value, high, high_value = bracket
-    with_forces = (function % 2 == 1 and turn != 0.0) or not is_geometric(function, phase.modes)
+    with_forces = (function % 2 == 1 and turn != 0.0) or not is_geometric(
+        function, within.phase.modes
+    )
     width = EVENT_TIME / length
     going_back = low_value <= 0.0
     for attempt in range(200):
@@ -130,7 +135,7 @@ def find_root(
         if attempt % 3 != 2 and not going_back:
             part = high - high_value * (high - low) / (high_value - low_value)
             part = min(max(part, low + INSIDE * width), high - INSIDE * width)
-        evaluate_within(scene, part, length, with_forces, control, memory, phase, step)
+        evaluate_within(part, length, with_forces, within)
         value = turn * watch.rate[function] if turn != 0.0 else watch.value[function]
         if value > 0.0:
             low = part
@@ -220,16 +225,13 @@ def lowest_place(before: float, rate: float, value: float, later_rate: float) ->
 
 
 @kernel
-def crossing(
-    scene: Scene, function: int, low: float, high: float, length: float, control: Control,
-    memory: Memory, phase: Phase, step: Step,
-) -> float:  # fmt: skip
+def crossing(function: int, low: float, high: float, length: float, within: Integration) -> float:
     """Fraction of the step at which an event function passes zero, between two samples of it.
 
     Of a point that has just left the ground the gap is zero but for rounding: it cannot come back
     before it turned round. If it got no higher than noise until then, it ends there, at rest.
     """
-    modes, watch = phase.modes, phase.watch
+    modes, watch, step = within.phase.modes, within.phase.watch, within.step
     samples = step.samples
     before, begin = samples.before[function], low
     value, end = samples.sample[function], high
@@ -243,7 +245,7 @@ def crossing(
     if dips:
         # An open point came down and went up again, or what slides was slower: how near to zero?
         bracket = low, -rate, high, -later_rate
-        end = find_root(scene, function, -1.0, bracket, length, control, memory, phase, step)
+        end = find_root(function, -1.0, bracket, length, within)
         value = watch.value[function]
     least = noise(function, modes, watch.weight, samples)
     if is_gap and rate >= 0.0 and later_rate >= 0.0 and before <= least:
@@ -255,19 +257,19 @@ def crossing(
         dip = lowest_place(before, span * rate, value, span * later_rate)
         if dip < NO_EVENT:
             end = low + dip * (high - low)
-            evaluate_within(scene, end, length, False, control, memory, phase, step)
+            evaluate_within(end, length, False, within)
             value = watch.value[function]
     # What is below zero from the beginning tells nothing new until it falls further.
     if not value < -least - max(-before, 0.0):
         return NO_EVENT
     if is_gap and rate > 0.0 and later_rate < 0.0 and before <= least:
         bracket = low, rate, high, later_rate
-        begin = find_root(scene, function, 1.0, bracket, length, control, memory, phase, step)
+        begin = find_root(function, 1.0, bracket, length, within)
         before = watch.value[function]
         if before <= least:
             return begin
     bracket = begin, before, end, value
-    return find_root(scene, function, 0.0, bracket, length, control, memory, phase, step)
+    return find_root(function, 0.0, bracket, length, within)
 
 
 @kernel
@@ -288,28 +290,24 @@ def may_turn(
 
 
 @kernel
-def face_within(
-    scene: Scene, part: float, length: float, contact: int, control: Control, memory: Memory,
-    phase: Phase, step: Step,
-) -> int:  # fmt: skip
+def face_within(part: float, length: float, point: int, within: Integration) -> int:
     """Face, or corner, of the ground that an open point is nearest to at a fraction of the step."""
-    evaluate_within(scene, part, length, False, control, memory, phase, step)
-    x, z = center_of(scene.model, memory.contacts, contact)
-    return int(nearest_face(scene.ground, x, z, A_DISC))
+    evaluate_within(part, length, False, within)
+    x, z = center_of(within.scene.model, within.memory.rows, point)
+    return int(nearest_face(within.scene.ground, x, z, A_DISC))
 
 
 @kernel
 def next_kink(
-    scene: Scene, contact: int, low: float, high: float, length: float, control: Control,
-    memory: Memory, phase: Phase, step: Step,
-) -> tuple[float, float]:  # fmt: skip
+    point: int, low: float, high: float, length: float, within: Integration
+) -> tuple[float, float]:
     """Fractions of the step between which another face is the nearest, or twice the last of it."""
-    face = face_within(scene, low, length, contact, control, memory, phase, step)
-    if face_within(scene, high, length, contact, control, memory, phase, step) == face:
+    face = face_within(low, length, point, within)
+    if face_within(high, length, point, within) == face:
         return high, high
     while high - low > EVENT_TIME / length:
         part = low + 0.5 * (high - low)
-        if face_within(scene, part, length, contact, control, memory, phase, step) == face:
+        if face_within(part, length, point, within) == face:
             low = part
         else:
             high = part
@@ -318,17 +316,15 @@ def next_kink(
 
 @kernel
 def crossing_by_faces(
-    scene: Scene, function: int, low: float, high: float, length: float, control: Control,
-    memory: Memory, phase: Phase, step: Step,
-) -> float:  # fmt: skip
+    function: int, low: float, high: float, length: float, within: Integration
+) -> float:
     """Fraction of the step at which an open point reaches ground whose nearest face changes.
 
     Its gap has kinks there, and is smooth in between. That of a point in the ground can be deepest
     at one, as in a thin wall that it would go through. Where it begins on the ground, as on a
     corner, a moment later tells over which face.
     """
-    watch = phase.watch
-    samples = step.samples
+    watch, samples = within.phase.watch, within.step.samples
     before, before_rate = samples.before[function], samples.before_rate[function]
     value, rate = samples.sample[function], samples.sample_rate[function]
     root, begin = NO_EVENT, low
@@ -336,76 +332,63 @@ def crossing_by_faces(
         if begin == 0.0 and before <= TOGETHER:
             end = beyond = AT_ONCE * high
         else:
-            end, beyond = next_kink(
-                scene, function // 2, begin, high, length, control, memory, phase, step
-            )  # fmt: skip
+            end, beyond = next_kink(function // 2, begin, high, length, within)
         if end == high:
             break
-        evaluate_within(scene, end, length, False, control, memory, phase, step)
-        samples.sample[function] = watch.value[function]
-        samples.sample_rate[function] = watch.rate[function]
-        root = crossing(scene, function, begin, end, length, control, memory, phase, step)
+        look_at_sample(function, end, length, within)
+        root = crossing(function, begin, end, length, within)
         if root != NO_EVENT:
             break
-        evaluate_within(scene, beyond, length, False, control, memory, phase, step)
+        evaluate_within(beyond, length, False, within)
         samples.before[function] = watch.value[function]
         samples.before_rate[function] = watch.rate[function]
         begin = beyond
     samples.sample[function], samples.sample_rate[function] = value, rate
     if root == NO_EVENT:
-        root = crossing(scene, function, begin, high, length, control, memory, phase, step)
+        root = crossing(function, begin, high, length, within)
     samples.before[function], samples.before_rate[function] = before, before_rate
     return root
 
 
 @kernel
-def early_crossing(
-    scene: Scene, function: int, high: float, length: float, control: Control, memory: Memory,
-    phase: Phase, step: Step,
-) -> float:  # fmt: skip
+def early_crossing(function: int, high: float, length: float, within: Integration) -> float:
     """Fraction of the step at which a point that has just left the ground is back there at once.
 
     It may have come back, and risen again, long before the first sample. Nothing happens so soon
     but on a scale of its own: it is looked for at ever smaller parts of the way there.
     """
-    watch = phase.watch
-    samples = step.samples
+    samples = within.step.samples
     value, rate = samples.sample[function], samples.sample_rate[function]
     soonest = SOONEST if samples.before[function] <= TOGETHER else SOON
     root = NO_EVENT
     part = high
     while root == NO_EVENT and part * length > soonest:
         part *= EARLIER
-        evaluate_within(scene, part, length, False, control, memory, phase, step)
-        samples.sample[function] = watch.value[function]
-        samples.sample_rate[function] = watch.rate[function]
-        root = crossing(scene, function, 0.0, part, length, control, memory, phase, step)
-    samples.sample[function] = value
-    samples.sample_rate[function] = rate
+        look_at_sample(function, part, length, within)
+        root = crossing(function, 0.0, part, length, within)
+    samples.sample[function], samples.sample_rate[function] = value, rate
     return root
 
 
 @kernel
-def first_event(
-    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase, step: Step
-) -> float:
+def first_event(length: float, within: Integration) -> float:
     """Fraction of the step just taken at which the first event happens, or ``NO_EVENT``.
 
     The event functions that vanish there are marked in ``watch.fired``. ``samples.before`` and
     ``samples.before_rate`` must hold the event functions at the start of the step.
     """
-    watch = phase.watch
-    samples = step.samples
+    model, modes, watch = within.scene.model, within.phase.modes, within.phase.watch
+    samples, radius = within.step.samples, model.contact_radius
     sample, sample_rate = samples.sample, samples.sample_rate
-    functions, corners = 2 * phase.modes.watched, has_corners(scene.ground)
+    functions, corners = 2 * modes.watched, has_corners(within.scene.ground)
     if corners:
-        functions += scene.model.nc
+        functions += model.nc
     together = min(EVENT_TIME / length, 0.5)  # there are steps shorter than that near poles
     low = 0.0
     for k in range(1, SAMPLES + 1):
         high = k / SAMPLES
         if k < SAMPLES:
-            evaluate_within(scene, high, length, True, control, memory, phase, step)
+            evaluate_within(high, length, True, within)
             copy_events(watch.value, watch.rate, sample, sample_rate)
         else:
             copy_events(samples.end_value, samples.end_rate, sample, sample_rate)
@@ -413,14 +396,12 @@ def first_event(
         for i in range(functions):
             watch.fired[i] = 0
             span, root = (high - low) * length, NO_EVENT
-            if corners and may_turn(
-                i, span, scene.model.contact_radius, phase.modes.closed, samples
-            ):
-                root = crossing_by_faces(scene, i, low, high, length, control, memory, phase, step)
-            elif may_cross(i, span, phase.modes, samples):
-                root = crossing(scene, i, low, high, length, control, memory, phase, step)
-            if k == 1 and root == NO_EVENT and just_left(i, phase.modes, samples):
-                root = early_crossing(scene, i, high, length, control, memory, phase, step)
+            if corners and may_turn(i, span, radius, modes.closed, samples):
+                root = crossing_by_faces(i, low, high, length, within)
+            elif may_cross(i, span, modes, samples):
+                root = crossing(i, low, high, length, within)
+            if k == 1 and root == NO_EVENT and just_left(i, modes, samples):
+                root = early_crossing(i, high, length, within)
             if root < first - together:
                 for j in range(i):
                     watch.fired[j] = 0

@@ -25,21 +25,12 @@ from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.contacts.brakes import awaits_hold
-from heelstrike.sim.contacts.candidates import find_constraints
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.loops import close_loops, rows_of, steady_loops
-from heelstrike.sim.contacts.rows import (
-    SECOND_FACE,
-    contact_count,
-)
+from heelstrike.sim.contacts.rows import SECOND_FACE, contact_count
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.event_driven.deciding import (
-    LOOKS,
-    ON_THE_GROUND,
-    contradicts_itself,
-    decide_modes,
-)
+from heelstrike.sim.event_driven.deciding import LOOKS, ON_THE_GROUND, decide_modes
 from heelstrike.sim.event_driven.events import meet_event
 from heelstrike.sim.event_driven.moving import EVENTS_AT_ONCE, NO_BRIDGE, move
 from heelstrike.sim.event_driven.phase import Motion, allocate_motion
@@ -199,7 +190,10 @@ class EventDriven(Method):
             before = told[kept].copy()
             told[:] = nothing
             told[kept] = before
-        work.phase.faces.face[:] = NO_FACE
+        for each in (work.phase.forces.force, work.step.end_force, work.impact.impulse):
+            each[:] = 0.0
+        work.impact.meets[:] = 0
+        modes.face[:] = NO_FACE
         work.phase.watch.fired[:] = 0
         clock.begun = 0
 
@@ -219,37 +213,26 @@ class EventDriven(Method):
 @kernel
 def begin(model: Model, ground: GroundModel, memory: Memory, work: Motion, record: Record) -> int:
     """Find what the robot stands on when the simulation begins."""
-    phase = work.phase
-    modes = phase.modes
-    step = work.step
-    q, v, equations = memory.q, memory.v, memory.equations
+    step, modes, loops = work.step, work.phase.modes, memory.loops
+    q, v, rows, equations = memory.q, memory.v, memory.rows, memory.equations
     # Modes that are guessed here are those of another instant: where forces or accelerations are
     # not unique, what comes of amending them need not be what the solvers would say.
     memory.solver.settings.amendments = 0
     memory.solver.settings.patient = 1
-    if rows_of(memory.loops) > 0:
-        if not close_loops(model, equations, memory.loops, q):
+    if rows_of(loops) > 0:
+        if not close_loops(model, equations, loops, q):
             return DIVERGED
-        steady_loops(model, q, equations, memory.loops, v)
-    modes.watched, phase.faces.paired = memory.rows.first[SECOND_FACE], ground.concave
-    for point in range(model.nc):
-        memory.seconds.gap[point] = np.inf
-    if ground.concave == 1:
-        modes.watched = memory.rows.end[SECOND_FACE]
+        steady_loops(model, q, equations, loops, v)
+    modes.watched = rows.end[SECOND_FACE] if ground.concave == 1 else rows.first[SECOND_FACE]
+    for second in range(rows.first[SECOND_FACE], rows.end[SECOND_FACE]):
+        rows.gap[second] = np.inf
     for i in range(model.nv):
         step.begin[i] = q[i]
         step.begin[model.nq + i] = v[i]
-    begin_rubbing(v, memory.breakaway, memory.rows, modes, memory.reported)
+    begin_rubbing(v, memory.breakaway, rows, modes, memory.reported)
     evaluate_equations(model, q, v, equations)
-    if memory.rows.outside.kernel.shape[0] > 0:
-        find_constraints(model, q, v, equations.tree, memory.rows)
-    locate(
-        model, ground, equations.tree, memory.rows, modes, memory.seconds, phase.faces,
-        memory.contacts, memory.surface,
-    )  # fmt: skip
-    code = meet_event(
-        True, model, ground, memory, phase, step, work.impact, work.bounces, work.decision, record
-    )
+    locate(q, v, model, ground, equations.tree, rows, modes, memory.surface)
+    code = meet_event(True, model, ground, memory, work, record)
     for i in range(model.nv):
         v[i] = step.begin[model.nq + i]
     return code
@@ -258,15 +241,10 @@ def begin(model: Model, ground: GroundModel, memory: Memory, work: Motion, recor
 @kernel
 def prepare(model: Model, ground: GroundModel, memory: Memory, work: Motion) -> None:
     """Kinematics, velocities and contact points of the state now."""
-    phase = work.phase
-    forward_kinematics(model, memory.q, memory.equations.tree)
-    link_velocities(model, memory.v, memory.equations.tree)
-    if memory.rows.outside.kernel.shape[0] > 0:
-        find_constraints(model, memory.q, memory.v, memory.equations.tree, memory.rows)
-    locate(
-        model, ground, memory.equations.tree, memory.rows, phase.modes, memory.seconds, phase.faces,
-        memory.contacts, memory.surface,
-    )  # fmt: skip
+    q, v, tree = memory.q, memory.v, memory.equations.tree
+    forward_kinematics(model, q, tree)
+    link_velocities(model, v, tree)
+    locate(q, v, model, ground, tree, memory.rows, work.phase.modes, memory.surface)
 
 
 @kernel
@@ -274,38 +252,28 @@ def decide(
     scene: Scene, control: Control, memory: Memory, work: Motion, record: Record, clock: Clock
 ) -> int:
     """Decide the contact modes if an event or a jump of forces left them open."""
-    phase = work.phase
-    step, decision = work.step, work.decision
+    phase, step, decision, rows = work.phase, work.step, work.decision, memory.rows
     work.output.every = clock.record_every
     jumped, decision.next_push = switch_at(step.time, memory.pushes)
     for i in range(scene.model.nu):
         change = abs(memory.torque[i] - step.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
         step.torque[i] = memory.torque[i]
-    if awaits_hold(memory.loops) or rubs_otherwise(memory.breakaway, memory.rows, phase.modes):
+    if awaits_hold(memory.loops) or rubs_otherwise(memory.breakaway, rows, phase.modes):
         brake(scene, control, memory, work, record)
     decision.at_event = decision.undecided
-    open_modes = decision.at_event == 1 or jumped
-    if decision.bridging == 0 and open_modes:
-        decision.bridging = 0 if decide_modes(scene, control, memory, work, record) else 1
+    if decision.bridging == 0:
+        if decision.at_event == 0 and not jumped:
+            evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
+        elif not decide_modes(scene, control, memory, work, record):
+            decision.bridging = 1
     if decision.bridging == 1:
         decision.at_event = 0
         decision.undecided = 1
         return DONE
-    decision.undecided = 0
-    decision.forced = 0
-    decision.jammed = 0
-    evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
-    if open_modes and contradicts_itself(phase.modes, phase.watch, phase.forces.deficient):
-        decision.bridging = 1
-        decision.at_event = 0
-        decision.undecided = 1
-        return DONE
+    decision.undecided = decision.forced = decision.jammed = 0
     if decision.at_event == 1:
-        show_forces(
-            phase.forces.force, memory.rows, memory.seconds, phase.modes.watched, work.impact.meets,
-            memory.contacts,
-        )  # fmt: skip
+        show_forces(phase.forces.force, rows, work.impact.meets, memory.contacts.force)
     return DONE
 
 
@@ -314,15 +282,11 @@ def report(
     scene: Scene, control: Control, memory: Memory, work: Motion, record: Record, clock: Clock
 ) -> None:
     """Append a row at events, at the end, and at every step if no period is asked for."""
-    phase = work.phase
     step, output = work.step, work.output
     every_step = output.period == 0.0 and memory.tally.steps % output.every == 0
     last = (clock.finishing == 1 or every_step) and output.last_row < step.time
     if work.decision.at_event == 1 or last:
-        write_row(
-            scene, step.time, step.begin, True, step, work.impact, control, memory, phase, output,
-            record,
-        )  # fmt: skip
+        write_row(scene, True, control, memory, work, record)
 
 
 EventDriven.work = Motion

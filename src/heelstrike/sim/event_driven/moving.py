@@ -9,24 +9,19 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.latches import react
-from heelstrike.sim.contacts.rows import (
-    POINT,
-    SECOND_FACE,
-    Rows,
-)
+from heelstrike.sim.contacts.rows import POINT, SECOND_FACE, Rows
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import SHORTEST_BRIDGE, cross_bridge
 from heelstrike.sim.event_driven.deciding import INSISTENT
 from heelstrike.sim.event_driven.events import meet_event
 from heelstrike.sim.event_driven.location import EVENT_TIME
-from heelstrike.sim.event_driven.phase import Decision, Motion, Step
+from heelstrike.sim.event_driven.phase import Decision, Integration, Motion
 from heelstrike.sim.event_driven.rows import NO_ROOM, TOO_FAR, write_row, write_rows_within
 from heelstrike.sim.event_driven.smooth.corners import show_forces
-from heelstrike.sim.event_driven.smooth.dynamics import evaluate
+from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate
 from heelstrike.sim.event_driven.steps import ALMOST, integrate, longest_turn, shortest_step
 from heelstrike.sim.frame import DONE, FORK, RECORD_FULL, SOLVER_FAILED, Scene
-from heelstrike.sim.memory import Memory, Tally
+from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import log_event
 
@@ -51,18 +46,14 @@ NO_BRIDGE = 1
 
 
 @kernel
-def next_due(next_push: float, clock: Clock) -> float:
-    """Time at which something from outside is due, or the end."""
+def next_stop(watched: int, accumulation: Floats, next_push: float, clock: Clock) -> float:
+    """Time that the next step may not pass: the end, or when something is due.
+
+    That is from outside, or the end of the bounces of what is `watched`.
+    """
     stop = min(clock.until, next_push)
     if clock.control_period > 0.0:
         stop = min(stop, clock.calls * clock.control_period)
-    return stop
-
-
-@kernel
-def next_stop(watched: int, accumulation: Floats, next_push: float, clock: Clock) -> float:
-    """Time that the next step may not pass."""
-    stop = next_due(next_push, clock)
     for contact in range(watched):
         stop = min(stop, accumulation[contact])
     return stop
@@ -82,35 +73,25 @@ def end_bounces(
 
 
 @kernel
-def pass_time(length: float, stop: float, step: Step, decision: Decision) -> None:
-    """Let time move on, to `stop` if that is the same but for rounding."""
-    step.time += length
-    if abs(step.time - stop) <= SAME_TIME * max(abs(stop), EARLY):
-        step.time = stop
-    decision.allowance = min(decision.allowance + EVENTS_A_SECOND * length, EVENTS_AT_ONCE)
+def pass_time(time: float, length: float, stop: float, allowance: float) -> tuple[float, float]:
+    """Let time move on, to `stop` if that is the same but for rounding; events are allowed for."""
+    time += length
+    if abs(time - stop) <= SAME_TIME * max(abs(stop), EARLY):
+        time = stop
+    return time, min(allowance + EVENTS_A_SECOND * length, EVENTS_AT_ONCE)
 
 
 @kernel
-def end_step(
-    clock: Clock, rows: Rows, seconds: Contacts, watched: int, meets: Integers, contacts: Contacts,
-    tally: Tally, step: Step, accumulation: Floats, decision: Decision, record: Record,
-) -> None:  # fmt: skip
-    """Move time and state to the end of the finished step."""
-    pass_time(
-        step.length, next_stop(watched, accumulation, decision.next_push, clock), step, decision
-    )
-    for i in range(step.begin.shape[0]):
-        step.begin[i] = step.end[i]
-    show_forces(step.end_force, rows, seconds, watched, meets, contacts)
-    end_bounces(rows, watched, step.time, accumulation, record)
-    step.finished = 0
-    tally.steps += 1
-    if step.has_fired == 1:
-        together = step.time - decision.last_event < INSTANT
+def count_event(
+    length: float, longest: float, time: float, fired: bool, decision: Decision
+) -> None:
+    """Count an event at the end of a step, or a step too short to see."""
+    if fired:
+        together = time - decision.last_event < INSTANT
         decision.burst = decision.burst + 1 if together else 0
-        decision.last_event = step.time
+        decision.last_event = time
         decision.allowance -= 1.0
-    elif step.length < min(SHORT_STEP, SHORT_PART * step.longest):
+    elif length < min(SHORT_STEP, SHORT_PART * longest):
         decision.allowance -= SHARE_OF_A_STEP
 
 
@@ -128,10 +109,9 @@ def move_over(
     clock: Clock,
 ) -> int:  # fmt: skip
     """Leave an instant by a bridge, behind which it is looked for what there is to be met."""
-    phase = work.phase
-    watch = phase.watch
-    step, bounces = work.step, work.bounces
-    series, output, decision = work.series, work.output, work.decision
+    phase, step, bounces, series = work.phase, work.step, work.bounces, work.series
+    output, decision, fired = work.output, work.decision, work.phase.watch.fired
+    model, begin = scene.model, step.begin
     end = stop
     if output.period > 0.0:  # a row is due no later than at its end
         period = output.period * output.every
@@ -141,29 +121,22 @@ def move_over(
     if not cross_bridge(scene, end, control, memory, work, record):
         series.reason = NO_BRIDGE
         return SOLVER_FAILED
-    react(scene.model, first, step.begin[: scene.model.nq], record, memory.loops)
-    pass_time(series.length, end, step, decision)
-    clock.time = step.time
-    series.last_end = step.time
+    react(model, first, begin[: model.nq], record, memory.loops)
+    step.time, _ = pass_time(step.time, series.length, end, decision.allowance)
+    clock.time = series.last_end = time = step.time
     for contact in range(phase.modes.watched):
-        if bounces.accumulation[contact] <= step.time:
+        if bounces.accumulation[contact] <= time:
             bounces.accumulation[contact] = np.inf
     memory.tally.steps += 1
-    for i in range(watch.fired.shape[0]):
-        watch.fired[i] = 0
+    for i in range(fired.shape[0]):
+        fired[i] = 0
     decision.burst = 0
     decision.allowance = EVENTS_A_BRIDGE
     step.next_length = AFRESH
-    write_row(
-        scene, step.time, step.begin, False, step, work.impact, control, memory, phase, output,
-        record,
-    )  # fmt: skip
-    evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
-    meet_event(
-        False, scene.model, scene.ground, memory, phase, step, work.impact, bounces, decision,
-        record,
-    )  # fmt: skip
-    show_state(scene.model, step.begin, memory.q, memory.v)
+    write_row(scene, False, control, memory, work, record)
+    evaluate(scene, time, begin, control, memory, phase, step.slopes[0])
+    meet_event(False, model, scene.ground, memory, work, record)
+    show_state(model, begin, memory.q, memory.v)
     return DONE
 
 
@@ -187,62 +160,52 @@ def move(
     scene: Scene, control: Control, memory: Memory, work: Motion, record: Record, clock: Clock
 ) -> int:
     """Take a step to the next event, at the longest to where something is due."""
-    phase = work.phase
-    step, decision = work.step, work.decision
-    model, ground = scene.model, scene.ground
+    phase, step, decision, impact = work.phase, work.step, work.decision, work.impact
+    model, rows, watched = scene.model, memory.rows, phase.modes.watched
+    accumulation, output = work.bounces.accumulation, work.output
+    taken = Integration(scene, control, memory, phase, step)
     if step.finished == 0:
-        stop = (
-            next_due(decision.next_push, clock)
-            if decision.bridging == 1
-            else next_stop(
-                phase.modes.watched, work.bounces.accumulation, decision.next_push, clock
-            )
-        )
+        bridging = decision.bridging == 1
+        stop = next_stop(0 if bridging else watched, accumulation, decision.next_push, clock)
         if stop - step.time < shortest_step(step.time):
             # The same time but for rounding: 0.3 for one, 3 · 0.1 for the other.
-            step.time = stop
-            clock.time = stop
-            end_bounces(
-                memory.rows, phase.modes.watched, step.time, work.bounces.accumulation, record,
-            )  # fmt: skip
+            step.time = clock.time = stop
+            end_bounces(rows, watched, step.time, accumulation, record)
             return DONE
         turn = longest_turn(model, memory.equations.tree.motion, step.begin)
         step.next_length = min(step.next_length, turn)
-        wish = step.longest if decision.bridging == 1 else min(step.next_length, step.longest)
+        wish = step.longest if bridging else min(step.next_length, step.longest)
         if clock.forked == 0 and stop == clock.until and step.time + ALMOST * wish >= stop:
             clock.forked = 1
             return FORK
-        if decision.bridging == 1:
+        if bridging:
             return move_over(scene, stop, control, memory, work, record, clock)
-        if not integrate(scene, stop, control, memory, phase, step):
+        if not integrate(stop, taken):
             if not jam(model, phase.modes.slide, decision):
                 decision.bridging = 1
             step.next_length = AFRESH
             return DONE
-    written = write_rows_within(
-        scene, control, memory, phase, step, work.impact, work.output, record
-    )
+    written = write_rows_within(impact.meets, output, record, taken)
     if written == NO_ROOM:
         return RECORD_FULL
     if written == TOO_FAR:  # the step is taken again, to end there
         step.finished = 0
         return DONE
-    end_step(
-        clock, memory.rows, memory.seconds, phase.modes.watched, work.impact.meets, memory.contacts,
-        memory.tally, step, work.bounces.accumulation, decision, record,
-    )  # fmt: skip
+    stop = next_stop(watched, accumulation, decision.next_push, clock)
+    step.time, decision.allowance = pass_time(step.time, step.length, stop, decision.allowance)
+    copy_state(step.end, step.begin)
+    show_forces(step.end_force, rows, impact.meets, memory.contacts.force)
+    end_bounces(rows, watched, step.time, accumulation, record)
+    step.finished = 0
+    memory.tally.steps += 1
+    count_event(step.length, step.longest, step.time, step.has_fired == 1, decision)
     clock.time = step.time
     if step.has_fired == 1:
         evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
-        meet_event(
-            False, model, ground, memory, phase, step, work.impact, work.bounces, decision, record
-        )
+        meet_event(False, model, scene.ground, memory, work, record)
     if decision.allowance < 0.0:
-        if (
-            step.has_fired == 0
-            and step.length < EVENT_TIME
-            and jam(model, phase.modes.slide, decision)
-        ):
+        stuck = step.has_fired == 0 and step.length < EVENT_TIME
+        if stuck and jam(model, phase.modes.slide, decision):
             decision.allowance = EVENTS_A_BRIDGE
         else:
             decision.bridging = 1

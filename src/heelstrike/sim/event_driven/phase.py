@@ -12,6 +12,8 @@ none elsewhere.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,8 +21,11 @@ from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.rows import contact_count, most_rows
+from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.continuous_extension import Extension
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
+from heelstrike.sim.frame import Scene
+from heelstrike.sim.memory import Memory
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -54,24 +59,11 @@ class Modes(Bundle):
     """Whether swing feet may scuff without effect."""
     breakaway: Floats = array("nv")
     """The most that dry friction is of each joint in this phase."""
-
-
-class Faces(Bundle):
-    """On which faces of the ground contact points are."""
-
     face: Integers = array("contacts", of=int)
     """Face of the ground that each closed contact point is on, -1 for none; the second that it is
-    on, or could meet (:mod:`heelstrike.sim.event_driven.faces`)."""
-    paired: int = cell(int)
-    """Whether the ground has concave corners, where points have second faces."""
+    on, or could meet (:mod:`heelstrike.sim.event_driven.smooth.faces`)."""
     bend: Floats = array("contacts")
     """Curvature (1/m) of the way of the centre of each disc along smooth ground."""
-    place: Floats = array(3)
-    """Scratch of :func:`~heelstrike.sim.event_driven.smooth.faces.choose_faces`."""
-    center: Floats = array(3)
-    acceleration: Floats = array(3)
-    """center, acceleration: Scratch of
-    :func:`~heelstrike.sim.event_driven.smooth.gaps.free_gap_acceleration`."""
 
 
 class Watch(Bundle):
@@ -89,8 +81,6 @@ class Watch(Bundle):
     weight: float = cell(float)
     """Of the robot, or its mass where there is no gravity: what forces are small or large
     beside."""
-    center: Floats = array(3)
-    """Scratch of :func:`~heelstrike.sim.event_driven.smooth.faces.rate_corners`."""
 
 
 class Samples(Bundle):
@@ -153,10 +143,8 @@ class SaddlePoint(Bundle):
     order. The coordinates come first, then forces."""
     force: Floats = array("nv")
     bias: Floats = array("2 capacity")
-    """Known force, and acceleration of the rows of the candidates without any of the
-    coordinates."""
-    rate: Floats = array("nv")
-    """Scratch of :func:`~heelstrike.sim.event_driven.smooth.saddle_point.state_accelerations`."""
+    """Known force of the state that was evaluated last, and acceleration of the rows of the
+    candidates without any of the coordinates."""
     mode: Integers = array("capacity", of=int)
     impulse: Floats = array("2 capacity")
     velocity: Floats = array("2 capacity")
@@ -324,7 +312,6 @@ class Phase(Bundle):
     """A smooth phase of the motion, in which every contact keeps its mode."""
 
     modes: Modes = part(Modes)
-    faces: Faces = part(Faces)
     watch: Watch = part(Watch)
     held: HeldRows = part(HeldRows)
     forces: Forces = part(Forces)
@@ -344,6 +331,16 @@ class Motion(Bundle):
     decision: Decision = part(Decision)
 
 
+class Integration(NamedTuple):
+    """A step of the smooth motion, and all that tells the rates of the states within it."""
+
+    scene: Scene
+    control: Control
+    memory: Memory
+    phase: Phase
+    step: Step
+
+
 def allocate_motion(robot: Robot) -> Motion:
     """Allocate the memory of an event-driven simulation of `robot`."""
     model = robot.model
@@ -358,7 +355,7 @@ def allocate_motion(robot: Robot) -> Motion:
     mass, gravity = float(sum(model.mass)), np.sqrt(np.sum(model.gravity**2))
     phase.watch.weight = mass * gravity if gravity > 0.0 else mass
     phase.watch.value[:] = 1.0
-    phase.faces.face[:] = NO_FACE
+    phase.modes.face[:] = NO_FACE
     motion = Motion.allocate(extents, phase=phase)
     motion.bounces.last_impact[:] = -np.inf
     motion.bounces.accumulation[:] = np.inf

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.ground import GroundModel
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.brakes import share_friction
 from heelstrike.sim.contacts.dry_friction import add_dry_force
-from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.loops import note_loops, rows_of
-from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import (
+    CONSTRAINT,
+    DRY_JOINT,
+    POINT,
+    SECOND_FACE,
+    STOP,
+    Rows,
+    second_of,
+)
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.continuous_extension import (
     BETWEEN,
     PLACES,
@@ -20,17 +27,18 @@ from heelstrike.sim.event_driven.continuous_extension import (
 )
 from heelstrike.sim.event_driven.dormand_prince import interpolate
 from heelstrike.sim.event_driven.location import EVENT_TIME, TOGETHER
-from heelstrike.sim.event_driven.phase import Impact, Output, Phase, Samples, Step
+from heelstrike.sim.event_driven.phase import Integration, Motion, Output, Phase, Samples, Step
 from heelstrike.sim.event_driven.smooth.candidates import slides
 from heelstrike.sim.event_driven.smooth.corners import record_corner
-from heelstrike.sim.event_driven.smooth.dynamics import evaluate
+from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate
+from heelstrike.sim.event_driven.smooth.gaps import gap_velocity
 from heelstrike.sim.event_driven.smooth.projection import (
     INTERPOLATED,
     explained,
     is_in_place,
     project,
 )
-from heelstrike.sim.event_driven.smooth.saddle_point import solve_accelerations
+from heelstrike.sim.event_driven.smooth.saddle_point import solve_contacts
 from heelstrike.sim.event_driven.steps import shortest_step
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Surface
@@ -49,42 +57,21 @@ REPEATED, FAR = 3, 4.0
 
 
 @kernel
-def note_state(model: Model, row: int, state: Floats, rows: Rows, record: Record) -> None:
-    """Write a state to a row, where no force acts as yet."""
-    for i in range(model.nv):
-        record.position[row, i] = state[i]
-        record.velocity[row, i] = state[model.nq + i]
-        record.stop_torque[row, i] = 0.0
-        record.friction_torque[row, i] = 0.0
-    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
-        record.constraint_force[row, rows.owner[entry], 0] = 0.0
-    for contact in range(model.nc):
-        record.contact_force[row, contact, 0] = 0.0
-        record.contact_force[row, contact, 1] = 0.0
-        record.slip_velocity[row, contact] = 0.0
-
-
-@kernel
 def put_right(
-    scene: Scene, state: Floats, step: Step, rows: Rows, equations: Equations, contacts: Contacts,
-    surface: Surface, assembly: Assembly, loops: Loops, seconds: Contacts, phase: Phase,
-    output: Output,
+    state: Floats, model: Model, ground: GroundModel, step: Step, equations: Equations, rows: Rows,
+    surface: Surface, assembly: Assembly, loops: Loops, phase: Phase, trial: Floats,
 ) -> bool:  # fmt: skip
-    """Write a state that is to become a row, put on its constraints, to ``output.state``.
+    """Write a state that is to become a row, put on its constraints, to `trial`.
 
     Returns whether the error of the dense output explains how far it is moved. If not it stays.
     """
-    trial = output.state
-    for i in range(state.shape[0]):
-        trial[i] = state[i]
+    copy_state(state, trial)
     _, strayed, fastest = project(
-        scene.model, scene.ground, rows, equations, contacts, surface, assembly, loops, seconds,
-        phase, trial,
-    )  # fmt: skip
-    if explained(state, trial, INTERPOLATED, step):
+        model, ground, equations, rows, surface, assembly, loops, phase, trial
+    )
+    if explained(state, trial, INTERPOLATED, step.relative, step.absolute):
         return True
-    for i in range(state.shape[0]):
-        trial[i] = state[i]
+    copy_state(state, trial)
     return is_in_place(strayed, fastest)
 
 
@@ -110,83 +97,85 @@ def show_who_carries(
 
 @kernel
 def write_row(
-    scene: Scene, time: float, state: Floats, lawful: bool, step: Step, impact: Impact,
-    control: Control, memory: Memory, phase: Phase, output: Output, record: Record,
-) -> None:  # fmt: skip
-    """Append a state, put on its constraints, with the certified contact forces in it.
+    scene: Scene, lawful: bool, control: Control, memory: Memory, work: Motion, record: Record
+) -> None:
+    """Append the state now, put on its constraints, with the certified contact forces in it.
 
     Where no contact forces obey the laws there are none in the row, and none of loops.
     """
+    step, output, phase, meets = work.step, work.output, work.phase, work.impact.meets
     put_right(
-        scene, state, step, memory.rows, memory.equations, memory.contacts, memory.surface,
-        memory.assembly, memory.loops, memory.seconds, phase, output,
+        step.begin, scene.model, scene.ground, step, memory.equations, memory.rows, memory.surface,
+        memory.assembly, memory.loops, phase, output.state,
     )  # fmt: skip
-    write_right(scene, time, lawful, impact, control, memory, phase, output, record)
+    write_right(scene, step.time, lawful, meets, control, memory, phase, output, record)
 
 
 @kernel
 def write_right(
-    scene: Scene, time: float, lawful: bool, impact: Impact, control: Control, memory: Memory,
+    scene: Scene, time: float, lawful: bool, meets: Integers, control: Control, memory: Memory,
     phase: Phase, output: Output, record: Record,
 ) -> None:  # fmt: skip
     """Append the state in ``output.state``, as :func:`write_row` does."""
-    modes, forces = phase.modes, phase.forces
-    model, contacts, assembly = scene.model, memory.contacts, memory.assembly
+    modes, force, model, rows = phase.modes, phase.forces.force, scene.model, memory.rows
+    assembly, loops, tree = memory.assembly, memory.loops, memory.equations.tree
     trial, residual, impulse = output.state, assembly.answer.residual, assembly.answer.impulse
+    q, v = trial[: model.nq], trial[model.nq :]
     evaluate(scene, time, trial, control, memory, phase, output.slope)
     for k in range(3):
         residual[k] = 0.0
-    count, loop_rows = forces.count, rows_of(memory.loops)
+    count, loop_rows = phase.forces.count, rows_of(loops)
     if not lawful:
         count = 0
         for place in range(loop_rows):
             impulse[2 * place] = 0.0
-        note_loops(memory.rows, loop_rows, 1.0, impulse, memory.loops)
     elif count + loop_rows > 0:
-        solve_accelerations(count, model, trial, memory, phase)
+        solve_contacts(count, True, model, memory, phase)
         note_residual(residual, memory.tally)
-        if loop_rows == 0 and forces.deficient == 1:
+        if loop_rows == 0 and phase.forces.deficient == 1:
             show_who_carries(
-                count, memory.surface.friction, modes.slide, phase.watch.value, forces.force,
-                assembly,
-            )  # fmt: skip
-        note_loops(memory.rows, count + loop_rows, 1.0, impulse, memory.loops)
-    row, friction_torque = record.rows, record.friction_torque[record.rows]
-    note_row(time, memory, record)
-    note_state(model, row, trial, memory.rows, record)
-    add_dry_force(modes.slide, modes.breakaway, memory.rows, friction_torque)
-    deepest = memory.tally.penetration
-    for contact in range(model.nc):
-        if modes.passing[contact] == 0:
-            deepest = max(deepest, -contacts.gap[contact], -memory.seconds.gap[contact])
-        memory.seconds.force[contact, 0] = 0.0
-        memory.seconds.force[contact, 1] = 0.0
-    memory.tally.penetration = deepest
+                count, memory.surface.friction, modes.slide, phase.watch.value, force, assembly
+            )
+    if loop_rows > 0:
+        note_loops(rows, count + loop_rows, 1.0, impulse, loops)
+    for contact in range(modes.watched):
+        force[contact, 0], force[contact, 1] = 0.0, 0.0
     for place in range(count):
         contact = assembly.candidate[place]
-        normal, tangent = impulse[2 * place], impulse[2 * place + 1]
-        kind, owner = memory.rows.kind[contact], memory.rows.owner[contact]
-        if kind == SECOND_FACE:
-            memory.seconds.force[owner, 0] = normal
-            memory.seconds.force[owner, 1] = tangent
-        elif kind == DRY_JOINT:
-            friction_torque[owner] = tangent
-        elif kind == STOP:
-            record.stop_torque[row, owner] += memory.rows.side[contact] * normal
-        elif kind == CONSTRAINT:
-            record.constraint_force[row, owner, 0] = normal
-        else:
-            record.contact_force[row, contact, 0] = normal
-            record.contact_force[row, contact, 1] = tangent
-            _, record.slip_velocity[row, contact] = contact_velocity(
-                model, memory.equations.tree, contacts, contact
-            )
+        force[contact, 0], force[contact, 1] = impulse[2 * place], impulse[2 * place + 1]
+    row = record.rows
+    note_row(time, memory, record)
+    stop_torque, friction_torque = record.stop_torque[row], record.friction_torque[row]
+    for i in range(model.nv):
+        record.position[row, i], record.velocity[row, i] = q[i], v[i]
+        stop_torque[i] = friction_torque[i] = 0.0
+    add_dry_force(modes.slide, modes.breakaway, rows, friction_torque)
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        if modes.slide[dry] == 0:
+            friction_torque[rows.owner[dry]] = force[dry, 1]
     share_friction(model, modes.breakaway, friction_torque, record.brake_torque[row])
-    for second in range(memory.rows.first[SECOND_FACE], modes.watched):
-        record_corner(
-            row, memory.rows.owner[second], model, memory.equations.tree, contacts, memory.seconds,
-            impact, record,
-        )  # fmt: skip
+    for stop in range(rows.first[STOP], rows.end[STOP]):
+        stop_torque[rows.owner[stop]] += rows.side[stop] * force[stop, 0]
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        record.constraint_force[row, rows.owner[entry], 0] = force[entry, 0]
+    for point in range(rows.first[POINT], rows.end[POINT]):
+        slip, deepest = 0.0, -rows.gap[point]
+        record.contact_force[row, point, 0] = force[point, 0]
+        record.contact_force[row, point, 1] = force[point, 1]
+        if lawful and modes.closed[point] == 1:
+            _, slip = gap_velocity(point, model, tree, rows, v)
+        if scene.ground.concave == 1:
+            second = second_of(point, rows)
+            deepest = max(deepest, -rows.gap[second])
+            if meets[point] == 1:
+                record.gap[row, point] = rows.gap[second]
+                _, slip = gap_velocity(second, model, tree, rows, v)
+            record_corner(
+                row, point, second, model, rows.normal, rows.position, force, meets, record
+            )
+        record.slip_velocity[row, point] = slip
+        if modes.passing[point] == 0:
+            memory.tally.penetration = max(memory.tally.penetration, deepest)
     output.last_row = time
     period = output.period * output.every
     if period > 0.0 and abs(output.next_row * period - time) <= EVENT_TIME:
@@ -210,36 +199,33 @@ def is_inside(time: float, begin: float, length: float) -> bool:
 
 
 @kernel
-def extend(scene: Scene, control: Control, memory: Memory, phase: Phase, step: Step) -> None:
+def extend(within: Integration) -> None:
     """Correct the dense output of the finished step by the slopes that the motion has on it.
 
     Where that leads nowhere, as under a torque that switches, the dense output stays as it is.
     """
-    extension, moved = step.extension, 0.0
+    step, moved = within.step, 0.0
+    extension, begin, dense = step.extension, step.begin, step.dense
     for j in range(BETWEEN):
-        interpolate(PLACES[j], step.begin, step.dense, extension.state[j])
+        interpolate(PLACES[j], begin, dense, extension.state[j])
     for _ in range(REPEATED):
         for j in range(BETWEEN):
-            time = step.time + PLACES[j] * step.length
-            state, slope = extension.state[j], extension.slope[j]
-            evaluate(scene, time, state, control, memory, phase, slope)
-        fit_correction(step.length, step.dense, extension.slope, extension.correction)
-        moved = move_places(
-            step.begin, step.end, step.dense, step.relative, step.absolute, extension
-        )
+            evaluate(
+                within.scene, step.time + PLACES[j] * step.length, extension.state[j],
+                within.control, within.memory, within.phase, extension.slope[j],
+            )  # fmt: skip
+        fit_correction(step.length, dense, extension.slope, extension.correction)
+        moved = move_places(begin, step.end, dense, step.relative, step.absolute, extension)
         if not moved > FAR:
             break
     if not moved <= INTERPOLATED:
         for k in range(extension.correction.shape[0]):
-            for i in range(step.begin.shape[0]):
+            for i in range(begin.shape[0]):
                 extension.correction[k, i] = 0.0
 
 
 @kernel
-def write_rows_within(
-    scene: Scene, control: Control, memory: Memory, phase: Phase, step: Step, impact: Impact,
-    output: Output, record: Record,
-) -> int:  # fmt: skip
+def write_rows_within(meets: Integers, output: Output, record: Record, within: Integration) -> int:
     """Append the rows due within the finished step; return whether all, or what is in the way.
 
     An event at its end has rows of its own, one before it if velocities or normals may jump. Where
@@ -247,7 +233,8 @@ def write_rows_within(
     at the row: nothing but integration finds the state there. Rows before it are taken back, since
     the shorter step may meet an event that the longer one has passed.
     """
-    modes, watch = phase.modes, phase.watch
+    scene, memory, phase, step = within.scene, within.memory, within.phase, within.step
+    modes, fired, state = phase.modes, phase.watch.fired, output.dense_state
     period = output.period * output.every
     last = step.time + step.length
     first, next_row, last_row = record.rows, output.next_row, output.last_row
@@ -255,12 +242,10 @@ def write_rows_within(
     if step.has_fired == 1:
         last -= EVENT_TIME
         for contact in range(modes.watched):
-            touch = touch or (
-                modes.closed[contact] == 0 and comes_down(contact, watch.fired, step.samples)
-            )
+            open_one = modes.closed[contact] == 0
+            touch = touch or (open_one and comes_down(contact, fired, step.samples))
         for point in range(scene.model.nc):
-            touch = touch or watch.fired[2 * modes.watched + point] == 1
-    state = output.dense_state
+            touch = touch or fired[2 * modes.watched + point] == 1
     while True:
         time = output.next_row * period
         part = 1.0
@@ -272,25 +257,24 @@ def write_rows_within(
             touch = False
             time = step.time + step.length
             for second in range(memory.rows.first[SECOND_FACE], modes.watched):
-                meets = modes.closed[second] == 0 and watch.fired[2 * second] == 1
-                impact.meets[memory.rows.owner[second]] = 1 if meets else 0
+                met = modes.closed[second] == 0 and fired[2 * second] == 1
+                meets[memory.rows.owner[second]] = 1 if met else 0
         if record.rows + ROWS_OF_AN_INSTANT > record.time.shape[0]:
             return NO_ROOM
         if part < 1.0:
             if not is_extended:
-                extend(scene, control, memory, phase, step)
+                extend(within)
                 is_extended = True
             interpolate_corrected(part, step.begin, step.dense, step.extension.correction, state)
         else:  # the end has been put on its constraints, and on the event
-            for i in range(state.shape[0]):
-                state[i] = step.end[i]
+            copy_state(step.end, state)
         fits = put_right(
-            scene, state, step, memory.rows, memory.equations, memory.contacts, memory.surface,
-            memory.assembly, memory.loops, memory.seconds, phase, output,
+            state, scene.model, scene.ground, step, memory.equations, memory.rows, memory.surface,
+            memory.assembly, memory.loops, phase, output.state,
         )  # fmt: skip
         inside = is_inside(time, step.time, step.length)
         if not fits and inside and not last_row > step.time:
             step.next_length = time - step.time
             record.rows, output.next_row, output.last_row = first, next_row, last_row
             return TOO_FAR
-        write_right(scene, time, True, impact, control, memory, phase, output, record)
+        write_right(scene, time, True, meets, within.control, memory, phase, output, record)

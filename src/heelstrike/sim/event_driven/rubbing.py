@@ -5,10 +5,7 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats
 from heelstrike.sim.contacts.brakes import note_brakes, stops_any, take_hold
-from heelstrike.sim.contacts.rows import (
-    DRY_JOINT,
-    Rows,
-)
+from heelstrike.sim.contacts.rows import DRY_JOINT, Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.impact import REST, heading, strike
 from heelstrike.sim.event_driven.phase import Modes, Motion
@@ -51,23 +48,18 @@ def brake(scene: Scene, control: Control, memory: Memory, work: Motion, record: 
 
     Those that slip begin to, and end.
     """
-    phase = work.phase
-    step = work.step
-    model = scene.model
-    if work.output.last_row < step.time:
-        write_row(
-            scene, step.time, step.begin, True, step, work.impact, control, memory, phase,
-            work.output, record,
-        )  # fmt: skip
-    begin_rubbing(
-        step.begin[model.nq :], memory.breakaway, memory.rows, phase.modes, memory.reported
-    )
-    stops = take_hold(model, memory.loops)
+    phase, step, impact, loops = work.phase, work.step, work.impact, memory.loops
+    model, time, begin = scene.model, step.time, step.begin
+    v = begin[model.nq :]
+    if work.output.last_row < time:
+        write_row(scene, True, control, memory, work, record)
+    begin_rubbing(v, memory.breakaway, memory.rows, phase.modes, memory.reported)
+    stops = take_hold(model, loops)
     # Of joints at rest there is no impact to solve: its data would be rounding.
-    if stops and stops_any(model, step.begin[model.nq :], REST, memory.loops):
-        evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
-        for contact in range(phase.modes.closed.shape[0]):
-            work.impact.hit[contact] = 0
-        if not strike(model, scene.ground, memory, phase, step, work.impact, work.bounces, record):
+    if stops and stops_any(model, v, REST, loops):
+        evaluate(scene, time, begin, control, memory, phase, step.slopes[0])
+        for contact in range(impact.hit.shape[0]):
+            impact.hit[contact] = 0
+        if not strike(model, scene.ground, memory, work, record):
             work.decision.bridging = 1
-    note_brakes(model, step.time, 1.0, record, memory.loops)
+    note_brakes(model, time, 1.0, record, loops)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.ground import GroundModel
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.rows import Rows
-from heelstrike.sim.controller.control import Control
-from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.dormand_prince import (
     NODES,
     SLOPES,
@@ -25,12 +24,11 @@ from heelstrike.sim.event_driven.location import (
     is_geometric,
     noise,
 )
-from heelstrike.sim.event_driven.phase import Modes, Phase, Step, Watch
-from heelstrike.sim.event_driven.smooth.dynamics import evaluate, look
+from heelstrike.sim.event_driven.phase import Integration, Modes, Phase, Step, Watch
+from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate, look
 from heelstrike.sim.event_driven.smooth.faces import has_corners, rate_corners
 from heelstrike.sim.event_driven.smooth.projection import EXPLAINED, explained, project
-from heelstrike.sim.frame import Scene
-from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Surface
+from heelstrike.sim.memory import Assembly, Equations, Loops, Surface
 
 # An event function that is nearer to zero than this part of its noise is zero.
 NEAR_ENOUGH = 0.1
@@ -52,22 +50,19 @@ ALMOST = 1.0001
 
 
 @kernel
-def longest_good_step(
-    scene: Scene, length: float, stop: float, control: Control, memory: Memory, phase: Phase,
-    step: Step,
-) -> tuple[float, float, bool]:  # fmt: skip
+def longest_good_step(length: float, stop: float, taken: Integration) -> tuple[float, float, bool]:
     """Take a step of some length or, if it is not good enough, a shorter one.
 
     Returns its length, zero if it would have to be too short; how much longer the next may be; and
     whether any was rejected.
     """
-    rejected = False
+    rejected, begin = False, taken.step.time
     while True:
-        if step.time + ALMOST * length >= stop:
-            length = stop - step.time
-        if length < shortest_step(step.time):
+        if begin + ALMOST * length >= stop:
+            length = stop - begin
+        if length < shortest_step(begin):
             return 0.0, 1.0, rejected
-        error = take_step(scene, length, control, memory, phase, step)
+        error = take_step(length, taken)
         factor = MOST if error == 0.0 else min(MOST, SAFETY * error**ORDER)
         if error <= 1.0:
             return length, factor, rejected
@@ -76,23 +71,21 @@ def longest_good_step(
 
 
 @kernel
-def take_step(
-    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase, step: Step
-) -> float:
+def take_step(length: float, taken: Integration) -> float:
     """Try a step of the given length from ``step.begin``; return its error over the tolerance.
 
     ``step.slopes[0]`` must be the slope at the start. A step that is good enough gets its dense
     output; event functions and forces are left as they are at its end.
     """
-    watch, forces = phase.watch, phase.forces
-    samples = step.samples
+    memory, phase, step = taken.memory, taken.phase, taken.step
+    watch, force, samples = phase.watch, phase.forces.force, step.samples
     error = 0.0
     for stage in range(1, SLOPES):
         at_end = stage == STAGES
         state = step.end if at_end else step.point
         stage_point(stage, length, step.begin, step.slopes, state)
         time = step.time + NODES[stage] * length
-        evaluate(scene, time, state, control, memory, phase, step.slopes[stage])
+        evaluate(taken.scene, time, state, taken.control, memory, phase, step.slopes[stage])
         if at_end:
             error = error_norm(
                 length, step.begin, step.end, step.slopes, step.relative, step.absolute
@@ -101,8 +94,8 @@ def take_step(
                 return error
             copy_events(watch.value, watch.rate, samples.end_value, samples.end_rate)
             for contact in range(phase.modes.watched):
-                step.end_force[contact, 0] = forces.force[contact, 0]
-                step.end_force[contact, 1] = forces.force[contact, 1]
+                step.end_force[contact, 0] = force[contact, 0]
+                step.end_force[contact, 1] = force[contact, 1]
             for i in range(memory.torque.shape[0]):
                 step.torque[i] = memory.torque[i]
     fit_dense(length, step.begin, step.end, step.slopes, step.dense)
@@ -111,53 +104,44 @@ def take_step(
 
 @kernel
 def settle(
-    scene: Scene, rows: Rows, equations: Equations, contacts: Contacts, surface: Surface,
-    assembly: Assembly, loops: Loops, seconds: Contacts, phase: Phase, step: Step,
+    model: Model, ground: GroundModel, equations: Equations, rows: Rows, surface: Surface,
+    assembly: Assembly, loops: Loops, phase: Phase, step: Step,
 ) -> bool:  # fmt: skip
     """Put the end of the step on its constraints; return whether its error explains how far."""
-    end, before = step.end, step.unsettled
-    for i in range(end.shape[0]):
-        before[i] = end[i]
-    left, _, _ = project(
-        scene.model, scene.ground, rows, equations, contacts, surface, assembly, loops, seconds,
-        phase, end,
-    )  # fmt: skip
-    return left <= max(TOGETHER, 2.0 * step.left) and explained(before, end, EXPLAINED, step)
+    copy_state(step.end, step.unsettled)
+    left, _, _ = project(model, ground, equations, rows, surface, assembly, loops, phase, step.end)
+    fits = explained(step.unsettled, step.end, EXPLAINED, step.relative, step.absolute)
+    return left <= max(TOGETHER, 2.0 * step.left) and fits
 
 
 @kernel
-def end_at_event(
-    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase, step: Step
-) -> tuple[float, bool, bool]:
+def end_at_event(length: float, taken: Integration) -> tuple[float, bool, bool]:
     """Repeat the step to end at the event, and correct its length by what is left there.
 
     Returns the length, whether the step is good enough, and whether its end fits its constraints.
     """
-    watch = phase.watch
+    model, ground, memory = taken.scene.model, taken.scene.ground, taken.memory
+    modes, watch, step = taken.phase.modes, taken.phase.watch, taken.step
+    value, rate, fired, tree = watch.value, watch.rate, watch.fired, memory.equations.tree
     for attempt in range(4):
-        if not take_step(scene, length, control, memory, phase, step) <= 1.0:
+        if not take_step(length, taken) <= 1.0:
             return length, False, True
         if not settle(
-            scene, memory.rows, memory.equations, memory.contacts, memory.surface, memory.assembly,
-            memory.loops, memory.seconds, phase, step,
+            model, ground, memory.equations, memory.rows, memory.surface, memory.assembly,
+            memory.loops, taken.phase, step,
         ):  # fmt: skip
             return length, True, False
-        look(
-            scene.model, scene.ground, step.end, phase.modes, memory.rows, memory.equations.tree,
-            memory.contacts, memory.surface, memory.seconds, phase.faces, watch,
-        )  # fmt: skip
-        if has_corners(scene.ground):
+        look(step.end, model, ground, tree, memory.rows, modes, memory.surface, watch)
+        if has_corners(ground):
             rate_corners(
-                scene.model, scene.ground, memory.equations.tree, memory.contacts, memory.rows,
-                phase.modes, phase.faces, watch,
+                model, ground, tree, modes.watched, memory.rows, modes.closed, modes.face, fired,
+                rate,
             )  # fmt: skip
-        value, rate = watch.value, watch.rate
         change = 0.0
-        for i in range(watch.fired.shape[0]):
-            passes = watch.fired[i] == 1 and is_geometric(i, phase.modes) and rate[i] < 0.0
-            if passes and abs(value[i]) > NEAR_ENOUGH * noise(
-                i, phase.modes, watch.weight, step.samples
-            ):
+        for i in range(fired.shape[0]):
+            passes = fired[i] == 1 and is_geometric(i, modes) and rate[i] < 0.0
+            least = NEAR_ENOUGH * noise(i, modes, watch.weight, step.samples)
+            if passes and abs(value[i]) > least:
                 change = -value[i] / rate[i]
         # Where it turns round rather than passes zero, its rate does not tell where zero is.
         if attempt == 3 or change == 0.0 or abs(change) > 0.5 * length:
@@ -180,11 +164,11 @@ def missed(modes: Modes, watch: Watch) -> bool:
 
 
 @kernel
-def look_back(scene: Scene, control: Control, memory: Memory, phase: Phase, step: Step) -> None:
+def look_back(taken: Integration) -> None:
     """Evaluate the beginning of the step again."""
-    watch = phase.watch
-    samples = step.samples
-    evaluate(scene, step.time, step.begin, control, memory, phase, step.slopes[0])
+    step, phase = taken.step, taken.phase
+    watch, samples = phase.watch, step.samples
+    evaluate(taken.scene, step.time, step.begin, taken.control, taken.memory, phase, step.slopes[0])
     copy_events(watch.value, watch.rate, samples.before, samples.before_rate)
 
 
@@ -198,24 +182,20 @@ def longest_turn(model: Model, motion: Floats, state: Floats) -> float:
 
 
 @kernel
-def integrate(
-    scene: Scene, stop: float, control: Control, memory: Memory, phase: Phase, step: Step
-) -> bool:
+def integrate(stop: float, taken: Integration) -> bool:
     """Take one good step that ends at its first event, or at `stop` at the latest.
 
     ``step.slopes[0]`` must be the slope now, and the event functions those of now. Returns false
     if the step would have to be too short.
     """
-    watch = phase.watch
-    samples = step.samples
-    copy_events(watch.value, watch.rate, samples.before, samples.before_rate)
+    scene, memory, step = taken.scene, taken.memory, taken.step
+    modes, watch = taken.phase.modes, taken.phase.watch
+    copy_events(watch.value, watch.rate, step.samples.before, step.samples.before_rate)
     wish = min(step.next_length, step.longest)
     length = wish
     rejected = False
     while True:
-        length, factor, shortened = longest_good_step(
-            scene, length, stop, control, memory, phase, step
-        )
+        length, factor, shortened = longest_good_step(length, stop, taken)
         if length == 0.0:
             return False
         rejected = rejected or shortened
@@ -223,29 +203,29 @@ def integrate(
             step.next_length = length * min(factor, 1.0)
         else:  # a step cut short by a stop says little about how long the next may be
             step.next_length = max(min(wish, MOST * length), length * factor)
-        part = first_event(scene, length, control, memory, phase, step)
+        part = first_event(length, taken)
         step.has_fired = 0 if part == NO_EVENT else 1
         good, fits = True, True
         for _ in range(ATTEMPTS):
             if part == NO_EVENT:
                 break
-            length, good, fits = end_at_event(scene, length * part, control, memory, phase, step)
-            if not (good and fits and missed(phase.modes, watch)):
+            length, good, fits = end_at_event(length * part, taken)
+            if not (good and fits and missed(modes, watch)):
                 break
-            look_back(scene, control, memory, phase, step)
-            part = first_event(scene, length, control, memory, phase, step)
+            look_back(taken)
+            part = first_event(length, taken)
             step.has_fired = 0 if part == NO_EVENT else 1
         if step.has_fired == 0:
             fits = settle(
-                scene, memory.rows, memory.equations, memory.contacts, memory.surface,
-                memory.assembly, memory.loops, memory.seconds, phase, step,
+                scene.model, scene.ground, memory.equations, memory.rows, memory.surface,
+                memory.assembly, memory.loops, taken.phase, step,
             )  # fmt: skip
         if good and fits:
             break
         # Where a torque saturates the shorter step can be the worse one: take less of it.
         length *= SHORTENED if good else 0.5
         rejected = True
-        look_back(scene, control, memory, phase, step)
+        look_back(taken)
     step.length = length
     step.finished = 1
     return True

@@ -5,7 +5,6 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.contact.workspace import ContactWorkspace
 from heelstrike.dynamics.kernels import passive_force
 from heelstrike.robot.model import Floats, Integers, Model
@@ -13,61 +12,49 @@ from heelstrike.sim.contacts.dry_friction import add_dry_force
 from heelstrike.sim.contacts.geometry import solve_mass_matrix
 from heelstrike.sim.contacts.latches import hold
 from heelstrike.sim.contacts.loops import rows_of
-from heelstrike.sim.contacts.rows import DRY_JOINT, Rows
-from heelstrike.sim.event_driven.phase import Modes, Phase
+from heelstrike.sim.contacts.rows import Rows
+from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Assembly, Equations, Loops
 from heelstrike.sim.push import Pushes, add_pushes
 
 
 @dissolved_kernel
-def known_force(
-    model: Model, state: Floats, torque: Floats, rows: Rows, modes: Modes, pushes: Pushes,
-    equations: Equations,
+def free_acceleration(
+    model: Model, state: Floats, torque: Floats, rows: Rows, slide: Integers, breakaway: Floats,
+    pushes: Pushes, equations: Equations, force: Floats,
 ) -> None:  # fmt: skip
-    """Generalised force without contact, B Γ + passive + pushes − H, into ``equations.rate``.
+    """Acceleration without contact, A⁻¹ (B Γ + passive + pushes − H), into ``equations.rate``.
 
     The equations of the state have been evaluated. Dry friction of the joints that move is one of
-    the passive forces.
+    the passive forces. What is multiplied by A⁻¹ goes to `force`.
     """
-    force, rate = equations.force, equations.rate
+    rate = equations.rate
     passive_force(model, state[: model.nq], state[model.nq :], force)
     add_pushes(model, equations.tree, pushes, force)
     for i in range(model.nu):
         force[model.actuator_joint[i]] += torque[i]
-    add_dry_force(modes.slide, modes.breakaway, rows, force)
+    add_dry_force(slide, breakaway, rows, force)
     for i in range(model.nv):
-        rate[i] = force[i] - equations.bias[i]
-
-
-@dissolved_kernel
-def free_acceleration(
-    model: Model, state: Floats, torque: Floats, rows: Rows, modes: Modes, pushes: Pushes,
-    equations: Equations,
-) -> None:  # fmt: skip
-    """Acceleration without contact, A⁻¹ (B Γ + passive + pushes − H), into ``equations.rate``.
-
-    The equations of the state have been evaluated.
-    """
-    known_force(model, state, torque, rows, modes, pushes, equations)
-    solve_mass_matrix(model, equations, equations.rate)
+        force[i] -= equations.bias[i]
+        rate[i] = force[i]
+    solve_mass_matrix(model, equations, rate)
 
 
 @kernel
 def pose_problem(
-    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers, rows: Rows,
-    slide: Integers, assembly: Assembly,
+    count: int, total: int, accelerations: bool, friction: Floats, guess: Integers, rows: Rows,
+    slide: Integers, held: Integers, assembly: Assembly,
 ) -> None:  # fmt: skip
     """Pose the contact problem of the candidates at the level of accelerations or velocities.
 
-    These are `count` contacts and, after them, the rows of the loops, whose sets are there. Matrix
-    and free term are there, too. Of accelerations, points that slide are prescribed to go on
-    doing so: their friction is known. Sets, friction and modes to begin with are written.
+    These are `count` contacts and, up to `total`, the rows of the loops, whose sets are there.
+    Matrix, free term and bounds are there, too. Of accelerations, points that slide are prescribed
+    to go on doing so: their friction is known. Sets, friction and modes to begin with are written.
     """
     problem, mode = assembly.problem, assembly.answer.mode
     for place in range(count):
         contact = assembly.candidate[place]
-        is_dry = rows.kind[contact] == DRY_JOINT
-        problem.set[place] = INTERVAL if is_dry else CONE
+        problem.set[place] = rows.set[contact]
         problem.friction[place] = friction[contact]
         mode[place] = STICK
         if accelerations:
@@ -77,9 +64,9 @@ def pose_problem(
                 mode[place] = SLIDING_BACKWARD
             elif guess[contact] < SLIDING_FORWARD:
                 mode[place] = guess[contact]
-    hold(count, rows.latch_stop, loops.held, assembly)
-    problem.count = count + rows_of(loops)
-    for place in range(count, problem.count):
+    hold(count, rows.latch_stop, held, assembly)
+    problem.count = total
+    for place in range(count, total):
         mode[place] = STICK
 
 
@@ -92,7 +79,8 @@ def solve_candidates(
 
     Forces or impulses and modes go to ``assembly.answer``.
     """
-    pose_problem(count, loops, accelerations, friction, guess, rows, slide, assembly)
+    total = count + rows_of(loops)
+    pose_problem(count, total, accelerations, friction, guess, rows, slide, loops.held, assembly)
     return int(solve_contact_kernel(solvers, assembly.problem, solver, assembly.answer))
 
 

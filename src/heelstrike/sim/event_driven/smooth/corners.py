@@ -12,47 +12,32 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame, out_of_frame
-from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.contacts.rows import SECOND_FACE, Rows, second_of
-from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.rows import CONSTRAINT, POINT, STOP, Rows, second_of
 from heelstrike.sim.event_driven.phase import Impact
 from heelstrike.sim.event_driven.steps import shortest_step
+from heelstrike.sim.memory import Reported
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import log_event
+from heelstrike.sim.record.recording import CONSTRAINT_HOLDS, JOINT_STOP, TOUCHDOWN, log_event
 
-
-@kernel
-def is_cornered(point: int, rows: Rows, paired: int, impact: Impact) -> bool:
-    """Whether a second face acts on a point, or gives it its frame."""
-    if paired == 0:
-        return False
-    second = second_of(point, rows)
-    pushed = impact.impulse[second, 0] != 0.0 or impact.impulse[second, 1] != 0.0
-    return pushed or impact.meets[point] == 1
+IMPACT = int(EventKind.IMPACT)
 
 
 @kernel
 def joined(
-    point: int, force: Floats, contacts: Contacts, rows: Rows, seconds: Contacts, meets: Integers
+    point: int, second: int, force: Floats, normal: Floats, meets: Integers
 ) -> tuple[float, float]:
-    """Resultant (normal, tangent) of the forces, or impulses, of both faces of a point."""
-    second, other = second_of(point, rows), seconds.normal[point]
-    own_x, own_z = out_of_frame(contacts.normal[point], (force[point, 0], force[point, 1]))
-    x, z = out_of_frame(other, (force[second, 0], force[second, 1]))
-    frame = other if meets[point] == 1 else contacts.normal[point]
+    """Resultant (normal, tangent) of the forces, or impulses, of both faces of a point.
+
+    `force` and `normal` are numbered by the table of rows, `second` is the second face.
+    """
+    if meets[point] == 0 and force[second, 0] == 0.0 and force[second, 1] == 0.0:
+        return force[point, 0], force[point, 1]
+    own_x, own_z = out_of_frame(normal[point], (force[point, 0], force[point, 1]))
+    x, z = out_of_frame(normal[second], (force[second, 0], force[second, 1]))
+    frame = normal[second] if meets[point] == 1 else normal[point]
     return into_frame(frame, (own_x + x, own_z + z))
-
-
-@kernel
-def impulse_of(
-    point: int, contacts: Contacts, rows: Rows, seconds: Contacts, paired: int, impact: Impact
-) -> tuple[float, float]:
-    """Impulse (normal, tangent) on a point in this instant, of both faces."""
-    if is_cornered(point, rows, paired, impact):
-        return joined(point, impact.impulse, contacts, rows, seconds, impact.meets)
-    return impact.impulse[point, 0], impact.impulse[point, 1]
 
 
 @kernel
@@ -66,83 +51,90 @@ def first_row(time: float, record: Record) -> int:
 
 @kernel
 def log_impulse(
-    kind: int, point: int, contacts: Contacts, rows: Rows, seconds: Contacts, paired: int,
-    time: float, impact: Impact, record: Record,
-) -> None:  # fmt: skip
+    kind: int, point: int, second: int, time: float, normal: Floats, impact: Impact, record: Record
+) -> None:
     """Append the impulse on a point in this instant to the events.
 
     It is told in the frame of the first row of the instant: several impacts, jams and a bridge may
     follow each other there, and turn the point from face to face.
     """
-    frame = contacts.normal[point]
-    normal, tangent = impact.impulse[point, 0], impact.impulse[point, 1]
-    if is_cornered(point, rows, paired, impact):
-        normal, tangent = joined(point, impact.impulse, contacts, rows, seconds, impact.meets)
-        if impact.meets[point] == 1:
-            frame = seconds.normal[point]
+    along, across = joined(point, second, impact.impulse, normal, impact.meets)
+    frame = normal[second] if impact.meets[point] == 1 else normal[point]
     row = first_row(time, record)
     if row < record.rows:
         told = record.contact_normal[row, point]
         if told[0] != frame[0] or told[1] != frame[1]:
-            normal, tangent = into_frame(told, out_of_frame(frame, (normal, tangent)))
-    log_event(time, kind, point, normal, tangent, record)
+            along, across = into_frame(told, out_of_frame(frame, (along, across)))
+    log_event(time, kind, point, along, across, record)
 
 
 @kernel
-def is_struck(point: int, rows: Rows, paired: int, impulse: Floats) -> bool:
-    """Whether an impulse acts on a point in this instant, of either face."""
-    if impulse[point, 0] > 0.0:
-        return True
-    second = second_of(point, rows)
-    return bool(paired == 1 and impulse[second, 0] > 0.0)
+def report_impulses(
+    kind: int, time: float, rows: Rows, impact: Impact, reported: Reported, record: Record
+) -> int:
+    """Append the impulses of this instant to the events; return the point with the largest.
+
+    Those of contact points have a kind of their own, or are touchdowns where `kind` is ``IMPACT``
+    and the point was not on the ground.
+    """
+    impulse, largest = impact.impulse, 0
+    for contact in range(rows.end[CONSTRAINT]):
+        normal = impulse[contact, 0]
+        if rows.kind[contact] != POINT:
+            if normal != 0.0:  # it may pull, as a latch does
+                holds = JOINT_STOP if rows.kind[contact] == STOP else CONSTRAINT_HOLDS
+                reported.closed[contact] = 1
+                log_event(time, holds, rows.owner[contact], normal, 0.0, record)
+            continue
+        second, told = second_of(contact, rows), kind
+        largest = contact if normal > impulse[largest, 0] else largest
+        if not (normal > 0.0 or impulse[second, 0] > 0.0):
+            continue
+        if kind == IMPACT and reported.closed[contact] == 0:
+            reported.closed[contact], reported.slipping[contact] = 1, 0
+            told = TOUCHDOWN
+        log_impulse(told, contact, second, time, rows.normal, impact, record)
+    return largest
 
 
 @kernel
-def show_forces(
-    force: Floats, rows: Rows, seconds: Contacts, watched: int, meets: Integers, contacts: Contacts
-) -> None:
+def show_forces(force: Floats, rows: Rows, meets: Integers, shown: Floats) -> None:
     """Let controllers see the forces of the contact points; what stands after them is of joints."""
-    for contact in range(contacts.force.shape[0]):
-        contacts.force[contact, 0] = force[contact, 0]
-        contacts.force[contact, 1] = force[contact, 1]
-    for second in range(rows.first[SECOND_FACE], watched):
-        if force[second, 0] != 0.0 or force[second, 1] != 0.0:
-            point = rows.owner[second]
-            both = joined(point, force, contacts, rows, seconds, meets)
-            contacts.force[point, 0], contacts.force[point, 1] = both
+    for point in range(meets.shape[0]):
+        second = second_of(point, rows)
+        pushed = force[second, 0] != 0.0 or force[second, 1] != 0.0
+        shown[point, 0], shown[point, 1] = force[point, 0], force[point, 1]
+        if pushed:
+            shown[point, 0], shown[point, 1] = joined(point, second, force, rows.normal, meets)
 
 
 @kernel
 def record_corner(
-    row: int, point: int, model: Model, tree: Workspace, contacts: Contacts, seconds: Contacts,
-    impact: Impact, record: Record,
+    row: int, point: int, second: int, model: Model, normal: Floats, position: Floats,
+    force: Floats, meets: Integers, record: Record,
 ) -> None:  # fmt: skip
     """Put the force of the second face of a point into a row, and the frame of one just met.
 
-    The force of the first face is there. About the centre of the disc only friction has a moment,
-    r λ_t of either face; the resultant acts where its line leaves the disc.
+    About the centre of the disc only friction has a moment, r λ_t of either face; the resultant
+    acts where its line leaves the disc.
     """
-    force, other = record.contact_force[row, point], seconds.force[point]
-    meets = impact.meets[point] == 1
-    if other[0] == 0.0 and other[1] == 0.0 and not meets:
+    own, other, met = force[point], force[second], meets[point] == 1
+    if other[0] == 0.0 and other[1] == 0.0 and not met:
         return
-    radius, own = model.contact_radius[point], contacts.normal[point]
-    own_x, own_z = out_of_frame(own, (force[0], force[1]))
-    x, z = out_of_frame(seconds.normal[point], (other[0], other[1]))
+    radius, place = model.contact_radius[point], record.contact_point[row, point]
+    own_x, own_z = out_of_frame(normal[point], (own[0], own[1]))
+    x, z = out_of_frame(normal[second], (other[0], other[1]))
     x, z = own_x + x, own_z + z
-    place, moment = record.contact_point[row, point], radius * (force[1] + other[1])
     size = math.sqrt(x * x + z * z)
-    normal = seconds.normal[point] if meets else own
     if size > 0.0:
-        lever = moment / size
+        lever = radius * (own[1] + other[1]) / size
         depth = math.sqrt(max(radius * radius - lever * lever, 0.0))
-        place[0] += radius * own[0] + (lever * z - depth * x) / size
-        place[1] += radius * own[1] + (-lever * x - depth * z) / size
-    elif meets:
-        place[0], place[1] = seconds.position[point, 0], seconds.position[point, 1]
-    if meets:
-        record.gap[row, point] = seconds.gap[point]
+        place[0] += radius * normal[point, 0] + (lever * z - depth * x) / size
+        place[1] += radius * normal[point, 1] + (-lever * x - depth * z) / size
+    elif met:
+        place[0], place[1] = position[second, 0], position[second, 1]
+    if met:
         for i in range(2):
-            record.contact_normal[row, point, i] = normal[i]
-        _, record.slip_velocity[row, point] = contact_velocity(model, tree, seconds, point)
-    force[0], force[1] = into_frame(normal, (x, z))
+            record.contact_normal[row, point, i] = normal[second, i]
+    told = record.contact_force[row, point]
+    told[0], told[1] = into_frame(normal[second] if met else normal[point], (x, z))

@@ -11,11 +11,11 @@ import math
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
+from heelstrike.contact.workspace import ContactAnswer
 from heelstrike.dynamics.dense import raise_to_zero, shorten, solve_to_rank
-from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
+from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, mass_matrix
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contacts.candidates import find_constraints
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -26,12 +26,11 @@ from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, 
 from heelstrike.sim.contacts.rows import DRY_JOINT, Rows
 from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.motors import try_torque
-from heelstrike.sim.event_driven.phase import Faces, HeldRows, Modes, Phase, Watch
+from heelstrike.sim.event_driven.phase import HeldRows, Modes, Phase, SaddlePoint, Watch
 from heelstrike.sim.event_driven.smooth.candidates import free_acceleration, share_redundant
 from heelstrike.sim.event_driven.smooth.faces import locate
-from heelstrike.sim.event_driven.smooth.gaps import free_gap_acceleration, gap_rows
+from heelstrike.sim.event_driven.smooth.gaps import free_gap_acceleration, write_candidates
 from heelstrike.sim.event_driven.smooth.saddle_point import (
     is_delicate,
     solve_saddle_point,
@@ -47,32 +46,55 @@ from heelstrike.sim.event_driven.smooth.watch import (
 )
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Surface
-from heelstrike.sim.push import Pushes
+
+
+@kernel
+def copy_state(source: Floats, state: Floats) -> None:
+    """Copy a state (q, v)."""
+    for i in range(source.shape[0]):
+        state[i] = source[i]
+
+
+@kernel
+def list_closed(rows: Rows, modes: Modes, candidate: Integers, bound: Floats) -> int:
+    """List the closed contacts as candidates, and the bounds of dry joints; return their number.
+
+    Dry joints that move are none of them: their friction is known.
+    """
+    count = 0
+    for contact in range(modes.watched):
+        if modes.closed[contact] == 0:
+            continue
+        if rows.kind[contact] == DRY_JOINT:
+            if modes.slide[contact] != 0:
+                continue
+            bound[count] = modes.breakaway[rows.owner[contact]]
+        candidate[count] = contact
+        count += 1
+    return count
 
 
 @kernel
 def list_unknowns(
-    count: int, loop_rows: int, candidate: Integers, friction: Floats, modes: Modes, held: HeldRows
+    count: int, total: int, candidate: Integers, friction: Floats, modes: Modes, held: HeldRows
 ) -> int:
-    """List the Jacobian rows along which closed points are held, and friction per normal force.
+    """List the Jacobian rows along which contacts are held, and friction per normal force.
 
-    The rows of the loops, which come after the `count` contacts, are held always.
+    Open contacts among the `count` are held along their normals, and so are the rows of the loops,
+    which come after the contacts, up to `total`.
     """
     size = 0
-    for place in range(count):
+    for place in range(total):
         contact = candidate[place]
-        if modes.carrier[contact] == 1:
+        is_loop = place >= count
+        if is_loop or modes.carrier[contact] == 1 or modes.closed[contact] == 0:
             held.row[size] = 2 * place
-            held.lean[size] = -modes.slide[contact] * friction[contact]
+            held.lean[size] = 0.0 if is_loop else -modes.slide[contact] * friction[contact]
             size += 1
-        if modes.holder[contact] == 1:
+        if not is_loop and modes.holder[contact] == 1:
             held.row[size] = 2 * place + 1
             held.lean[size] = 0.0
             size += 1
-    for place in range(count, count + loop_rows):
-        held.row[size] = 2 * place
-        held.lean[size] = 0.0
-        size += 1
     return size
 
 
@@ -126,31 +148,8 @@ def share_forces(
 
 
 @kernel
-def gather_closed(
-    model: Model, contacts: Contacts, rows: Rows, seconds: Contacts, modes: Modes, loops: Loops,
-    equations: Equations, assembly: Assembly,
-) -> int:  # fmt: skip
-    """Jacobian rows and Delassus matrix of the closed contacts; return their number.
-
-    Dry joints that move are none of them: their friction is known. The rows of the loops come
-    after those of the contacts and are not counted; they have been found for the state.
-    """
-    count = 0
-    for contact in range(modes.watched):
-        moves = rows.kind[contact] == DRY_JOINT and modes.slide[contact] != 0
-        if modes.closed[contact] == 1 and not moves:
-            gap_rows(model, equations.tree, contacts, rows, seconds, contact, count, assembly)
-            assembly.candidate[count] = contact
-            count += 1
-    total = append_loops(count, loops, assembly)
-    if total > 0:
-        assemble_delassus(model, total, equations, assembly)
-    return count
-
-
-@kernel
 def list_pressing(
-    size: int, count: int, candidate: Integers, loops: Loops, rows: Rows, held: HeldRows
+    size: int, count: int, candidate: Integers, latched: Integers, rows: Rows, held: HeldRows
 ) -> None:
     """Write to ``held.presses`` which unknown forces can press only.
 
@@ -161,42 +160,39 @@ def list_pressing(
         held.presses[k] = 1 if held.row[k] % 2 == 0 and place < count else 0
         if held.presses[k] == 1:
             contact = candidate[place]
-            for latch in range(loops.held.shape[0]):
-                if loops.held[latch] == 1 and rows.latch_stop[latch] == contact:
+            for latch in range(latched.shape[0]):
+                if latched[latch] == 1 and rows.latch_stop[latch] == contact:
                     held.presses[k] = 0
 
 
 @kernel
 def hold_by_saddle_point(
-    size: int, count: int, model: Model, state: Floats, contacts: Contacts, loops: Loops,
-    torque: Floats, rows: Rows, seconds: Contacts, equations: Equations, assembly: Assembly,
-    pushes: Pushes, phase: Phase,
-) -> None:  # fmt: skip
+    size: int, count: int, total: int, model: Model, rows: Rows, face: Integers, bend: Floats,
+    loop_bias: Floats, latched: Integers, candidate: Integers, jacobian: Floats, tree: Workspace,
+    matrix: Floats, rate: Floats, answer: ContactAnswer, held: HeldRows, saddle: SaddlePoint,
+) -> bool:  # fmt: skip
     """Contact forces that keep the modes, and the acceleration, from the full equations.
 
     What is no unknown has been written to the forces. Accelerations of the candidates' rows go to
-    ``answer.velocity``.
+    ``answer.velocity``. Returns whether the forces are ambiguous.
     """
-    held, forces = phase.held, phase.forces
-    nv, saddle = model.nv, phase.saddle
-    impulse, velocity, rate = assembly.answer.impulse, assembly.answer.velocity, equations.rate
+    nv, impulse, velocity = model.nv, answer.impulse, answer.velocity
     state_accelerations(
-        count, model, state, contacts, loops, torque, rows, seconds, equations, assembly, pushes,
-        phase,
-    )  # fmt: skip
-    write_equations(size, model, assembly.jacobian, held, equations, phase.saddle.system)
+        count, total, candidate, model, tree, rows, face, bend, loop_bias, jacobian, saddle.bias
+    )
+    mass_matrix(model, tree, matrix)
+    write_equations(size, nv, matrix, jacobian, held, saddle.system)
     for i in range(nv):
         saddle.system[i, nv + size] = saddle.force[i]
     for k in range(size):
         saddle.system[nv + k, nv + size] = -saddle.bias[held.row[k]]
     rank = solve_saddle_point(nv + size, saddle)
-    forces.deficient = 1 if rank < nv + size else 0
-    if forces.deficient == 1:
+    if rank < nv + size:
         shorten(
             nv, nv + size, rank, saddle.scale, held.lean, saddle.order, saddle.system,
             saddle.unknown,
         )  # fmt: skip
-        list_pressing(size, count, assembly.candidate, loops, rows, held)
+        list_pressing(size, count, candidate, latched, rows, held)
         raise_to_zero(nv, nv + size, rank, held.presses, saddle.system, saddle.unknown)
     saddle.needed = 1
     for i in range(nv):
@@ -206,78 +202,88 @@ def hold_by_saddle_point(
         impulse[row] += force
         if held.lean[k] != 0.0:
             impulse[row + 1] += held.lean[k] * force
-    for row in range(2 * (count + rows_of(loops))):
-        velocity[row] = saddle.bias[row] + row_product(assembly.jacobian, row, rate)
+    for row in range(2 * total):
+        velocity[row] = saddle.bias[row] + row_product(jacobian, row, rate)
+    return rank < nv + size
 
 
 @dissolved_kernel
 def hold_closed(
-    model: Model, count: int, state: Floats, friction: Floats, rows: Rows, seconds: Contacts,
-    contacts: Contacts, loops: Loops, torque: Floats, phase: Phase, equations: Equations,
-    assembly: Assembly, pushes: Pushes,
-) -> None:  # fmt: skip
-    """Contact forces that keep the modes of the candidates, and the acceleration under them."""
-    held, forces = phase.held, phase.forces
-    impulse = assembly.answer.impulse
+    count: int, total: int, model: Model, rows: Rows, modes: Modes, friction: Floats, loops: Loops,
+    equations: Equations, assembly: Assembly, held: HeldRows, saddle: SaddlePoint,
+) -> bool:  # fmt: skip
+    """Contact forces that keep the modes of the candidates, and the acceleration under them.
+
+    Returns whether they are ambiguous.
+    """
+    candidate, free, impulse = assembly.candidate, assembly.problem.free, assembly.answer.impulse
     for place in range(count):
-        contact = assembly.candidate[place]
+        contact = candidate[place]
         free_gap_acceleration(
-            model, contacts, equations, contact, place, rows, seconds, phase.modes.breakaway,
-            phase.faces, assembly,
+            contact, place, model, equations.tree, rows, modes.face, modes.bend, equations.rate,
+            assembly.jacobian, free,
         )  # fmt: skip
         impulse[2 * place] = 0.0
         impulse[2 * place + 1] = 0.0
         if rows.kind[contact] == DRY_JOINT:
-            joint = rows.owner[contact]
-            impulse[2 * place] = phase.modes.breakaway[joint]
-    loop_rows = rows_of(loops)
-    total = count + loop_rows
+            impulse[2 * place] = assembly.problem.bound[place]
     free_loops(total, loops, equations.rate, 1.0, assembly)
     for row in range(2 * count, 2 * total):
         impulse[row] = 0.0
-    size = list_unknowns(count, loop_rows, assembly.candidate, friction, phase.modes, held)
+    size = list_unknowns(count, total, candidate, friction, modes, held)
     for i in range(size):
-        held.system[i, size] = -assembly.problem.free[held.row[i]]
+        held.system[i, size] = -free[held.row[i]]
     rank = solve_constraints(size, 1.0, assembly.problem.delassus, held)
     if is_delicate(size, rank, held.system):
-        hold_by_saddle_point(
-            size, count, model, state, contacts, loops, torque, rows, seconds, equations, assembly,
-            pushes, phase,
+        return hold_by_saddle_point(
+            size, count, total, model, rows, modes.face, modes.bend, loops.rows.bias, loops.held,
+            candidate,
+            assembly.jacobian, equations.tree, equations.mass_matrix, equations.rate,
+            assembly.answer, held, saddle,
         )  # fmt: skip
-        return
-    forces.deficient = 1 if rank < size else 0
-    if forces.deficient == 1:
+    if rank < size:
         shorten(0, size, rank, held.scale, held.lean, held.column, held.system, held.unknown)
-        list_pressing(size, count, assembly.candidate, loops, rows, held)
+        list_pressing(size, count, candidate, loops.held, rows, held)
         raise_to_zero(0, size, rank, held.presses, held.system, held.unknown)
     for i in range(size):
         impulse[held.row[i]] += held.unknown[i]
         if held.lean[i] != 0.0:
             impulse[held.row[i] + 1] += held.lean[i] * held.unknown[i]
     add_impulse(model, assembly, total, equations, equations.rate)
+    return rank < size
 
 
 @kernel
 def observe_faces(
-    model: Model, ground: GroundModel, state: Floats, modes: Modes, rows: Rows, seconds: Contacts,
-    faces: Faces, tree: Workspace, contacts: Contacts, surface: Surface,
+    state: Floats, model: Model, ground: GroundModel, tree: Workspace, rows: Rows, modes: Modes,
+    surface: Surface,
 ) -> None:  # fmt: skip
-    """Kinematics, velocities and contact points of a state (q, v)."""
-    forward_kinematics(model, state[: model.nq], tree)
-    link_velocities(model, state[model.nq :], tree)
-    if rows.outside.kernel.shape[0] > 0:
-        find_constraints(model, state[: model.nq], state[model.nq :], tree, rows)
-    locate(model, ground, tree, rows, modes, seconds, faces, contacts, surface)
+    """Kinematics, velocities, contact points and gaps of a state (q, v)."""
+    q, v = state[: model.nq], state[model.nq :]
+    forward_kinematics(model, q, tree)
+    link_velocities(model, v, tree)
+    locate(q, v, model, ground, tree, rows, modes, surface)
+
+
+@kernel
+def observe_rows(
+    state: Floats, model: Model, ground: GroundModel, tree: Workspace, rows: Rows, modes: Modes,
+    surface: Surface, loops: Loops,
+) -> None:  # fmt: skip
+    """The same, and the rows of the loops."""
+    observe_faces(state, model, ground, tree, rows, modes, surface)
+    if rows_of(loops) > 0:
+        find_loops(model, state[: model.nq], state[model.nq :], tree, loops)
 
 
 @kernel
 def look(
-    model: Model, ground: GroundModel, state: Floats, modes: Modes, rows: Rows, tree: Workspace,
-    contacts: Contacts, surface: Surface, seconds: Contacts, faces: Faces, watch: Watch,
+    state: Floats, model: Model, ground: GroundModel, tree: Workspace, rows: Rows, modes: Modes,
+    surface: Surface, watch: Watch,
 ) -> None:  # fmt: skip
     """Pose, contact points, and the event functions that need no forces, of a state (q, v)."""
-    observe_faces(model, ground, state, modes, rows, seconds, faces, tree, contacts, surface)
-    watch_geometry(model, ground, tree, contacts, state, rows, seconds, modes, faces, watch)
+    observe_faces(state, model, ground, tree, rows, modes, surface)
+    watch_geometry(model, ground, tree, state[model.nq :], rows, modes, watch.value, watch.rate)
 
 
 @kernel
@@ -290,56 +296,46 @@ def evaluate(
     Pose, contact points, torque, slope (v, v̇), contact forces and all event functions. A continuous
     controller is asked without letting it remember.
     """
-    forces, saddle = phase.forces, phase.saddle
-    model = scene.model
+    modes, watch, forces, saddle = phase.modes, phase.watch, phase.forces, phase.saddle
+    model, ground, rows, loops = scene.model, scene.ground, memory.rows, memory.loops
     q, v = state[: model.nq], state[model.nq :]
     equations, assembly, friction = memory.equations, memory.assembly, memory.surface.friction
-    rate = equations.rate
+    tree, rate = equations.tree, equations.rate
     evaluate_equations(model, q, v, equations)
-    if memory.rows.outside.kernel.shape[0] > 0:
-        find_constraints(model, q, v, equations.tree, memory.rows)
-    locate(
-        model, scene.ground, equations.tree, memory.rows, phase.modes, memory.seconds, phase.faces,
-        memory.contacts, memory.surface,
-    )  # fmt: skip
-    watch_geometry(
-        model, scene.ground, equations.tree, memory.contacts, state, memory.rows, memory.seconds,
-        phase.modes, phase.faces, phase.watch,
-    )  # fmt: skip
+    locate(q, v, model, ground, tree, rows, modes, memory.surface)
+    watch_geometry(model, ground, tree, v, rows, modes, watch.value, watch.rate)
     if control.continuous == 1:
         consult(scene.controller, time, q, v, model, memory, control, memory.command)
     try_torque(model, control, q, v, memory.tally, memory.command, memory.torque)
     free_acceleration(
-        model, state, memory.torque, memory.rows, phase.modes, memory.pushes, equations
-    )
-    loop_rows = rows_of(memory.loops)
-    if loop_rows > 0:
-        find_loops(model, q, v, equations.tree, memory.loops)
-    count = gather_closed(
-        model, memory.contacts, memory.rows, memory.seconds, phase.modes, memory.loops, equations,
-        assembly,
+        model, state, memory.torque, rows, modes.slide, modes.breakaway, memory.pushes, equations,
+        saddle.force,
     )  # fmt: skip
+    if rows_of(loops) > 0:
+        find_loops(model, q, v, tree, loops)
+    count = list_closed(rows, modes, assembly.candidate, assembly.problem.bound)
+    write_candidates(count, assembly.candidate, model, tree, rows, assembly.leaf, assembly.jacobian)
+    total = append_loops(count, loops, assembly)
     forces.count = count
     saddle.needed = 0
-    if count + loop_rows > 0:
-        hold_closed(
-            model, count, state, friction, memory.rows, memory.seconds, memory.contacts,
-            memory.loops, memory.torque, phase, equations, assembly, memory.pushes,
+    if total > 0:
+        assemble_delassus(model, total, equations, assembly)
+        ambiguous = hold_closed(
+            count, total, model, rows, modes, friction, loops, equations, assembly, phase.held,
+            saddle,
         )  # fmt: skip
-    share_forces(count, assembly, friction, phase.modes, forces.force)
-    watch_forces(count, loop_rows, assembly, friction, phase.modes, phase.watch)
+        forces.deficient = 1 if ambiguous else 0
+    share_forces(count, assembly, friction, modes, forces.force)
+    watch_forces(count, total, assembly, friction, modes, watch)
     if saddle.needed == 1:
-        watch_slips(count, assembly, phase.modes, phase.watch.rate)
-    trust_latches(memory.loops.held, memory.rows, phase.modes.closed, phase.watch.value)
+        watch_slips(count, assembly, modes, watch.rate)
+    trust_latches(loops.held, rows, modes.closed, watch.value)
     if count > 0 and forces.deficient == 1:
         share_redundant(
-            count, memory.loops, friction, memory.reaction.mode, memory.rows, phase, assembly,
-            memory.solver,
-        )  # fmt: skip
+            count, loops, friction, memory.reaction.mode, rows, phase, assembly, memory.solver
+        )
     for i in range(model.nv):
         slope[i] = v[i]
         slope[model.nq + i] = rate[i]
-    for contact in range(memory.rows.first[DRY_JOINT], memory.rows.end[DRY_JOINT]):
-        phase.watch.rate[2 * contact + 1] = (
-            phase.modes.slide[contact] * rate[memory.rows.owner[contact]]
-        )
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        watch.rate[2 * dry + 1] = modes.slide[dry] * rate[rows.owner[dry]]

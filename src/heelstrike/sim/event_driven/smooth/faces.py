@@ -3,8 +3,8 @@
 As long as a point stays on a face, its gap and normal are those of this face, however the next one
 turns: the motion is smooth until the point comes to the end of the face, and that is an event. In a
 concave corner a face has no end: there a point that is on it meets a second one, which is a contact
-of its own, with a gap, modes and forces. The second faces are numbered on from all other contacts.
-Flat ground has one face, and none of this.
+of its own, with a gap, modes and forces: an entry of the table like the others. Flat ground has one
+face, and none of this.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import point_position
-from heelstrike.dynamics.places import place_of, velocity_at
+from heelstrike.dynamics.places import velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.candidates import find_constraints, locate_stops
 from heelstrike.sim.contacts.faces import (
     CURVE,
     NO_FACE,
@@ -34,8 +35,7 @@ from heelstrike.sim.contacts.faces import (
 )
 from heelstrike.sim.contacts.geometry import locate_contacts
 from heelstrike.sim.contacts.rows import SECOND_FACE, Rows, second_of
-from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.phase import Bounces, Faces, Modes, Watch
+from heelstrike.sim.event_driven.phase import Bounces, Modes
 from heelstrike.sim.memory import Surface
 
 # Two normals are one when one minus the cosine of the angle between them is below this.
@@ -54,80 +54,82 @@ def has_corners(ground: GroundModel) -> bool:
 
 @kernel
 def locate_second(
-    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts, rows: Rows,
-    closed: Integers, surface: Surface, seconds: Contacts, face: Integers,
+    point: int, model: Model, ground: GroundModel, tree: Workspace, closed: Integers, rows: Rows,
+    face: Integers, surface: Surface,
 ) -> None:  # fmt: skip
     """Contact point, gap and normal of a point on its second face, the one it is on or could meet.
 
     Where there is none the gap is infinite.
     """
     second = second_of(point, rows)
-    seconds.gap[point] = np.inf
+    rows.gap[second] = np.inf
     if face[point] == NO_FACE:
         return
     if closed[second] == 0:
-        x, z = center_of(model, contacts, point)
+        x, z = center_of(model, rows, point)
         _, face[second] = second_face(
             ground, face[point], NO_FACE, x, z, model.contact_radius[point]
         )
     if face[second] != NO_FACE:
-        locate_on_face(model, ground, tree, point, face[second], seconds)
+        locate_on_face(model, ground, tree, point, face[second], second, rows)
         take_surface(model, ground, point, second, face[second], surface)
 
 
 @kernel
 def locate(
-    model: Model, ground: GroundModel, tree: Workspace, rows: Rows, modes: Modes, seconds: Contacts,
-    faces: Faces, contacts: Contacts, surface: Surface,
+    q: Floats, v: Floats, model: Model, ground: GroundModel, tree: Workspace, rows: Rows,
+    modes: Modes, surface: Surface,
 ) -> None:  # fmt: skip
-    """Contact points, gaps, normals and ground coefficients of the state now."""
-    locate_contacts(model, ground, tree, contacts, surface)
+    """Gaps, contact points, normals and ground coefficients of the state now.
+
+    Its kinematics and velocities have been found.
+    """
+    closed, face = modes.closed, modes.face
+    locate_contacts(model, ground, tree, rows, surface)
+    locate_stops(q, rows)
+    if rows.outside.kernel.shape[0] > 0:
+        find_constraints(model, q, v, tree, rows)
     if ground.curved == 1:
-        for contact in range(model.nc):
-            faces.face[contact], faces.bend[contact] = CURVE, surface.bend[contact]
+        for point in range(model.nc):
+            face[point], modes.bend[point] = CURVE, surface.bend[point]
     if not has_corners(ground):
         return
-    normals, normal = contacts.normal, ground.normal
-    for contact in range(model.nc):
-        face = faces.face[contact]
-        segment = face // 2
-        if face != NO_FACE and not (
-            face % 2 == 0
-            and normals[contact, 0] == normal[segment, 0]
-            and normals[contact, 1] == normal[segment, 1]
+    normals, normal = rows.normal, ground.normal
+    for point in range(model.nc):
+        its, segment = face[point], face[point] // 2
+        if its != NO_FACE and not (
+            its % 2 == 0
+            and normals[point, 0] == normal[segment, 0]
+            and normals[point, 1] == normal[segment, 1]
         ):
-            locate_on_face(model, ground, tree, contact, face, contacts)
-            take_surface(model, ground, contact, contact, face, surface)
-    for second in range(rows.first[SECOND_FACE], modes.watched):
-        point = rows.owner[second]
-        locate_second(
-            model, ground, tree, point, contacts, rows, modes.closed, surface, seconds, faces.face
-        )
+            locate_on_face(model, ground, tree, point, its, point, rows)
+            take_surface(model, ground, point, point, its, surface)
+    if ground.concave == 1:
+        for point in range(model.nc):
+            locate_second(point, model, ground, tree, closed, rows, face, surface)
 
 
 @kernel
 def stand_on_face(
-    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts, rows: Rows,
-    closed: Integers, surface: Surface, seconds: Contacts, faces: Faces,
+    point: int, model: Model, ground: GroundModel, tree: Workspace, closed: Integers, rows: Rows,
+    face: Integers, surface: Surface,
 ) -> None:  # fmt: skip
     """Put a point that has reached the ground on the face that its normal is of.
 
     In a corner two faces may be equally near.
     """
-    if faces.face[point] == NO_FACE and has_corners(ground):
-        x, z = center_of(model, contacts, point)
-        faces.face[point] = nearest_face(ground, x, z, model.contact_radius[point])
-        if faces.paired == 1:
-            locate_second(
-                model, ground, tree, point, contacts, rows, closed, surface, seconds, faces.face
-            )
-            own, other = contacts.normal[point], seconds.normal[point]
-            twice = own[0] * other[0] + own[1] * other[1] > 1.0 - ONE_NORMAL
-            if twice and abs(seconds.gap[point] - contacts.gap[point]) < ONE_GAP:
-                faces.face[point] = faces.face[second_of(point, rows)]
-                locate_second(
-                    model, ground, tree, point, contacts, rows, closed, surface, seconds, faces.face
-                )
+    if face[point] != NO_FACE or not has_corners(ground):
+        return
+    x, z = center_of(model, rows, point)
+    face[point] = nearest_face(ground, x, z, model.contact_radius[point])
+    if ground.concave == 1:
+        locate_second(point, model, ground, tree, closed, rows, face, surface)
+        second = second_of(point, rows)
+        own, other = rows.normal[point], rows.normal[second]
+        twice = own[0] * other[0] + own[1] * other[1] > 1.0 - ONE_NORMAL
+        if twice and abs(rows.gap[second] - rows.gap[point]) < ONE_GAP:
+            face[point] = face[second]
+            locate_second(point, model, ground, tree, closed, rows, face, surface)
 
 
 @kernel
@@ -137,47 +139,41 @@ def exchange_entries(first: int, second: int, values: Any) -> None:
 
 
 @kernel
-def exchange(
-    point: int, rows: Rows, mode: Integers, modes: Modes, face: Integers, hit: Integers,
-    bounces: Bounces,
-) -> None:  # fmt: skip
-    """Let the first face of a point be the one that was its second."""
-    second = second_of(point, rows)
-    exchange_entries(point, second, modes.closed)
-    exchange_entries(point, second, modes.slide)
-    exchange_entries(point, second, modes.stuck)
-    exchange_entries(point, second, face)
-    exchange_entries(point, second, hit)
-    exchange_entries(point, second, bounces.plastic)
-    exchange_entries(point, second, modes.anchor)
-    exchange_entries(point, second, bounces.last_impact)
-    exchange_entries(point, second, bounces.accumulation)
-    exchange_entries(point, second, mode)
+def begin_with_first(
+    rows: Rows, mode: Integers, modes: Modes, hit: Integers, bounces: Bounces
+) -> None:
+    """Let points that are on their second face only be there with their first contact."""
+    for second in range(rows.first[SECOND_FACE], modes.watched):
+        point = rows.owner[second]
+        if modes.closed[second] == 0 or modes.closed[point] == 1:
+            continue
+        exchange_entries(point, second, modes.closed)
+        exchange_entries(point, second, modes.slide)
+        exchange_entries(point, second, modes.stuck)
+        exchange_entries(point, second, modes.face)
+        exchange_entries(point, second, hit)
+        exchange_entries(point, second, bounces.plastic)
+        exchange_entries(point, second, modes.anchor)
+        exchange_entries(point, second, bounces.last_impact)
+        exchange_entries(point, second, bounces.accumulation)
+        exchange_entries(point, second, mode)
 
 
 @kernel
 def choose_faces(
-    model: Model, ground: GroundModel, tree: Workspace, rows: Rows, mode: Integers, modes: Modes,
-    faces: Faces, hit: Integers, bounces: Bounces,
-) -> None:  # fmt: skip
+    model: Model, ground: GroundModel, tree: Workspace, closed: Integers, face: Integers, rows: Rows
+) -> None:
     """Put the closed points that are on no face yet on the nearest; open ones are on none.
 
-    A point that is on one face only is there with its first contact.
+    They have yet to be located there.
     """
-    place = faces.place
-    for second in range(rows.first[SECOND_FACE], modes.watched):
-        point = rows.owner[second]
-        if modes.closed[second] == 1 and modes.closed[point] == 0:
-            exchange(point, rows, mode, modes, faces.face, hit, bounces)
-    for contact in range(model.nc):
-        if modes.closed[contact] == 0 or not has_corners(ground):
-            faces.face[contact] = NO_FACE
-        elif faces.face[contact] == NO_FACE:
-            point_position(
-                tree, model.contact_link[contact], model.contact_position[contact], place
-            )
-            radius = model.contact_radius[contact]
-            faces.face[contact] = nearest_face(ground, place[0], place[1], radius)
+    for point in range(model.nc):
+        if closed[point] == 0 or not has_corners(ground):
+            face[point] = NO_FACE
+        elif face[point] == NO_FACE:
+            center = rows.position[point]
+            point_position(tree, model.contact_link[point], model.contact_position[point], center)
+            face[point] = nearest_face(ground, center[0], center[1], model.contact_radius[point])
 
 
 @kernel
@@ -212,74 +208,69 @@ def following_face(
 
 @kernel
 def turn_corner(
-    model: Model, ground: GroundModel, contact: int, contacts: Contacts, stuck: Integers,
-    faces: Faces,
-) -> bool:  # fmt: skip
+    point: int, model: Model, ground: GroundModel, rows: Rows, stuck: Integers, face: Integers
+) -> bool:
     """Let a point go over to the following face; return whether its normal jumps there."""
-    face, radius = faces.face[contact], model.contact_radius[contact]
-    x, z = center_of(model, contacts, contact)
-    _, following = following_face(ground, face, x, z, radius)
-    faces.face[contact] = following
-    stuck[contact] = 0
-    return not is_beside(face, following)
+    before = face[point]
+    x, z = center_of(model, rows, point)
+    _, face[point] = following_face(ground, before, x, z, model.contact_radius[point])
+    stuck[point] = 0
+    return not is_beside(before, face[point])
 
 
 @kernel
 def watch_corners(
-    model: Model, ground: GroundModel, contacts: Contacts, rows: Rows, modes: Modes, faces: Faces,
-    value: Floats,
-) -> None:  # fmt: skip
+    model: Model, ground: GroundModel, rows: Rows, modes: Modes, value: Floats
+) -> None:
     """Event functions of the points on faces: how far each is from the end of its own."""
     first = 2 * modes.watched
-    for contact in range(model.nc):
-        value[first + contact] = 1.0
-        if faces.face[contact] != NO_FACE:
-            x, z = center_of(model, contacts, contact)
-            left = way_left(
-                ground, contact, x, z, model.contact_radius[contact], rows, modes.closed, faces
-            )
-            value[first + contact] = min(left, 1.0)
+    for point in range(model.nc):
+        value[first + point] = 1.0
+        if modes.face[point] != NO_FACE:
+            x, z = center_of(model, rows, point)
+            radius = model.contact_radius[point]
+            left = way_left(point, ground, x, z, radius, rows, modes.closed, modes.face)
+            value[first + point] = min(left, 1.0)
 
 
 @kernel
 def way_left(
-    ground: GroundModel, point: int, x: float, z: float, radius: float, rows: Rows,
-    closed: Integers, faces: Faces,
+    point: int, ground: GroundModel, x: float, z: float, radius: float, rows: Rows,
+    closed: Integers, face: Integers,
 ) -> float:  # fmt: skip
     """How far a disc on a face is from the end of it, or what there is to meet or leave besides."""
-    left, _ = following_face(ground, faces.face[point], x, z, radius)
-    if faces.paired == 1:
-        left = min(left, *way_out(ground, point, x, z, radius, rows, closed, faces.face))
+    left, _ = following_face(ground, face[point], x, z, radius)
+    if ground.concave == 1:
+        left = min(left, *way_out(point, ground, x, z, radius, rows, closed, face))
     return float(left)
 
 
 @kernel
 def rate_corners(
-    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, rows: Rows,
-    modes: Modes, faces: Faces, watch: Watch,
+    model: Model, ground: GroundModel, tree: Workspace, watched: int, rows: Rows, closed: Integers,
+    face: Integers, fired: Integers, rate: Floats,
 ) -> None:  # fmt: skip
     """Rates of the event functions of corners that have fired.
 
     They are linear in the place of a disc, or nearly so: a short way ahead tells.
     """
-    center = watch.center
-    for contact in range(model.nc):
-        corner = 2 * modes.watched + contact
-        if watch.fired[corner] == 0 or faces.face[contact] == NO_FACE:
+    for point in range(model.nc):
+        corner = 2 * watched + point
+        if fired[corner] == 0 or face[point] == NO_FACE:
             continue
-        x, z = center_of(model, contacts, contact)
-        center[0], center[1] = x, z
-        link, radius = model.contact_link[contact], model.contact_radius[contact]
-        along_x, along_z = velocity_at(tree.velocity, link, place_of(tree, center))
+        x, z = center_of(model, rows, point)
+        link, radius = model.contact_link[point], model.contact_radius[point]
+        place = x - tree.pivot[0], z - tree.pivot[1]
+        along_x, along_z = velocity_at(tree.velocity, link, place)
         soon_x, soon_z = x + SOON * along_x, z + SOON * along_z
-        here = way_left(ground, contact, x, z, radius, rows, modes.closed, faces)
-        later = way_left(ground, contact, soon_x, soon_z, radius, rows, modes.closed, faces)
-        watch.rate[corner] = (later - here) / SOON
+        here = way_left(point, ground, x, z, radius, rows, closed, face)
+        later = way_left(point, ground, soon_x, soon_z, radius, rows, closed, face)
+        rate[corner] = (later - here) / SOON
 
 
 @kernel
 def way_out(
-    ground: GroundModel, point: int, x: float, z: float, radius: float, rows: Rows,
+    point: int, ground: GroundModel, x: float, z: float, radius: float, rows: Rows,
     closed: Integers, face: Integers,
 ) -> tuple[float, float]:  # fmt: skip
     """How far a disc that is on two faces is from the end of the second, and from a third.
@@ -296,42 +287,33 @@ def way_out(
 
 @kernel
 def leave_second_face(
-    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts, rows: Rows,
-    surface: Surface, seconds: Contacts, modes: Modes, face: Integers, fired: Integers,
+    point: int, model: Model, ground: GroundModel, tree: Workspace, rows: Rows, closed: Integers,
+    slide: Integers, stuck: Integers, face: Integers, fired: Integers, surface: Surface,
 ) -> bool:  # fmt: skip
     """Let a point that is on two faces go over from the second to a third that it meets.
 
     Or off the end of the second. Returns false if it has come to the end of the first.
     """
-    x, z = center_of(model, contacts, point)
+    x, z = center_of(model, rows, point)
     second, radius = second_of(point, rows), model.contact_radius[point]
     own, _ = following_face(ground, face[point], x, z, radius)
-    left, third = way_out(ground, point, x, z, radius, rows, modes.closed, face)
+    left, third = way_out(point, ground, x, z, radius, rows, closed, face)
     if own < min(left, third):
         return False
-    modes.closed[second], modes.slide[second], modes.stuck[second] = 0, 0, 0
+    closed[second], slide[second], stuck[second] = 0, 0, 0
     if third <= left:
-        _, its = second_face(ground, face[point], face[second], x, z, radius)
-        face[second] = its
-        locate_on_face(model, ground, tree, point, its, seconds)
-        take_surface(model, ground, point, second, its, surface)
+        _, face[second] = second_face(ground, face[point], face[second], x, z, radius)
+        locate_on_face(model, ground, tree, point, face[second], second, rows)
+        take_surface(model, ground, point, second, face[second], surface)
         fired[2 * second] = 1
     return True
 
 
 @kernel
 def is_at_second(
-    model: Model, ground: GroundModel, point: int, reach: float, contacts: Contacts, rows: Rows,
-    faces: Faces,
-) -> bool:  # fmt: skip
+    point: int, model: Model, ground: GroundModel, reach: float, rows: Rows, face: Integers
+) -> bool:
     """Whether a point is within reach of its second face itself, and not only of the line of it."""
-    face = faces.face[second_of(point, rows)]
-    x, z = center_of(model, contacts, point)
-    return room_to(ground, face, x, z, model.contact_radius[point]) <= reach
-
-
-@kernel
-def face_curvature(contact: int, radius: float, faces: Faces) -> float:
-    """Curvature (1/m) of the way of the centre of a disc on its face."""
-    face = faces.face[contact]
-    return 1.0 / radius if face >= 0 and face % 2 == 1 else faces.bend[contact]
+    its = face[second_of(point, rows)]
+    x, z = center_of(model, rows, point)
+    return room_to(ground, its, x, z, model.contact_radius[point]) <= reach

@@ -6,25 +6,21 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
+from heelstrike.dynamics.kernels import mass_matrix
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.faces import CURVE
-from heelstrike.sim.contacts.geometry import (
-    add_impulse,
-    assemble_delassus,
-    row_product,
-    weigh,
-)
-from heelstrike.sim.contacts.loops import append_loops, find_loops, row_of, rows_of
-from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, LOOP, POINT, SECOND_FACE, Rows
-from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.phase import HeldRows, Modes, Phase, SaddlePoint, Step
+from heelstrike.sim.contacts.geometry import add_impulse, assemble_delassus, row_product, weigh
+from heelstrike.sim.contacts.loops import append_loops
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, Rows
+from heelstrike.sim.event_driven.phase import HeldRows, Modes, Phase, SaddlePoint
 from heelstrike.sim.event_driven.smooth.dynamics import (
-    gather_closed,
+    list_closed,
     list_unknowns,
-    observe_faces,
+    observe_rows,
     solve_constraints,
 )
-from heelstrike.sim.event_driven.smooth.gaps import gap_now, gap_rows
+from heelstrike.sim.event_driven.smooth.gaps import write_candidates
 from heelstrike.sim.event_driven.smooth.saddle_point import (
     is_delicate,
     solve_saddle_point,
@@ -46,20 +42,21 @@ PLACED, STILL = 5e-11, 1e-9
 
 @kernel
 def tangential_place(
-    model: Model, angle: Floats, contacts: Contacts, contact: int, rows: Rows, seconds: Contacts,
-    face: Integers,
-) -> float:  # fmt: skip
+    entry: int, model: Model, angle: Floats, q: Floats, rows: Rows, face: Integers
+) -> float:
     """Where a contact point is along the ground, less the length that its disc has rolled.
 
-    On smooth ground nobody knows: there what sticks is held by its velocity alone.
+    Of a joint with dry friction it is the position. On smooth ground nobody knows: there what
+    sticks is held by its velocity alone.
     """
-    if face[contact] == CURVE:
+    owner, position, normal = rows.owner[entry], rows.position[entry], rows.normal[entry]
+    if rows.kind[entry] == DRY_JOINT:
+        return q[owner]
+    if face[entry] == CURVE:
         return 0.0
-    point = rows.owner[contact]
-    its = seconds if rows.kind[contact] == SECOND_FACE else contacts
-    position, normal, radius = its.position[point], its.normal[point], model.contact_radius[point]
-    rolled = radius * angle[model.contact_link[point]]
-    if face[contact] >= 0 and face[contact] % 2 == 1:
+    radius = model.contact_radius[owner]
+    rolled = radius * angle[model.contact_link[owner]]
+    if face[entry] >= 0 and face[entry] % 2 == 1:
         # The way of the contact point round the disc that pivots on a corner.
         return radius * math.atan2(normal[0], normal[1]) - rolled
     return normal[1] * position[0] - normal[0] * position[1] - rolled
@@ -67,36 +64,30 @@ def tangential_place(
 
 @kernel
 def displacement(
-    row: int, model: Model, angle: Floats, contacts: Contacts, candidate: Integers, loops: Loops,
-    rows: Rows, seconds: Contacts, modes: Modes, face: Integers, state: Floats,
-) -> float:  # fmt: skip
-    """How far a candidate is along its row from where its constraint wants it."""
-    contact = candidate[row // 2]
-    if rows.kind[contact] >= LOOP:
-        return loops.rows.displacement[row_of(contact, loops)]
+    row: int, entry: int, model: Model, angle: Floats, q: Floats, rows: Rows, modes: Modes
+) -> float:
+    """How far a contact is along its row from where its constraint wants it."""
     if row % 2 == 0:
-        return gap_now(contact, rows, state)
-    if rows.kind[contact] == DRY_JOINT:
-        return state[rows.owner[contact]] - modes.anchor[contact]
-    if modes.stuck[contact] == 1:
-        return -modes.anchor[contact] + tangential_place(
-            model, angle, contacts, contact, rows, seconds, face
-        )
+        return rows.gap[entry]
+    if modes.stuck[entry] == 1:
+        place = tangential_place(entry, model, angle, q, rows, modes.face)
+        return -modes.anchor[entry] + place
     return 0.0
 
 
 @kernel
 def move_by_saddle_point(
-    size: int, model: Model, jacobian: Floats, equations: Equations, held: HeldRows,
+    size: int, model: Model, jacobian: Floats, tree: Workspace, matrix: Floats, held: HeldRows,
     saddle: SaddlePoint, along: Floats,
 ) -> None:  # fmt: skip
     """Change positions, or velocities, by as little as the masses allow for the rows to come right.
 
     What each row is wrong by is in ``saddle.bias``.
     """
+    mass_matrix(model, tree, matrix)
     for k in range(size):
         held.lean[k] = 0.0
-    write_equations(size, model, jacobian, held, equations, saddle.system)
+    write_equations(size, model.nv, matrix, jacobian, held, saddle.system)
     for i in range(model.nv):
         saddle.system[i, model.nv + size] = 0.0
     for k in range(size):
@@ -107,49 +98,25 @@ def move_by_saddle_point(
 
 
 @kernel
-def gather_sunk(
-    count: int, model: Model, contacts: Contacts, state: Floats, rows: Rows, seconds: Contacts,
-    modes: Modes, fired: Integers, loops: Loops, equations: Equations, assembly: Assembly,
-) -> int:  # fmt: skip
+def list_sunk(count: int, rows: Rows, modes: Modes, fired: Integers, candidate: Integers) -> int:
     """Append the open contacts that are beyond the ground, or their range, by rounding.
 
-    After those that are closed, and before the loops. What reaches the ground in this instant is
-    none of them: it is the instant that is corrected. Returns how many there are.
+    What reaches the ground in this instant is none of them: it is the instant that is corrected.
+    Returns how many candidates there are then.
     """
-    sunk = 0
     for contact in range(rows.end[CONSTRAINT]):
-        if modes.closed[contact] == 1 or fired[2 * contact] == 1:
+        if modes.closed[contact] == 1 or fired[2 * contact] == 1 or modes.passing[contact] == 1:
             continue
-        if rows.kind[contact] == POINT and modes.passing[contact] == 1:
-            continue
-        if -DEEP < gap_now(contact, rows, state) < -SHALLOW:
-            place = count + sunk
-            gap_rows(model, equations.tree, contacts, rows, seconds, contact, place, assembly)
-            assembly.candidate[place] = contact
-            sunk += 1
-    if sunk > 0:
-        total = append_loops(count + sunk, loops, assembly)
-        assemble_delassus(model, total, equations, assembly)
-    return sunk
-
-
-@kernel
-def list_sunk(size: int, count: int, sunk: int, loop_rows: int, held: HeldRows) -> int:
-    """List the rows of what :func:`gather_sunk` found after the `size` others; return how many."""
-    for k in range(size - loop_rows, size):  # those of the loops have been listed in their place
-        held.row[k] += 2 * sunk
-    for place in range(count, count + sunk):
-        held.row[size] = 2 * place
-        held.lean[size] = 0.0
-        size += 1
-    return size
+        if -DEEP < rows.gap[contact] < -SHALLOW:
+            candidate[count] = contact
+            count += 1
+    return count
 
 
 @kernel
 def project(
-    model: Model, ground: GroundModel, rows: Rows, equations: Equations, contacts: Contacts,
-    surface: Surface, assembly: Assembly, loops: Loops, seconds: Contacts, phase: Phase,
-    state: Floats,
+    model: Model, ground: GroundModel, equations: Equations, rows: Rows, surface: Surface,
+    assembly: Assembly, loops: Loops, phase: Phase, state: Floats,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Put a state back on its contact constraints, along the shortest way that the masses allow.
 
@@ -160,41 +127,30 @@ def project(
     Returns how far (m) the worst is left from its place - constraints that say the same twice need
     not agree - and how far it was off, and how fast (m/s), to begin with.
     """
-    held = phase.held
-    q, v = state[: model.nq], state[model.nq :]
-    system, row, loop_rows = held.system, held.row, rows_of(loops)
+    modes, held = phase.modes, phase.held
+    candidate, jacobian = assembly.candidate, assembly.jacobian
+    tree, q, v = equations.tree, state[: model.nq], state[model.nq :]
+    system, row = held.system, held.row
     strayed, fastest = 0.0, 0.0
     for attempt in range(5):
-        observe_faces(
-            model, ground, state, phase.modes, rows, seconds, phase.faces, equations.tree, contacts,
-            surface,
-        )  # fmt: skip
+        observe_rows(state, model, ground, tree, rows, modes, surface, loops)
         weigh(model, equations)
-        if loop_rows > 0:
-            find_loops(model, q, v, equations.tree, loops)
-        count = gather_closed(
-            model, contacts, rows, seconds, phase.modes, loops, equations, assembly
-        )
-        sunk = 0
+        count = list_closed(rows, modes, candidate, assembly.problem.bound)
         if attempt < 4:
-            sunk = gather_sunk(
-                count, model, contacts, state, rows, seconds, phase.modes, phase.watch.fired, loops,
-                equations, assembly,
-            )  # fmt: skip
-        total = count + sunk + loop_rows
+            count = list_sunk(count, rows, modes, phase.watch.fired, candidate)
+        write_candidates(count, candidate, model, tree, rows, assembly.leaf, jacobian)
+        total = append_loops(count, loops, assembly)
         if total == 0:
             return 0.0, strayed, 0.0
-        size = list_unknowns(
-            count, loop_rows, assembly.candidate, surface.friction, phase.modes, held
-        )
-        if sunk > 0:
-            size = list_sunk(size, count, sunk, loop_rows, held)
+        assemble_delassus(model, total, equations, assembly)
+        size = list_unknowns(count, total, candidate, surface.friction, modes, held)
         worst = 0.0
         for i in range(size):
-            error = displacement(
-                row[i], model, equations.tree.angle, contacts, assembly.candidate, loops, rows,
-                seconds, phase.modes, phase.faces.face, state,
-            )  # fmt: skip
+            place = row[i] // 2
+            if place < count:
+                error = displacement(row[i], candidate[place], model, tree.angle, q, rows, modes)
+            else:
+                error = loops.rows.displacement[place - count]
             system[i, size] = -error
             worst = max(worst, abs(error))
         if attempt == 0:
@@ -202,22 +158,23 @@ def project(
         positions = worst > IN_PLACE and attempt < 4
         if not positions:
             for i in range(size):
-                speed = row_product(assembly.jacobian, row[i], v)
+                speed = row_product(jacobian, row[i], v)
                 system[i, size] = -speed
                 fastest = max(fastest, abs(speed))
         for i in range(size):
             phase.saddle.bias[i] = -system[i, size]
         rank = solve_constraints(size, 0.0, assembly.problem.delassus, held)
+        along = q if positions else v
         if is_delicate(size, rank, system):
             move_by_saddle_point(
-                size, model, assembly.jacobian, equations, held, phase.saddle, q if positions else v
+                size, model, jacobian, tree, equations.mass_matrix, held, phase.saddle, along
             )
         else:
             for i in range(2 * total):
                 assembly.answer.impulse[i] = 0.0
             for i in range(size):
                 assembly.answer.impulse[row[i]] = held.unknown[i]
-            add_impulse(model, assembly, total, equations, q if positions else v)
+            add_impulse(model, assembly, total, equations, along)
         if not positions:
             return worst, strayed, fastest
     return math.inf, strayed, fastest
@@ -234,11 +191,13 @@ def is_in_place(strayed: float, fastest: float) -> bool:
 
 
 @kernel
-def explained(before: Floats, after: Floats, times: float, step: Step) -> bool:
+def explained(
+    before: Floats, after: Floats, times: float, relative: float, absolute: float
+) -> bool:
     """Whether some multiple of the error that a step may make explains how far a state moved."""
     size = before.shape[0]
     total = 0.0
     for i in range(size):
-        scale = step.absolute + step.relative * max(abs(before[i]), abs(after[i]))
+        scale = absolute + relative * max(abs(before[i]), abs(after[i]))
         total += ((after[i] - before[i]) / scale) ** 2
     return bool(total <= size * times**2)

@@ -34,20 +34,15 @@ from heelstrike.contact.sets import INTERVAL, LINE
 from heelstrike.contact.workspace import ContactAnswer, Tally
 from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import mass_matrix
-from heelstrike.robot.model import Floats, Model
-from heelstrike.sim.contacts.geometry import add_impulse, row_product
+from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.geometry import row_product
 from heelstrike.sim.contacts.loops import rows_of
 from heelstrike.sim.contacts.rows import Rows
-from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.phase import HeldRows, Modes, Phase, SaddlePoint
-from heelstrike.sim.event_driven.smooth.candidates import (
-    known_force,
-    pose_problem,
-    solve_candidates,
-)
+from heelstrike.sim.event_driven.phase import HeldRows, Phase, SaddlePoint
+from heelstrike.sim.event_driven.smooth.candidates import pose_problem, solve_candidates
 from heelstrike.sim.event_driven.smooth.gaps import free_gap_acceleration
-from heelstrike.sim.memory import Assembly, Equations, Loops, Memory
-from heelstrike.sim.push import Pushes
+from heelstrike.sim.memory import Assembly, Memory
 
 SMALL_PIVOT = 1e-6
 """Pivots of the contacts' unit-diagonal matrix below this leave too few digits of the forces."""
@@ -96,18 +91,15 @@ def is_delicate(size: int, rank: int, system: Floats) -> bool:
 
 @kernel
 def write_equations(
-    size: int, model: Model, jacobian: Floats, held: HeldRows, equations: Equations, system: Floats
+    size: int, nv: int, matrix: Floats, jacobian: Floats, held: HeldRows, system: Floats
 ) -> None:
     """Write the matrix of the equations: those of motion first, then those of ``held.row``.
 
     A force along a row brings along its tangential one, by ``held.lean``.
     """
-    nv, matrix = model.nv, equations.mass_matrix
-    mass_matrix(model, equations.tree, matrix)
     for i in range(nv):
         for j in range(nv):
             system[i, j] = matrix[i, j]
-        system[i, i] += equations.added[i]
     for k in range(size):
         row, lean = held.row[k], held.lean[k]
         for j in range(nv):
@@ -121,37 +113,20 @@ def write_equations(
 
 @kernel
 def state_accelerations(
-    count: int, model: Model, state: Floats, contacts: Contacts, loops: Loops, torque: Floats,
-    rows: Rows, seconds: Contacts, equations: Equations, assembly: Assembly, pushes: Pushes,
-    phase: Phase,
+    count: int, total: int, candidate: Integers, model: Model, tree: Workspace, rows: Rows,
+    face: Integers, bend: Floats, loop_bias: Floats, jacobian: Floats, bias: Floats,
 ) -> None:  # fmt: skip
-    """State the problem of accelerations: the known force, and J̇ v of the candidates.
+    """State the problem of accelerations: J̇ v of the candidates, up to `total` those of loops.
 
     No force is divided by an inertia.
     """
-    saddle = phase.saddle
-    problem, bias = assembly.problem, saddle.bias
-    rate, kept = equations.rate, saddle.rate
-    for i in range(model.nv):
-        kept[i] = rate[i]
-        rate[i] = 0.0
     for place in range(count):
-        normal, tangent = problem.free[2 * place], problem.free[2 * place + 1]
-        contact = assembly.candidate[place]
         free_gap_acceleration(
-            model, contacts, equations, contact, place, rows, seconds, phase.modes.breakaway,
-            phase.faces, assembly,
-        )  # fmt: skip
-        for row in range(2 * place, 2 * place + 2):
-            bias[row] = problem.free[row]
-        problem.free[2 * place], problem.free[2 * place + 1] = normal, tangent
-    for row in range(rows_of(loops)):
-        bias[2 * (count + row)] = loops.rows.bias[row]
-        bias[2 * (count + row) + 1] = 0.0
-    known_force(model, state, torque, rows, phase.modes, pushes, equations)
-    for i in range(model.nv):
-        saddle.force[i] = rate[i]
-        rate[i] = kept[i]
+            candidate[place], place, model, tree, rows, face, bend, tree.zero, jacobian, bias
+        )
+    for place in range(count, total):
+        bias[2 * place] = loop_bias[place - count]
+        bias[2 * place + 1] = 0.0
 
 
 @kernel
@@ -240,18 +215,17 @@ def begin_impulses(total: int, assembly: Assembly) -> None:
 
 @kernel
 def solve_modes(
-    count: int, total: int, model: Model, equations: Equations, assembly: Assembly, held: HeldRows,
-    saddle: SaddlePoint,
-) -> int:  # fmt: skip
+    count: int, total: int, matrix: Floats, assembly: Assembly, held: HeldRows, saddle: SaddlePoint
+) -> int:
     """Correct the impulses of the answer, and find velocities, by the modes; return how many rows.
 
     The motion goes to ``saddle.unknown``, the units of coordinates and rows to ``saddle.scale``.
     """
-    nv = model.nv
+    nv = matrix.shape[0]
     answer, jacobian, bias = assembly.answer, assembly.jacobian, saddle.bias
     begin_impulses(total, assembly)
     size = list_rows(count, total, assembly, held)
-    write_equations(size, model, assembly.jacobian, held, equations, saddle.system)
+    write_equations(size, nv, matrix, jacobian, held, saddle.system)
     for j in range(nv):
         pushed = saddle.force[j]
         for row in range(2 * total):
@@ -316,7 +290,7 @@ def amended(place: int, slide: int, data: float, nv: int, assembly: Assembly, sc
 
 @kernel
 def amend_modes(
-    total: int, accelerations: bool, nv: int, data: float, modes: Modes, scale: Floats,
+    total: int, accelerations: bool, nv: int, data: float, slides: Integers, scale: Floats,
     assembly: Assembly,
 ) -> bool:  # fmt: skip
     """Change the modes of the answer that it contradicts; return whether there are any."""
@@ -324,7 +298,7 @@ def amend_modes(
     for place in range(total):
         if assembly.problem.set[place] == LINE:
             continue
-        slide = modes.slide[assembly.candidate[place]] if accelerations else 0
+        slide = slides[assembly.candidate[place]] if accelerations else 0
         mode = amended(place, slide, data, nv, assembly, scale)
         changed = changed or mode != assembly.answer.mode[place]
         assembly.answer.mode[place] = mode
@@ -346,20 +320,20 @@ def size_of_data(total: int, nv: int, jacobian: Floats, saddle: SaddlePoint) -> 
 
 @kernel
 def is_proven(
-    size: int, total: int, data: float, model: Model, held: HeldRows, saddle: SaddlePoint,
-    equations: Equations, assembly: Assembly,
+    size: int, total: int, data: float, matrix: Floats, held: Integers, saddle: SaddlePoint,
+    assembly: Assembly,
 ) -> bool:  # fmt: skip
     """Certify the answer, whose modes agree with it; write its residuals.
 
     Whether the equations of motion hold and the held rows have no velocity, to a part of the data,
     and no unknown is beyond all proportion to them.
     """
-    matrix, nv = equations.mass_matrix, model.nv
+    nv = matrix.shape[0]
     answer, jacobian = assembly.answer, assembly.jacobian
     worst = 0.0
     largest = 0.0
     for i in range(nv):
-        left = equations.added[i] * saddle.unknown[i] - saddle.force[i]
+        left = -saddle.force[i]
         for j in range(nv):
             left += matrix[i, j] * saddle.unknown[j]
         for row in range(2 * total):
@@ -367,8 +341,8 @@ def is_proven(
         worst = max(worst, abs(left) * saddle.scale[i])
         largest = max(largest, abs(saddle.unknown[i]) / saddle.scale[i])
     for k in range(size):
-        worst = max(worst, abs(answer.velocity[held.row[k]]) * saddle.scale[nv + k])
-        largest = max(largest, abs(answer.impulse[held.row[k]]) / saddle.scale[nv + k])
+        worst = max(worst, abs(answer.velocity[held[k]]) * saddle.scale[nv + k])
+        largest = max(largest, abs(answer.impulse[held[k]]) / saddle.scale[nv + k])
     answer.residual[0] = worst / data if worst > 0.0 else 0.0
     answer.residual[1] = answer.residual[2] = 0.0  # the modes agree with it
     return worst <= PROVEN * data and largest <= GREATEST * data
@@ -376,25 +350,21 @@ def is_proven(
 
 @kernel
 def solve_by_saddle_point(
-    count: int, total: int, accelerations: bool, model: Model, equations: Equations,
-    assembly: Assembly, phase: Phase,
+    count: int, total: int, accelerations: bool, matrix: Floats, slide: Integers,
+    assembly: Assembly, held: HeldRows, saddle: SaddlePoint,
 ) -> bool:  # fmt: skip
     """Solve the contact problem of the candidates from the full equations; return whether proven.
 
-    It begins with the modes and impulses of the answer.
+    It begins with the modes and impulses of the answer. `matrix` is the mass matrix.
     Forces or impulses, velocities, modes and residuals go to ``assembly.answer``, the accelerations
     of the coordinates, or what the impulses change of their velocities, to ``saddle.unknown``.
     """
-    nv = model.nv
+    nv, scale = matrix.shape[0], saddle.scale
     for _ in range(ROUNDS):
-        size = solve_modes(count, total, model, equations, assembly, phase.held, phase.saddle)
-        data = size_of_data(total, nv, assembly.jacobian, phase.saddle)
-        if not amend_modes(
-            total, accelerations, nv, data, phase.modes, phase.saddle.scale, assembly
-        ):
-            return is_proven(
-                size, total, data, model, phase.held, phase.saddle, equations, assembly
-            )
+        size = solve_modes(count, total, matrix, assembly, held, saddle)
+        data = size_of_data(total, nv, assembly.jacobian, saddle)
+        if not amend_modes(total, accelerations, nv, data, slide, scale, assembly):
+            return is_proven(size, total, data, matrix, held.row, saddle, assembly)
     return False
 
 
@@ -413,27 +383,6 @@ def copy_answer(
 
 
 @kernel
-def solve_at_once(count: int, model: Model, memory: Memory, phase: Phase) -> bool:
-    """Solve for accelerations without asking the solvers; return whether what comes out is proven.
-
-    That is where the last evaluation took the full equations.
-    """
-    assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode
-    answer, tally = assembly.answer, memory.solver.tally
-    pose_problem(
-        count, memory.loops, True, friction, guess, memory.rows, phase.modes.slide, assembly
-    )
-    total = assembly.problem.count
-    for row in range(2 * total):
-        answer.impulse[row] = 0.0
-    if not solve_by_saddle_point(count, total, True, model, memory.equations, assembly, phase):
-        return False
-    tally.solves += 1
-    tally.shortcuts += 1
-    return True
-
-
-@kernel
 def guess_modes(total: int, bias: Floats, assembly: Assembly) -> None:
     """Let the candidates of an impact slip as they would without it, and those open that leave."""
     problem, answer, free = assembly.problem, assembly.answer, bias
@@ -447,20 +396,24 @@ def guess_modes(total: int, bias: Floats, assembly: Assembly) -> None:
 
 @kernel
 def solve_once_more(
-    status: int, count: int, accelerations: bool, model: Model, tally: Tally, equations: Equations,
-    assembly: Assembly, phase: Phase,
+    solved: bool, count: int, accelerations: bool, matrix: Floats, slide: Integers, tally: Tally,
+    assembly: Assembly, held: HeldRows, saddle: SaddlePoint,
 ) -> bool:  # fmt: skip
-    """Solve again what the solvers left like this; return whether what comes out is proven."""
-    saddle = phase.saddle
+    """Solve again what the solvers left, or could not solve; return whether the answer is proven.
+
+    If not the answer is theirs.
+    """
     answer, total = assembly.answer, assembly.problem.count
     copy_answer(total, answer, saddle)
-    for attempt in range(1 if status == SOLVED or accelerations else 2):
+    for attempt in range(1 if solved or accelerations else 2):
         if attempt == 1:
-            guess_modes(total, phase.saddle.bias, assembly)
-        for row in range(2 * total if status != SOLVED else 0):
+            guess_modes(total, saddle.bias, assembly)
+        for row in range(0 if solved else 2 * total):
             answer.impulse[row] = 0.0
-        if solve_by_saddle_point(count, total, accelerations, model, equations, assembly, phase):
-            if status != SOLVED:
+        if solve_by_saddle_point(
+            count, total, accelerations, matrix, slide, assembly, held, saddle
+        ):
+            if not solved:
                 tally.failures -= 1
                 tally.fallbacks += 1
             return True
@@ -469,72 +422,53 @@ def solve_once_more(
 
 
 @kernel
-def solve_accelerations(
-    count: int, model: Model, state: Floats, memory: Memory, phase: Phase
+def solve_contacts(
+    count: int, accelerations: bool, model: Model, memory: Memory, phase: Phase
 ) -> int:
     """Solve the contact problem of the candidates, from the full equations where its matrix fails.
 
-    The equations of the state have been evaluated. Otherwise this is
+    It is one of accelerations, whose state has been evaluated, or of velocities, whose free terms
+    are those of the contact problem. Otherwise this is
     :func:`~heelstrike.sim.event_driven.smooth.candidates.solve_candidates`, of whose certificate
-    nothing is left where rounding of the matrix counts.
+    nothing is left where rounding of the matrix counts. Where the last evaluation took the full
+    equations, the solvers are not asked unless the answer is not proven.
     """
-    saddle = phase.saddle
-    assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode
+    saddle, held, slide = phase.saddle, phase.held, phase.modes.slide
+    face, bend = phase.modes.face, phase.modes.bend
+    tree, matrix = memory.equations.tree, memory.equations.mass_matrix
+    assembly, loops, rows = memory.assembly, memory.loops, memory.rows
+    candidate, jacobian, bias = assembly.candidate, assembly.jacobian, saddle.bias
+    friction, guess, tally = memory.surface.friction, memory.reaction.mode, memory.solver.tally
+    total = count + rows_of(loops)
     saddle.used = 0
-    if saddle.needed == 1:
+    if accelerations and saddle.needed == 1:
         state_accelerations(
-            count, model, state, memory.contacts, memory.loops, memory.torque, memory.rows,
-            memory.seconds, memory.equations, assembly, memory.pushes, phase,
-        )  # fmt: skip
-        if solve_at_once(count, model, memory, phase):
+            count, total, candidate, model, tree, rows, face, bend, loops.rows.bias, jacobian, bias
+        )
+        mass_matrix(model, tree, matrix)
+        pose_problem(count, total, True, friction, guess, rows, slide, loops.held, assembly)
+        for row in range(2 * total):
+            assembly.answer.impulse[row] = 0.0
+        if solve_by_saddle_point(count, total, True, matrix, slide, assembly, held, saddle):
+            tally.solves += 1
+            tally.shortcuts += 1
             saddle.used = 1
             return SOLVED
     status = solve_candidates(
-        count, memory.loops, True, friction, guess, memory.rows, phase.modes.slide,
-        phase.forces.solvers, assembly, memory.solver,
+        count, loops, accelerations, friction, guess, rows, slide, phase.forces.solvers, assembly,
+        memory.solver,
     )  # fmt: skip
-    if status == SOLVED and not memory.solver.yardstick.effort > STRAINED:
+    solved = status == SOLVED
+    if solved and not memory.solver.yardstick.effort > STRAINED:
         return status
-    state_accelerations(
-        count, model, state, memory.contacts, memory.loops, memory.torque, memory.rows,
-        memory.seconds, memory.equations, assembly, memory.pushes, phase,
-    )  # fmt: skip
-    if solve_once_more(
-        status, count, True, model, memory.solver.tally, memory.equations, assembly, phase
-    ):
-        saddle.used = 1
-        return SOLVED
-    return status
-
-
-@kernel
-def solve_velocities(count: int, model: Model, memory: Memory, phase: Phase) -> int:
-    """The same of velocities, whose free terms are those of the contact problem."""
-    saddle = phase.saddle
-    assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode
-    saddle.used = 0
-    status = solve_candidates(
-        count, memory.loops, False, friction, guess, memory.rows, phase.modes.slide,
-        phase.forces.solvers, assembly, memory.solver,
-    )  # fmt: skip
-    if status == SOLVED and not memory.solver.yardstick.effort > STRAINED:
-        return status
-    state_velocities(assembly.problem.count, assembly.problem.free, saddle)
-    if solve_once_more(
-        status, count, False, model, memory.solver.tally, memory.equations, assembly, phase
-    ):
-        saddle.used = 1
-        return SOLVED
-    return status
-
-
-@kernel
-def add_impulses(
-    model: Model, assembly: Assembly, saddle: SaddlePoint, equations: Equations, v: Floats
-) -> None:
-    """Add what the answer of :func:`solve_velocities` does to velocities."""
-    if saddle.used == 1:
-        for j in range(model.nv):
-            v[j] += saddle.unknown[j]
+    if accelerations:
+        state_accelerations(
+            count, total, candidate, model, tree, rows, face, bend, loops.rows.bias, jacobian, bias
+        )
     else:
-        add_impulse(model, assembly, assembly.problem.count, equations, v)
+        state_velocities(total, assembly.problem.free, saddle)
+    mass_matrix(model, tree, matrix)
+    if solve_once_more(solved, count, accelerations, matrix, slide, tally, assembly, held, saddle):
+        saddle.used = 1
+        return SOLVED
+    return status

@@ -8,14 +8,11 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contacts.geometry import (
-    contact_velocity,
-)
-from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.contacts.writers import rate_of
-from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.phase import Faces, Modes, Watch
+from heelstrike.sim.event_driven.phase import Modes, Watch
 from heelstrike.sim.event_driven.smooth.faces import has_corners, watch_corners
+from heelstrike.sim.event_driven.smooth.gaps import gap_velocity
 from heelstrike.sim.memory import Assembly
 
 
@@ -33,73 +30,70 @@ def friction_limit(
 
 
 @kernel
-def watch_second_faces(
-    model: Model, tree: Workspace, rows: Rows, seconds: Contacts, modes: Modes, watch: Watch
-) -> None:
-    """Event functions of the second faces: gaps to those that points on the ground could meet."""
-    value, rate = watch.value, watch.rate
-    for contact in range(rows.first[SECOND_FACE], rows.end[SECOND_FACE]):
-        point = rows.owner[contact]
-        value[2 * contact], value[2 * contact + 1] = 1.0, 1.0
-        rate[2 * contact] = 0.0
-        if modes.closed[point] == 0 or seconds.gap[point] == math.inf:
-            continue
-        normal, tangent = contact_velocity(model, tree, seconds, point)
-        if modes.closed[contact] == 0:
-            value[2 * contact] = seconds.gap[point]
-            rate[2 * contact] = normal
-        elif modes.slide[contact] != 0 and modes.group[contact] == contact:
-            value[2 * contact + 1] = modes.slide[contact] * tangent
+def watch_faces(
+    kind: int, model: Model, ground: GroundModel, tree: Workspace, v: Floats, rows: Rows,
+    closed: Integers, passing: Integers, slide: Integers, group: Integers, value: Floats,
+    rate: Floats,
+) -> None:  # fmt: skip
+    """Event functions of the contact points on their first or their second faces.
+
+    Second faces are there for points on the ground, with those that they could meet. That of a
+    point that is let pass below the ground is its depth. On ground with corners the second rate of
+    an open point bounds how fast it moves, or the centre of its disc.
+    """
+    first = kind == POINT
+    for entry in range(rows.first[kind], rows.end[kind]):
+        point = rows.owner[entry]
+        value[2 * entry + 1] = 1.0
+        if not first:
+            value[2 * entry], rate[2 * entry] = 1.0, 0.0
+            if closed[point] == 0 or rows.gap[entry] == math.inf:
+                continue
+        normal, tangent = gap_velocity(entry, model, tree, rows, v)
+        if closed[entry] == 0:
+            side = 1.0 - 2.0 * passing[entry]
+            value[2 * entry] = side * rows.gap[entry]
+            rate[2 * entry] = side * normal
+            if first and has_corners(ground):
+                spin = tree.velocity[model.contact_link[point], 0]
+                rolls = abs(model.contact_radius[point] * spin)
+                rate[2 * entry + 1] = abs(normal) + abs(tangent) + rolls
+        elif slide[entry] != 0 and group[entry] == entry:
+            value[2 * entry + 1] = slide[entry] * tangent
 
 
 @kernel
 def watch_geometry(
-    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, state: Floats,
-    rows: Rows, seconds: Contacts, modes: Modes, faces: Faces, watch: Watch,
+    model: Model, ground: GroundModel, tree: Workspace, v: Floats, rows: Rows, modes: Modes,
+    value: Floats, rate: Floats,
 ) -> None:  # fmt: skip
-    """Event functions that need no forces: gaps of open points, speeds of what slides, corners.
-
-    That of a point that is let pass below the ground is its depth. On ground with corners the
-    second rate of an open point bounds how fast it moves, or the centre of its disc.
-    """
-    value, rate, corners = watch.value, watch.rate, has_corners(ground)
-    if corners:
-        watch_corners(model, ground, contacts, rows, modes, faces, value)
-        if faces.paired == 1:
-            watch_second_faces(model, tree, rows, seconds, modes, watch)
-    table = rows
-    for contact in range(table.first[DRY_JOINT], table.end[DRY_JOINT]):
-        slide = modes.slide[contact]
+    """Event functions that need no forces: gaps of open points, speeds of what slides, corners."""
+    closed, passing, slide, group = modes.closed, modes.passing, modes.slide, modes.group
+    if has_corners(ground):
+        watch_corners(model, ground, rows, modes, value)
+        if ground.concave == 1:
+            watch_faces(
+                SECOND_FACE, model, ground, tree, v, rows, closed, passing, slide, group, value,
+                rate,
+            )  # fmt: skip
+    for contact in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
         value[2 * contact + 1] = 1.0
-        if slide != 0:
-            value[2 * contact + 1] = slide * state[model.nq + table.owner[contact]]
-    for contact in range(table.first[STOP], table.end[STOP]):
-        if modes.closed[contact] == 0:
-            joint, side = table.owner[contact], table.side[contact]
-            value[2 * contact] = side * (state[joint] - table.limit[contact])
-            rate[2 * contact] = side * state[model.nq + joint]
-    for contact in range(table.first[CONSTRAINT], table.end[CONSTRAINT]):
-        if modes.closed[contact] == 0:
-            value[2 * contact] = table.gap[contact]
-            rate[2 * contact] = rate_of(table.owner[contact], 0, state[model.nq :], table.outside)
-    for contact in range(model.nc):
-        normal, tangent = contact_velocity(model, tree, contacts, contact)
-        value[2 * contact + 1] = 1.0
-        if modes.closed[contact] == 0:
-            side = 1.0 - 2.0 * modes.passing[contact]
-            value[2 * contact] = side * contacts.gap[contact]
-            rate[2 * contact] = side * normal
-            if corners:
-                spin = tree.velocity[model.contact_link[contact], 0]
-                rolls = abs(model.contact_radius[contact] * spin)
-                rate[2 * contact + 1] = abs(normal) + abs(tangent) + rolls
-        elif modes.slide[contact] != 0 and modes.group[contact] == contact:
-            value[2 * contact + 1] = modes.slide[contact] * tangent
+        if slide[contact] != 0:
+            value[2 * contact + 1] = slide[contact] * v[rows.owner[contact]]
+    for contact in range(rows.first[STOP], rows.end[STOP]):
+        if closed[contact] == 0:
+            value[2 * contact] = rows.gap[contact]
+            rate[2 * contact] = rows.side[contact] * v[rows.owner[contact]]
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        if closed[entry] == 0:
+            value[2 * entry] = rows.gap[entry]
+            rate[2 * entry] = rate_of(rows.owner[entry], 0, v, rows.outside)
+    watch_faces(POINT, model, ground, tree, v, rows, closed, passing, slide, group, value, rate)
 
 
 @dissolved_kernel
 def watch_forces(
-    count: int, loop_rows: int, assembly: Assembly, friction: Floats, modes: Modes, watch: Watch
+    count: int, total: int, assembly: Assembly, friction: Floats, modes: Modes, watch: Watch
 ) -> None:
     """Event functions of closed points: normal forces, and what is left to the friction limit."""
     delassus, free = assembly.problem.delassus, assembly.problem.free
@@ -114,7 +108,7 @@ def watch_forces(
             watch.value[2 * contact + 1] = limit - abs(impulse[2 * place + 1])
         elif modes.slide[contact] != 0 and modes.group[contact] == contact:
             acceleration = free[2 * place + 1]
-            for column in range(2 * (count + loop_rows)):
+            for column in range(2 * total):
                 acceleration += delassus[2 * place + 1, column] * impulse[column]
             watch.rate[2 * contact + 1] = modes.slide[contact] * acceleration
 
