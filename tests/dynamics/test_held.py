@@ -128,6 +128,15 @@ def moving(robot: Robot, seed: int = 2) -> tuple[np.ndarray, np.ndarray]:
     return q, draw.normal(size=robot.nv)
 
 
+def test_two_feet_hold_more_than_what_has_no_motor() -> None:
+    """Six rows that say something, three coordinates without a motor: three joints follow, too."""
+    robot = hs.load_robot("bravo7")
+    q, v = moving(robot)
+    found = HeldRobot.on(Evaluation(robot, q, v), range(robot.nc)).velocity(v)
+    assert np.abs(dynamics.contact_jacobian(robot, q).reshape(-1, robot.nv) @ found).max() <= 1e-12
+    assert np.abs(found).max() > 0.1
+
+
 @pytest.mark.parametrize("make", [lambda: hs.load_robot("bravo7"), parallel_ankles])
 def test_heel_and_toe_are_one_foot_and_forces_the_shortest(make: Any) -> None:
     """Four rows of rank three, and loops: the optimality system, its forces by pseudo-inverse."""

@@ -129,16 +129,17 @@ def test_bravo7_under_computed_torque() -> None:
 
 
 class Lag(hs.Bundle):
+    usual: float = hs.cell(float)
     told: float = hs.cell(float)
     rate: float = hs.cell(float)
 
 
 @hs.controller
 def lags(t, state, memory: Lag, torque):
-    """Brake by what the rate was; note the time, which nothing hangs on."""
+    """Brake by what the rate was, and by what never changes; note the time for nothing."""
     memory.told = t
     memory.rate += 0.01 * (state.joint_velocity[0] - memory.rate)
-    torque[0] = -1e-4 * memory.rate
+    torque[0] = -1e-4 * (memory.rate + memory.usual)
 
 
 class Note(hs.Bundle):
