@@ -1,4 +1,4 @@
-"""Partial derivatives of the equations of a motion under contact: what implicit differentiation needs.
+"""Partial derivatives of the equations of a motion under contact, for implicit differentiation.
 
 A motion with the acceleration a under given forces p of contact points and l of loops lacks the
 generalised force
@@ -17,15 +17,17 @@ of r and s at fixed a, p, l, x. The tape of the kernel is differentiated
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
-from weakref import WeakKeyDictionary
+from typing import Any
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.recordings.recording import Program
-from heelstrike.compiler.straight_line import straight_line_code
+from heelstrike.compiler.straight_line import play, straight_line_code
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import (
@@ -40,12 +42,17 @@ from heelstrike.dynamics.kernels import (
 from heelstrike.dynamics.loops import LoopRows, count_rows, find_rows
 from heelstrike.dynamics.places import bias_at, place_of, write_point_rows
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Integers, Model
 
 DYNAMIC = (
     "mass", "inertia", "center_of_mass", "armature", "damping", "stiffness", "rest", "gravity"
 )  # fmt: skip
 """Numbers of a robot that say how heavy, stiff or damped it is: they are in r alone."""
+
+
+FRICTION = "friction"
+"""The ground's coefficient."""
 
 
 class Balance(Bundle):
@@ -65,11 +72,12 @@ class Balance(Bundle):
     pull: Floats = array("loop_rows")
     """push, pull: Forces of contact points (normal, tangent) and of loops."""
     added: Floats = array("nv")
-    """What is added to the diagonal of the mass matrix before it is factorised."""
+    """What is added to the diagonal of the mass matrix."""
     point: Floats = array("nc", "components")
     """Where the contact points are."""
+    matrix: Floats = array("nv", "nv")
     factor: Floats = array("nv", "nv")
-    """Of the mass matrix."""
+    """matrix, factor: The mass matrix, with what is added, and its factor."""
     passive: Floats = array("nv")
     """Force of springs and dampers; scratch."""
     lacking: Floats = array("nv")
@@ -97,19 +105,18 @@ class Partials(Bundle):
 
 @kernel
 def find_balance(
-    model: Model, dated: Integers, tree: Workspace, matrix: Floats, loops: LoopRows,
-    balance: Balance,
-) -> None:  # fmt: skip
+    model: Model, dated: Integers, tree: Workspace, loops: LoopRows, balance: Balance
+) -> None:
     """Write what a motion lacks and how its points and loops go, with its Jacobians and factor.
 
     Where ``dated[0]`` is zero, J̇ v is left out.
     """
     forward_kinematics(model, balance.q, tree)
     link_velocities(model, balance.v, tree)
-    mass_matrix(model, tree, matrix)
+    mass_matrix(model, tree, balance.matrix)
     for i in range(model.nv):
-        matrix[i, i] += balance.added[i]
-    factorize(model, matrix, balance.factor)
+        balance.matrix[i, i] += balance.added[i]
+    factorize(model, balance.matrix, balance.factor)
     inverse_dynamics(model, balance.acceleration, tree, balance.lacking)
     passive_force(model, balance.q, balance.v, balance.passive)
     for i in range(model.nv):
@@ -196,12 +203,11 @@ def _compiled(model: Model, dated: bool, numbers: tuple[str, ...]) -> int:
     if numbers:
         by = tuple(f"model.{name}" for name in numbers)
         derivatives["partials.lacking_by_numbers"] = "balance.lacking", by
-    hidden = ("matrix", "balance.passive", "balance.point", *(f"tree.{n}" for n in tree.members()))
+    hidden = ("balance.passive", "balance.point", *(f"tree.{n}" for n in tree.members()))
     program = Program(
         find_balance,
         {
             "model": model, "dated": np.array([int(dated)]), "tree": tree,
-            "matrix": np.zeros((model.nv, model.nv)),
             "loops": LoopRows.allocate(nv=model.nv, loop_rows=count_rows(model)),
             "balance": balance, "partials": partials,
         },
@@ -210,3 +216,92 @@ def _compiled(model: Model, dated: bool, numbers: tuple[str, ...]) -> int:
     )  # fmt: skip
     (address,) = straight_line_code([program], known={"tree.zero": np.zeros(model.nv)})
     return address
+
+
+@kernel
+def find_partials(
+    model: Model, program: int, dated: Integers, tree: Workspace, loops: LoopRows,
+    balance: Balance, partials: Partials,
+) -> None:  # fmt: skip
+    """Find a balance and its partial derivatives."""
+    play(program, (model, dated, tree, loops, balance, partials))
+
+
+class Differentiated:
+    """The equations of a robot, differentiated wherever they are looked at.
+
+    Parameters
+    ----------
+    model : Model
+        The robot.
+    numbers : tuple of str
+        Of `DYNAMIC`, by which r is differentiated too.
+    """
+
+    def __init__(self, model: Model, numbers: tuple[str, ...] = ()) -> None:
+        self._model = ref(model)
+        self._program = partial_program(model, dated=True, numbers=numbers)
+        self.balance, self.partials = allocate_balance(model, numbers)
+        self._tree = Workspace.allocate({**model.extents, "components": 2})
+        self.loops = LoopRows.allocate(nv=model.nv, loop_rows=count_rows(model))
+        self._dated = np.array([1])
+
+    def place(self, q: Floats, v: Floats, normal: Any) -> None:
+        """Put the robot into a state, with a normal (2,) of the ground under all its points."""
+        self.balance.q[:], self.balance.v[:], self.balance.normal[:] = q, v, normal
+
+    def look(
+        self, *, ahead: float, going: Floats | float = 0.0, acceleration: Floats | float = 0.0,
+        push: Floats | float = 0.0, pull: Floats | float = 0.0,
+    ) -> None:  # fmt: skip
+        """Find r, s and their derivatives, of a motion under forces; see the module."""
+        balance = self.balance
+        balance.ahead[:], balance.going[:], balance.acceleration[:] = ahead, going, acceleration
+        balance.push[:], balance.pull[:] = push, pull
+        find_partials(
+            self._model(), self._program, self._dated, self._tree, self.loops, balance,
+            self.partials,
+        )  # fmt: skip
+
+
+_kept = threading.local()
+"""Of each thread its own: what is found is there until the next look."""
+
+
+def differentiated(model: Model, numbers: tuple[str, ...] = ()) -> Differentiated:
+    """Return the equations of a robot, which are those that were returned before."""
+    if not hasattr(_kept, "equations"):
+        _kept.equations = WeakKeyDictionary()
+    known = _kept.equations.setdefault(model, {})
+    if numbers not in known:
+        known[numbers] = Differentiated(model, numbers)
+    found: Differentiated = known[numbers]
+    return found
+
+
+def chosen_numbers(names: Sequence[str]) -> tuple[tuple[str, ...], bool]:
+    """Tell numbers of the robot from the ground's friction, among names of both.
+
+    Raises
+    ------
+    SimulationError
+        If there is no such number, or one is named twice.
+    """
+    known = (*DYNAMIC, FRICTION)
+    wrong = [name for name in names if name not in known]
+    if wrong or len(set(names)) < len(names):
+        raise SimulationError(
+            f"derivatives are known by {', '.join(known)}, each once; got {', '.join(names)}"
+        )
+    return tuple(name for name in names if name != FRICTION), FRICTION in names
+
+
+def columns_of(model: Model, names: Sequence[str]) -> dict[str, slice]:
+    """Return which columns are derivatives by which numbers: those of friction are last."""
+    dynamic, rubs = chosen_numbers(names)
+    sizes = [getattr(model, name).size for name in dynamic] + [1] * rubs
+    ends = np.cumsum(sizes, dtype=int).tolist()
+    named = [*dynamic, *([FRICTION] * rubs)]
+    return {
+        name: slice(end - size, end) for name, size, end in zip(named, sizes, ends, strict=True)
+    }

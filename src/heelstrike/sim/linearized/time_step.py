@@ -1,4 +1,4 @@
-"""The derivative of one step of time stepping, by implicit differentiation of what was active in it.
+"""The derivative of a step of time stepping, by implicit differentiation of what is active in it.
 
 A step (:mod:`heelstrike.sim.time_stepping.method`) finds v⁺ and the impulses λ from
 
@@ -21,11 +21,11 @@ import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
-from heelstrike.compiler.straight_line import play
 from heelstrike.contact.linearized.partials import (
     Balance,
     Partials,
     allocate_balance,
+    find_partials,
     partial_program,
 )
 from heelstrike.contact.modes import OPEN, SLIP_FORWARD, STICK
@@ -42,7 +42,7 @@ from heelstrike.sim.contacts.rows import (
     STOP,
     lay_out_rows,
 )
-from heelstrike.sim.memory import Assembly, Memory
+from heelstrike.sim.memory import Memory
 from heelstrike.sim.time_stepping.method import (
     LINEARLY_IMPLICIT,
     MOREAU_JEAN,
@@ -53,7 +53,7 @@ from heelstrike.sim.time_stepping.method import (
 
 
 class StepSlopes(Bundle):
-    """A step, and its derivative by (q, v), the torques, and numbers of the robot and the ground."""
+    """A step, and its derivative by (q, v), the torques, numbers of the robot and friction."""
 
     q: Floats = array("nq")
     v: Floats = array("nv")
@@ -65,8 +65,7 @@ class StepSlopes(Bundle):
     """What position does to the velocities of the points before the step."""
     loops: LoopRows = part(LoopRows)
     tree: Workspace = part(Workspace)
-    matrix: Floats = array("nv", "nv")
-    """loops, tree, matrix: Scratch."""
+    """loops, tree: Scratch."""
     dated: Integers = array(1, of=int)
     """Whether loops turn."""
     program: int = cell(int)
@@ -99,7 +98,7 @@ class StepSlopes(Bundle):
 def allocate_slopes(
     robot: Robot, numbers: tuple[str, ...] = (), *, friction: bool = False
 ) -> StepSlopes:
-    """Allocate the derivative of a step, by some `numbers` of the robot and the ground's friction."""
+    """Allocate the derivative of a step, by some `numbers` of the robot and by friction."""
     model = robot.model
     balance, partials = allocate_balance(model, numbers)
     loops, rows = count_rows(model), 2 * len(lay_out_rows(model).kind)
@@ -173,13 +172,9 @@ def evaluate(model: Model, going: Floats, slopes: StepSlopes) -> None:
     balance = slopes.balance
     for j in range(model.nv):
         balance.going[j] = going[j]
-    play(
-        slopes.program,
-        (
-            model, slopes.dated, slopes.tree, slopes.matrix, slopes.loops, balance,
-            slopes.partials,
-        ),
-    )  # fmt: skip
+    find_partials(
+        model, slopes.program, slopes.dated, slopes.tree, slopes.loops, balance, slopes.partials
+    )
 
 
 @kernel
@@ -209,9 +204,11 @@ def differentiate_problem(
     for row in range(balance.pull.shape[0]):
         balance.pull[row] = impulse[2 * (assembly.begin[LOOP] + row)] / step
     evaluate(model, after, slopes)
-    active = write_points(model, impulse, mode, 1.0 / step if gaps else 0.0, bounces, memory, slopes)
+    active = write_points(
+        model, impulse, mode, 1.0 / step if gaps else 0.0, bounces, memory, slopes
+    )
     active = write_joints(active, mode, 1.0 / step if gaps else 0.0, memory, slopes)
-    active = write_loops(active, memory, slopes)
+    active = write_loops(active, slopes)
     write_free(model, work, active, memory, slopes)
     solve_columns(model, active + result.shape[1], balance.factor, slopes.response)
     find_impulses(active, slopes)
@@ -301,7 +298,7 @@ def write_joints(
 
 
 @kernel
-def write_loops(active: int, memory: Memory, slopes: StepSlopes) -> int:
+def write_loops(active: int, slopes: StepSlopes) -> int:
     """Write the rows of loops and couplings; return how many active rows there are with them."""
     loops, partials = slopes.loops, slopes.partials
     for row in range(loops.bias.shape[0]):
@@ -318,8 +315,14 @@ def write_loops(active: int, memory: Memory, slopes: StepSlopes) -> int:
 def write_free(
     model: Model, work: Stepping, active: int, memory: Memory, slopes: StepSlopes
 ) -> None:
-    """Write what the velocity would do without impulses, times the mass matrix, but for v itself."""
-    response, partials, step, nq, nv = slopes.response, slopes.partials, work.step, model.nq, model.nv
+    """Write what the velocity would do without impulses, times A', but for v itself."""
+    response, partials, step, nq, nv = (
+        slopes.response,
+        slopes.partials,
+        work.step,
+        model.nq,
+        model.nv,
+    )
     numbers = partials.lacking_by_numbers.shape[1]
     by_torque = active + nq + nv
     by_number = by_torque + model.nu
