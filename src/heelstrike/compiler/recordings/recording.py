@@ -126,7 +126,7 @@ class Recording:
         uncompiled(program.kernel, replace=_RECORDED)(*operands)
         for name, (of, by) in program.derivatives.items():
             entries = np.concatenate([began[each].ravel() for each in by])
-            self.arrays[name] = tangents(self.arrays[of].ravel(), entries)
+            self.arrays[name] = tangents(self.arrays[of].ravel(), list(entries))
 
     def _symbols(self, name: str, value: Any, known: Mapping[str, Symbols]) -> Any:
         if not _is_floats(value):

@@ -195,7 +195,7 @@ def _compiled(model: Model, dated: bool, numbers: tuple[str, ...]) -> int:
     names = ["lacking"]
     names += ["along"] if model.nc else []
     names += ["loop_along"] if count_rows(model) else []
-    derivatives = {
+    derivatives: dict[str, tuple[str, tuple[str, ...]]] = {
         f"partials.{name}_by_{x}": (f"balance.{name}", (f"balance.{x}",))
         for name in names
         for x in "qv"
@@ -258,8 +258,9 @@ class Differentiated:
         balance = self.balance
         balance.ahead[:], balance.going[:], balance.acceleration[:] = ahead, going, acceleration
         balance.push[:], balance.pull[:] = push, pull
+        model: Any = self._model()
         find_partials(
-            self._model(), self._program, self._dated, self._tree, self.loops, balance,
+            model, self._program, self._dated, self._tree, self.loops, balance,
             self.partials,
         )  # fmt: skip
 

@@ -1,0 +1,382 @@
+"""Derivatives of what a simulation does, from one instant to another, through contact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from heelstrike.arguments import takes
+from heelstrike.contact.linearized.partials import FRICTION
+from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
+from heelstrike.sim.closed_sets import RunStatus
+from heelstrike.sim.event_driven.method import EventDriven
+from heelstrike.sim.frame import is_due
+from heelstrike.sim.linearized.flow import Variation
+from heelstrike.sim.linearized.inputs import TORQUE, Inputs, inputs_of
+from heelstrike.sim.linearized.law import AskedAlong, parameter_sizes
+from heelstrike.sim.linearized.mode_changes import ModeChange, other_modes
+from heelstrike.sim.linearized.refusals import refuse_step
+from heelstrike.sim.linearized.step import linearized
+from heelstrike.sim.linearized.time_step import StepSlopes, allocate_slopes, differentiate_step
+from heelstrike.sim.simulation import Simulation
+from heelstrike.sim.time_stepping.method import TimeStepping
+from heelstrike.sim.whole_run import whole
+
+Floats = NDArray[np.float64]
+
+AT_ONCE = 1e-6
+"""Part of a step within which a time is its end."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StepDerivatives:
+    """Derivatives of the state (q, v) after some time by what it hangs on, to first order."""
+
+    begin: float
+    end: float
+    """begin, end: From when to when (s)."""
+    state: Floats
+    """(nq + nv, nq + nv) By the state at the beginning."""
+    torque: Floats
+    """(nq + nv, nu) By torques that are added, the same all the time, to those that act anyway."""
+    numbers: Mapping[str, Floats]
+    """(nq + nv, k) each. By numbers of the robot, the ground and the law, by name."""
+    changes: tuple[ModeChange, ...] = ()
+    """Contact points at a change of mode, where the derivatives are those of one side; of one time
+    step."""
+
+    def forward(
+        self, state: ArrayLike = 0.0, torque: ArrayLike = 0.0, **numbers: ArrayLike
+    ) -> Floats:
+        """Return the change of the state at the end, (nq + nv,).
+
+        Parameters
+        ----------
+        state, torque : (nq + nv,) and (nu,) array
+            Changes of the state at the beginning and of the torques.
+        **numbers : (k,) array
+            Changes of numbers that were asked for.
+        """
+        change = self.state @ np.broadcast_to(state, len(self.state))
+        change = change + self.torque @ np.broadcast_to(torque, self.torque.shape[1])
+        for name, value in numbers.items():
+            change = change + self.numbers[name] @ np.broadcast_to(
+                value, self.numbers[name].shape[1]
+            )
+        return np.asarray(change)
+
+    def adjoint(self, gradient: ArrayLike) -> Gradient:
+        """Return the gradient of a function of the state at the end by all that it hangs on.
+
+        Parameters
+        ----------
+        gradient : (nq + nv,) array
+            Its gradient by that state.
+        """
+        back = np.asarray(gradient, np.float64)
+        return Gradient(
+            state=back @ self.state,
+            torque=back @ self.torque,
+            numbers={name: back @ each for name, each in self.numbers.items()},
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Gradient:
+    """The gradient of a number that a run leads to."""
+
+    state: Floats
+    """(nq + nv,) By the state at the beginning."""
+    torque: Floats
+    """(nu,) By torques that are added; over a run (steps, nu), those of each step."""
+    numbers: dict[str, Floats]
+    """(k,) each. By numbers of the robot, the ground and the law, by name."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunDerivatives:
+    """Derivatives along a run, step by step."""
+
+    steps: tuple[StepDerivatives, ...]
+    """Of each step: of the method, or from one call of a sampled controller to the next."""
+
+    def forward(
+        self, state: ArrayLike = 0.0, torque: ArrayLike = 0.0, **numbers: ArrayLike
+    ) -> Floats:
+        """Return changes of the state at the beginning and after every step.
+
+        Parameters
+        ----------
+        state : (nq + nv,) array
+            Change at the beginning.
+        torque : (steps, nu) array
+            Changes of the torques in every step.
+        **numbers : (k,) array
+            Changes of numbers that were asked for.
+
+        Returns
+        -------
+        (steps + 1, nq + nv) float
+            The changes.
+        """
+        first = self.steps[0]
+        changes = [np.array(np.broadcast_to(state, len(first.state)), dtype=np.float64)]
+        added = np.broadcast_to(torque, (len(self.steps), first.torque.shape[1]))
+        for step, each in zip(self.steps, added, strict=True):
+            changes.append(step.forward(changes[-1], each, **numbers))
+        return np.array(changes)
+
+    def adjoint(self, gradient: ArrayLike) -> Gradient:
+        """Return the gradient of a function of the run's states by all that they hang on.
+
+        Parameters
+        ----------
+        gradient : (nq + nv,) or (steps + 1, nq + nv) array
+            Its gradient by the last state, or by that at the beginning and those after every step.
+        """
+        given, size = np.asarray(gradient, np.float64), len(self.steps[0].state)
+        by_states = np.zeros((len(self.steps) + 1, size))
+        by_states[-1 if given.ndim == 1 else slice(None)] = given
+        back, torques = by_states[-1], []
+        numbers = {name: np.zeros(each.shape[1]) for name, each in self.steps[0].numbers.items()}
+        for step, own in zip(reversed(self.steps), by_states[-2::-1], strict=True):
+            found = step.adjoint(back)
+            torques.append(found.torque)
+            numbers = {name: each + found.numbers[name] for name, each in numbers.items()}
+            back = found.state + own
+        return Gradient(state=back, torque=np.array(torques[::-1]), numbers=numbers)
+
+
+@takes(SimulationError)
+def step_derivatives(
+    simulation: Simulation,
+    *,
+    until: float | None = None,
+    numbers: Sequence[str] = (),
+    gains: Sequence[str] = (),
+    answers: bool = True,
+    modes: Mapping[str, str] | None = None,
+) -> StepDerivatives:
+    """Take a step, or go on until a time, and differentiate what that does.
+
+    Contact modes are those that the certified solution has. While they last, equations hold that
+    are differentiated implicitly: exact to rounding, but for the law's own derivative, which is a
+    difference. Events of an event-driven motion, touchdowns, slips and stops, are gone through with
+    their saltations (:func:`~heelstrike.saltation_matrix`).
+
+    Parameters
+    ----------
+    simulation : Simulation
+        By time stepping or event-driven; it goes on to the end.
+    until : float, optional
+        End in s; one step of the method by default.
+    numbers : sequence of str
+        ``"friction"`` of the ground; ``"mass"``, ``"inertia"``, ``"center_of_mass"``,
+        ``"armature"``, ``"damping"``, ``"stiffness"``, ``"rest"`` or ``"gravity"`` of the robot,
+        all numbers of that name, as in its :class:`~heelstrike.robot.model.Model`.
+    gains : sequence of str
+        Parameters of a compiled law, by their names.
+    answers : bool
+        Whether the controller answers to a changed state. If not, its torques are those that they
+        are. It must be compiled, and act on the state, but not on forces.
+    modes : mapping of str to str, optional
+        For contact points at a change of mode the other side: ``"open"``, ``"stick"``,
+        ``"slip_forward"`` or ``"slip_backward"`` by name, as `changes` tells; of one time step.
+
+    Returns
+    -------
+    StepDerivatives
+
+    Raises
+    ------
+    SimulationError
+        If what happens has no derivative that is known here; the message says what.
+
+    Examples
+    --------
+    A block that slides for a millisecond loses μ g h of its speed:
+
+    >>> import heelstrike as hs
+    >>> robot, ground = hs.load_robot("bravo7"), hs.Ground(friction=0.6)
+    >>> simulation = hs.Simulation(robot, state=robot.reference_state(), ground=ground)
+    >>> found = hs.step_derivatives(simulation, numbers=["mass"])
+    >>> found.state.shape, found.torque.shape, found.numbers["mass"].shape
+    ((18, 18), (18, 6), (18, 9))
+    """
+    method, controller = simulation.method, simulation.controller
+    inputs = inputs_of(simulation.robot, numbers, parameter_sizes(controller, gains))
+    if isinstance(method, TimeStepping):
+        single = until is None
+        end = simulation.time + method.step if until is None else until
+        if modes and not single:
+            raise SimulationError("the other side of a change of mode is that of one step")
+        return _stepped(simulation, end, inputs, answers, modes or {}, single)
+    if not isinstance(method, EventDriven):
+        raise SimulationError(
+            f"{method.name} is not differentiated; use TimeStepping() or EventDriven()"
+        )
+    if modes:
+        raise SimulationError("the other side of a change of mode is that of a time step")
+    return _flowed(simulation, until, inputs, answers)
+
+
+@takes(SimulationError)
+def run_derivatives(
+    simulation: Simulation,
+    until: float,
+    *,
+    every: float | None = None,
+    numbers: Sequence[str] = (),
+    gains: Sequence[str] = (),
+    answers: bool = True,
+) -> RunDerivatives:
+    """Go on until a time, and differentiate every step, for sums forward and back along the run.
+
+    Parameters
+    ----------
+    simulation, numbers, gains, answers
+        As of :func:`step_derivatives`.
+    until : float
+        End in s.
+    every : float, optional
+        Seconds from one state to the next; by default one step of time stepping, or the period of a
+        sampled controller, of which it must be a multiple; and the whole time of an event-driven
+        motion.
+
+    Returns
+    -------
+    RunDerivatives
+
+    Raises
+    ------
+    SimulationError
+        As of :func:`step_derivatives`.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> robot = hs.load_robot("compass_gait")
+    >>> simulation = hs.Simulation(robot, state=robot.reference_state(), stop_when_fallen=False)
+    >>> run = hs.run_derivatives(simulation, 0.01)
+    >>> run.adjoint([1.0] + [0.0] * 7).state.shape
+    (8,)
+    """
+    own = max(simulation.method.step_length or 0.0, simulation.control_period)
+    span = every or own or until - simulation.time
+    begin, steps = simulation.time, []
+    for k in range(max(1, round((until - begin) / span))):
+        end = min(begin + (k + 1) * span, until)
+        steps.append(
+            step_derivatives(simulation, until=end, numbers=numbers, gains=gains, answers=answers)
+        )
+    return RunDerivatives(tuple(steps))
+
+
+def _stepped(
+    simulation: Simulation, until: float, inputs: Inputs, answers: bool, modes: Mapping[str, str],
+    single: bool,
+) -> StepDerivatives:  # fmt: skip
+    """Take time steps, and multiply their derivatives."""
+    robot, begin, step = simulation.robot, simulation.time, simulation.method.step_length or 0.0
+    slopes = allocate_slopes(robot, inputs.dynamic, friction=FRICTION in inputs.numbers)
+    size, controller = robot.nq + robot.nv, simulation.controller
+    law = AskedAlong(simulation, controller) if answers and controller is not None else None
+    change = np.eye(size + inputs.size)
+    added = change[[size + column for column in inputs.of(TORQUE)]]
+    held, asked = np.zeros_like(added), np.zeros(robot.nu)
+    found: tuple[ModeChange, ...] = ()
+    while simulation.time < until - AT_ONCE * step:
+        if law is not None and is_due(simulation._clock):
+            instant = law.now()
+            law.check_memory()
+            asked = instant.torque()
+            held = instant.gains() @ change[:size]
+            own = [size + column for column in inputs.of_parameters()]
+            held[:, own] += instant.by_parameters(inputs.parameters)
+        slopes.q[:], slopes.v[:] = simulation.state.q, simulation.state.v
+        _one_step(simulation)
+        if law is not None:
+            held[_at_limits(simulation, asked)] = 0.0
+        refuse_step(simulation)
+        found = other_modes(simulation, modes) if single else ()
+        _differentiate(simulation, slopes)
+        by_number = slopes.state[:, size + robot.nu :]
+        moved = slopes.state[:, :size] @ change[:size]
+        moved += slopes.state[:, size : size + robot.nu] @ (added + held)
+        moved += by_number @ change[[size + column for column in inputs.of_numbers()]]
+        change[:size] = moved
+    return _told(simulation, begin, change, inputs, found)
+
+
+def _one_step(simulation: Simulation) -> None:
+    """Take a step that is one."""
+    status = simulation.step()
+    if status is not RunStatus.COMPLETED:
+        raise SimulationError(f"there is no derivative of what ends a run: {simulation.message}")
+
+
+def _differentiate(simulation: Simulation, slopes: StepSlopes) -> None:
+    differentiate_step(simulation.robot.model, simulation._work, simulation._memory, slopes)
+
+
+def _at_limits(simulation: Simulation, asked: Floats) -> NDArray[np.bool_]:
+    """Tell which torques are what limits let through, (nu,), and do not answer."""
+    model, torque = simulation.robot.model, simulation._memory.torque
+    clipped = torque != asked
+    at_limits = (torque == model.torque_lower) | (torque == model.torque_upper)
+    if np.any(clipped & ~at_limits):
+        motor = simulation.robot.actuator_names[int(np.argmax(clipped & ~at_limits))]
+        raise SimulationError(
+            f"motor {motor!r} is on its speed-torque line, which is not differentiated"
+        )
+    return clipped
+
+
+def _flowed(
+    simulation: Simulation, until: float | None, inputs: Inputs, answers: bool
+) -> StepDerivatives:
+    """Go along an event-driven motion, event by event."""
+    begin, controller, now = simulation.time, simulation.controller, simulation.snapshot()
+
+    def again() -> Simulation:
+        return Simulation(
+            simulation.robot, controller, state=now, method=simulation.method,
+            ground=simulation.ground, control_period=simulation._given_period,
+            stop_when_fallen=False,
+        )  # fmt: skip
+
+    beside = again()
+    if until is None:
+        _one_step(beside)
+        until = beside.time
+        beside = again()
+    beside.advance(until)
+    if beside.status is not RunStatus.COMPLETED:
+        raise SimulationError(f"there is no derivative of what ends a run: {beside.message}")
+    run = whole(beside.record)
+    variation = Variation(again(), controller, inputs, answers=answers)
+    motion = linearized(run, until, variation, section=False, begin=begin)
+    simulation.advance(until)
+    return _told(simulation, begin, motion.matrix, inputs, ())
+
+
+def _told(
+    simulation: Simulation, begin: float, change: Floats, inputs: Inputs,
+    changes: tuple[ModeChange, ...],
+) -> StepDerivatives:  # fmt: skip
+    """Tell columns apart."""
+    size = simulation.robot.nq + simulation.robot.nv
+    by_input = change[:size, size:]
+    return StepDerivatives(
+        begin=begin,
+        end=simulation.time,
+        state=change[:size, :size],
+        torque=by_input[:, inputs.columns[TORQUE]],
+        numbers={
+            name: by_input[:, columns] for name, columns in inputs.columns.items() if name != TORQUE
+        },
+        changes=changes,
+    )
