@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +16,7 @@ from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.frame import is_due
 from heelstrike.sim.linearized.flow import Variation
-from heelstrike.sim.linearized.inputs import TORQUE, Inputs, inputs_of
+from heelstrike.sim.linearized.inputs import LAW, TORQUE, Inputs, inputs_of
 from heelstrike.sim.linearized.law import AskedAlong, parameter_sizes
 from heelstrike.sim.linearized.mode_changes import ModeChange, other_modes
 from heelstrike.sim.linearized.refusals import refuse_step
@@ -26,6 +27,11 @@ from heelstrike.sim.time_stepping.method import TimeStepping
 from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
+
+NOTHING: Mapping[str, ArrayLike] = MappingProxyType({})
+
+SAME_TORQUE = 1e-9
+"""Torques that differ by less, of themselves and of 1 N m, are one, asked for twice."""
 
 AT_ONCE = 1e-6
 """Part of a step within which a time is its end."""
@@ -43,29 +49,31 @@ class StepDerivatives:
     torque: Floats
     """(nq + nv, nu) By torques that are added, the same all the time, to those that act anyway."""
     numbers: Mapping[str, Floats]
-    """(nq + nv, k) each. By numbers of the robot, the ground and the law, by name."""
+    """(nq + nv, k) each. By numbers of the robot and the ground, by name."""
+    gains: Mapping[str, Floats]
+    """(nq + nv, k) each. By parameters of the law, by name."""
     changes: tuple[ModeChange, ...] = ()
     """Contact points at a change of mode, where the derivatives are those of one side; of one time
     step."""
 
     def forward(
-        self, state: ArrayLike = 0.0, torque: ArrayLike = 0.0, **numbers: ArrayLike
-    ) -> Floats:
+        self, state: ArrayLike = 0.0, torque: ArrayLike = 0.0, *,
+        numbers: Mapping[str, ArrayLike] = NOTHING, gains: Mapping[str, ArrayLike] = NOTHING,
+    ) -> Floats:  # fmt: skip
         """Return the change of the state at the end, (nq + nv,).
 
         Parameters
         ----------
         state, torque : (nq + nv,) and (nu,) array
             Changes of the state at the beginning and of the torques.
-        **numbers : (k,) array
-            Changes of numbers that were asked for.
+        numbers, gains : mapping of str to (k,) array
+            Changes of those that were asked for.
         """
         change = self.state @ np.broadcast_to(state, len(self.state))
         change = change + self.torque @ np.broadcast_to(torque, self.torque.shape[1])
-        for name, value in numbers.items():
-            change = change + self.numbers[name] @ np.broadcast_to(
-                value, self.numbers[name].shape[1]
-            )
+        for own, given in ((self.numbers, numbers), (self.gains, gains)):
+            for name, value in given.items():
+                change = change + own[name] @ np.broadcast_to(value, own[name].shape[1])
         return np.asarray(change)
 
     def adjoint(self, gradient: ArrayLike) -> Gradient:
@@ -81,6 +89,7 @@ class StepDerivatives:
             state=back @ self.state,
             torque=back @ self.torque,
             numbers={name: back @ each for name, each in self.numbers.items()},
+            gains={name: back @ each for name, each in self.gains.items()},
         )
 
 
@@ -92,8 +101,10 @@ class Gradient:
     """(nq + nv,) By the state at the beginning."""
     torque: Floats
     """(nu,) By torques that are added; over a run (steps, nu), those of each step."""
-    numbers: dict[str, Floats]
-    """(k,) each. By numbers of the robot, the ground and the law, by name."""
+    numbers: Mapping[str, Floats]
+    gains: Mapping[str, Floats]
+    """numbers, gains: (k,) each. By numbers of robot and ground, and by parameters of the law, by
+    name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +115,9 @@ class RunDerivatives:
     """Of each step: of the method, or from one call of a sampled controller to the next."""
 
     def forward(
-        self, state: ArrayLike = 0.0, torque: ArrayLike = 0.0, **numbers: ArrayLike
-    ) -> Floats:
+        self, state: ArrayLike = 0.0, torque: ArrayLike = 0.0, *,
+        numbers: Mapping[str, ArrayLike] = NOTHING, gains: Mapping[str, ArrayLike] = NOTHING,
+    ) -> Floats:  # fmt: skip
         """Return changes of the state at the beginning and after every step.
 
         Parameters
@@ -114,8 +126,8 @@ class RunDerivatives:
             Change at the beginning.
         torque : (steps, nu) array
             Changes of the torques in every step.
-        **numbers : (k,) array
-            Changes of numbers that were asked for.
+        numbers, gains : mapping of str to (k,) array
+            Changes of those that were asked for.
 
         Returns
         -------
@@ -126,7 +138,7 @@ class RunDerivatives:
         changes = [np.array(np.broadcast_to(state, len(first.state)), dtype=np.float64)]
         added = np.broadcast_to(torque, (len(self.steps), first.torque.shape[1]))
         for step, each in zip(self.steps, added, strict=True):
-            changes.append(step.forward(changes[-1], each, **numbers))
+            changes.append(step.forward(changes[-1], each, numbers=numbers, gains=gains))
         return np.array(changes)
 
     def adjoint(self, gradient: ArrayLike) -> Gradient:
@@ -140,14 +152,16 @@ class RunDerivatives:
         given, size = np.asarray(gradient, np.float64), len(self.steps[0].state)
         by_states = np.zeros((len(self.steps) + 1, size))
         by_states[-1 if given.ndim == 1 else slice(None)] = given
-        back, torques = by_states[-1], []
-        numbers = {name: np.zeros(each.shape[1]) for name, each in self.steps[0].numbers.items()}
+        back, found = by_states[-1], []
         for step, own in zip(reversed(self.steps), by_states[-2::-1], strict=True):
-            found = step.adjoint(back)
-            torques.append(found.torque)
-            numbers = {name: each + found.numbers[name] for name, each in numbers.items()}
-            back = found.state + own
-        return Gradient(state=back, torque=np.array(torques[::-1]), numbers=numbers)
+            found.append(step.adjoint(back))
+            back = found[-1].state + own
+        return Gradient(
+            state=back,
+            torque=np.array([each.torque for each in found[::-1]]),
+            numbers={name: sum(each.numbers[name] for each in found) for name in found[0].numbers},
+            gains={name: sum(each.gains[name] for each in found) for name in found[0].gains},
+        )
 
 
 @takes(SimulationError)
@@ -197,8 +211,6 @@ def step_derivatives(
 
     Examples
     --------
-    A block that slides for a millisecond loses μ g h of its speed:
-
     >>> import heelstrike as hs
     >>> robot, ground = hs.load_robot("bravo7"), hs.Ground(friction=0.6)
     >>> simulation = hs.Simulation(robot, state=robot.reference_state(), ground=ground)
@@ -325,7 +337,7 @@ def _differentiate(simulation: Simulation, slopes: StepSlopes) -> None:
 def _at_limits(simulation: Simulation, asked: Floats) -> NDArray[np.bool_]:
     """Tell which torques are what limits let through, (nu,), and do not answer."""
     model, torque = simulation.robot.model, simulation._memory.torque
-    clipped = torque != asked
+    clipped = np.abs(torque - asked) > SAME_TORQUE * (1.0 + np.abs(asked))
     at_limits = (torque == model.torque_lower) | (torque == model.torque_upper)
     if np.any(clipped & ~at_limits):
         motor = simulation.robot.actuator_names[int(np.argmax(clipped & ~at_limits))]
@@ -375,8 +387,7 @@ def _told(
         end=simulation.time,
         state=change[:size, :size],
         torque=by_input[:, inputs.columns[TORQUE]],
-        numbers={
-            name: by_input[:, columns] for name, columns in inputs.columns.items() if name != TORQUE
-        },
+        numbers={name: by_input[:, inputs.of(name)] for name in inputs.numbers},
+        gains={name: by_input[:, inputs.of(LAW + name)] for name in inputs.parameters},
         changes=changes,
     )

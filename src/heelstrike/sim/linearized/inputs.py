@@ -8,8 +8,11 @@ from dataclasses import dataclass, field
 from heelstrike.contact.linearized.partials import FRICTION, chosen_numbers, columns_of
 from heelstrike.robot.robot import Robot
 
-TORQUE = "torque"
+TORQUE = "added torque"
 """Torques that are added, the same all the time, to those that act anyway."""
+
+LAW = "law."
+"""What the names of the law's parameters begin with, which may be those of numbers."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class Inputs:
 
     def of_parameters(self) -> list[int]:
         """Columns of the law's parameters."""
-        return [column for name in self.parameters for column in self.of(name)]
+        return [column for name in self.parameters for column in self.of(LAW + name)]
 
 
 NONE = Inputs()
@@ -61,8 +64,9 @@ def inputs_of(robot: Robot, numbers: Sequence[str], parameters: dict[str, int]) 
     chosen_numbers(numbers)
     own = columns_of(robot.model, numbers)
     sizes = {TORQUE: robot.nu, **{name: each.stop - each.start for name, each in own.items()}}
+    sizes |= {LAW + name: size for name, size in parameters.items()}
     columns, begin = {}, 0
-    for name, size in (sizes | parameters).items():
+    for name, size in sizes.items():
         columns[name] = slice(begin, begin + size)
         begin += size
     return Inputs(tuple(own), columns, tuple(parameters))

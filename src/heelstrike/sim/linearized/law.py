@@ -84,7 +84,7 @@ class Instant:
                 values[place] += side
                 sides.append(replace(self, numbers=self.asked.snapshot()).torque())
             columns.append((sides[0] - sides[1]) / (2.0 * change))
-        return np.array(columns).reshape(len(columns), -1).T
+        return np.array(columns).T if columns else np.zeros((self.asked.numbers.robot.nu, 0))
 
     def parameters(self, names: Sequence[str]) -> list[tuple[Floats, tuple[int, ...]]]:
         """Where the parameters of some names are."""

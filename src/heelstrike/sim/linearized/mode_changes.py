@@ -14,8 +14,8 @@ from heelstrike.sim.simulation import Simulation
 from heelstrike.tolerances import CLOSED_GAP
 
 AT_THE_EDGE = 1e-9
-"""Impulses this near to the edge of their cone, as a part of the largest, are on it; and speeds
-(m/s) that are smaller are none."""
+"""Impulses this near to the edge of their cone, as a part of the largest or of the robot's weight
+over the step, are on it; and speeds (m/s) that are smaller are none."""
 
 SLIPPING = (ContactMode.SLIP_FORWARD, ContactMode.SLIP_BACKWARD)
 
@@ -43,7 +43,8 @@ def other_modes(simulation: Simulation, wanted: Mapping[str, str]) -> tuple[Mode
     memory, names = simulation._memory, simulation.robot.contact_names
     assembly, answer = memory.assembly, memory.assembly.answer
     changes, left = [], dict(wanted)
-    scale = float(np.abs(answer.impulse[: 2 * assembly.problem.count]).max(initial=0.0))
+    usual = simulation.robot.weight * (simulation.method.step_length or 0.0)
+    scale = float(np.abs(answer.impulse[: 2 * assembly.problem.count]).max(initial=usual))
     for place in range(assembly.begin[POINT], assembly.until[POINT]):
         others = _others(simulation, place, scale)
         contact = names[assembly.candidate[place]]
