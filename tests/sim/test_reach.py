@@ -45,6 +45,7 @@ NOT_YET: dict[str, int] = {
     "sim.event_driven.smooth.projection": 3,
     "sim.event_driven.smooth.saddle_point": 8,
     "sim.event_driven.smooth.watch": 2,
+    "sim.linearized.time_step": 3,
     "sim.record.recording": 6,
     "sim.time_stepping.impact": 12,
     "sim.time_stepping.method": 15,

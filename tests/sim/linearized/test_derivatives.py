@@ -304,7 +304,8 @@ def test_a_joint_that_comes_to_its_stop_is_gone_through() -> None:
     knee, state = robot.joint_index("right_knee"), robot.reference_state()
     x = state.vector.copy()
     x[1] += 1.0
-    x[3 : robot.nq] = 0.5 * np.clip(robot.model.lower + robot.model.upper, -0.4, 0.4)[3:]
+    middle = 0.5 * (robot.model.lower + robot.model.upper)[3:]
+    x[3 : robot.nq] = np.clip(middle, -0.2, 0.2)
     x[knee], x[robot.nq + knee] = -0.3, 5.0
     found, seen, run = blocks_of(robot, x, 0.1, hs.Ground(), size=1e-4)
     assert any(event.kind.of_joint for event in run.events)

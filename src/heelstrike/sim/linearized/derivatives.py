@@ -21,8 +21,9 @@ from heelstrike.sim.linearized.law import AskedAlong, parameter_sizes
 from heelstrike.sim.linearized.mode_changes import ModeChange, other_modes
 from heelstrike.sim.linearized.refusals import refuse_step
 from heelstrike.sim.linearized.step import linearized
-from heelstrike.sim.linearized.time_step import StepSlopes, allocate_slopes, differentiate_step
+from heelstrike.sim.linearized.time_step import allocate_slopes, differentiate_step
 from heelstrike.sim.simulation import Simulation
+from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.time_stepping.method import TimeStepping
 from heelstrike.sim.whole_run import whole
 
@@ -159,9 +160,14 @@ class RunDerivatives:
         return Gradient(
             state=back,
             torque=np.array([each.torque for each in found[::-1]]),
-            numbers={name: sum(each.numbers[name] for each in found) for name in found[0].numbers},
-            gains={name: sum(each.gains[name] for each in found) for name in found[0].gains},
+            numbers=_sums([each.numbers for each in found]),
+            gains=_sums([each.gains for each in found]),
         )
+
+
+def _sums(several: Sequence[Mapping[str, Floats]]) -> dict[str, Floats]:
+    """Add what has the same name."""
+    return {name: np.sum([each[name] for each in several], axis=0) for name in several[0]}
 
 
 @takes(SimulationError)
@@ -218,21 +224,10 @@ def step_derivatives(
     >>> found.state.shape, found.torque.shape, found.numbers["mass"].shape
     ((18, 18), (18, 6), (18, 9))
     """
-    method, controller = simulation.method, simulation.controller
-    inputs = inputs_of(simulation.robot, numbers, parameter_sizes(controller, gains))
-    if isinstance(method, TimeStepping):
-        single = until is None
-        end = simulation.time + method.step if until is None else until
-        if modes and not single:
-            raise SimulationError("the other side of a change of mode is that of one step")
-        return _stepped(simulation, end, inputs, answers, modes or {}, single)
-    if not isinstance(method, EventDriven):
-        raise SimulationError(
-            f"{method.name} is not differentiated; use TimeStepping() or EventDriven()"
-        )
-    if modes:
-        raise SimulationError("the other side of a change of mode is that of a time step")
-    return _flowed(simulation, until, inputs, answers)
+    stepper = _stepper(simulation, numbers, gains, answers)
+    if modes is not None and not (until is None and isinstance(stepper, _TimeSteps)):
+        raise SimulationError("the other side of a change of mode is that of one time step")
+    return stepper.until(until, modes)
 
 
 @takes(SimulationError)
@@ -278,49 +273,73 @@ def run_derivatives(
     """
     own = max(simulation.method.step_length or 0.0, simulation.control_period)
     span = every or own or until - simulation.time
-    begin, steps = simulation.time, []
-    for k in range(max(1, round((until - begin) / span))):
-        end = min(begin + (k + 1) * span, until)
-        steps.append(
-            step_derivatives(simulation, until=end, numbers=numbers, gains=gains, answers=answers)
-        )
-    return RunDerivatives(tuple(steps))
+    begin, stepper = simulation.time, _stepper(simulation, numbers, gains, answers)
+    ends = begin + span * np.arange(1, max(1, round((until - begin) / span)) + 1)
+    return RunDerivatives(tuple(stepper.until(min(end, until)) for end in ends.tolist()))
 
 
-def _stepped(
-    simulation: Simulation, until: float, inputs: Inputs, answers: bool, modes: Mapping[str, str],
-    single: bool,
-) -> StepDerivatives:  # fmt: skip
-    """Take time steps, and multiply their derivatives."""
-    robot, begin, step = simulation.robot, simulation.time, simulation.method.step_length or 0.0
-    slopes = allocate_slopes(robot, inputs.dynamic, friction=FRICTION in inputs.numbers)
-    size, controller = robot.nq + robot.nv, simulation.controller
-    law = AskedAlong(simulation, controller) if answers and controller is not None else None
-    change = np.eye(size + inputs.size)
-    added = change[[size + column for column in inputs.of(TORQUE)]]
-    held, asked = np.zeros_like(added), np.zeros(robot.nu)
-    found: tuple[ModeChange, ...] = ()
-    while simulation.time < until - AT_ONCE * step:
-        if law is not None and is_due(simulation._clock):
-            instant = law.now()
-            law.check_memory()
-            asked = instant.torque()
-            held = instant.gains() @ change[:size]
-            own = [size + column for column in inputs.of_parameters()]
-            held[:, own] += instant.by_parameters(inputs.parameters)
-        slopes.q[:], slopes.v[:] = simulation.state.q, simulation.state.v
-        _one_step(simulation)
-        if law is not None:
-            held[_at_limits(simulation, asked)] = 0.0
-        refuse_step(simulation)
-        found = other_modes(simulation, modes) if single else ()
-        _differentiate(simulation, slopes)
-        by_number = slopes.state[:, size + robot.nu :]
-        moved = slopes.state[:, :size] @ change[:size]
-        moved += slopes.state[:, size : size + robot.nu] @ (added + held)
-        moved += by_number @ change[[size + column for column in inputs.of_numbers()]]
-        change[:size] = moved
-    return _told(simulation, begin, change, inputs, found)
+def _stepper(
+    simulation: Simulation, numbers: Sequence[str], gains: Sequence[str], answers: bool
+) -> _TimeSteps | _Flows:
+    """Choose how a simulation is differentiated.
+
+    Raises
+    ------
+    SimulationError
+        If its method is neither time stepping nor event-driven, or there are no such numbers.
+    """
+    sizes = parameter_sizes(simulation.controller, gains)
+    inputs = inputs_of(simulation.robot, numbers, sizes)
+    if isinstance(simulation.method, TimeStepping):
+        return _TimeSteps(simulation, inputs, answers)
+    if isinstance(simulation.method, EventDriven):
+        return _Flows(simulation, inputs, answers)
+    raise SimulationError(
+        f"{simulation.method.name} is not differentiated; use TimeStepping() or EventDriven()"
+    )
+
+
+class _TimeSteps:
+    """Time steps, whose derivatives are multiplied."""
+
+    def __init__(self, simulation: Simulation, inputs: Inputs, answers: bool) -> None:
+        self._simulation, self._inputs = simulation, inputs
+        friction = FRICTION in inputs.numbers
+        self._slopes = allocate_slopes(simulation.robot, inputs.dynamic, friction=friction)
+        controller = simulation.controller if answers else None
+        self._law = None if controller is None else AskedAlong(simulation, controller)
+
+    def until(self, end: float | None, modes: Mapping[str, str] | None = None) -> StepDerivatives:
+        """Go on until a time, or take one step, and say what that does."""
+        simulation, slopes, inputs = self._simulation, self._slopes, self._inputs
+        robot, begin, step = simulation.robot, simulation.time, simulation.method.step_length or 0.0
+        size, single = robot.nq + robot.nv, end is None
+        end = begin + step if end is None else end
+        change = np.eye(size + inputs.size)
+        added = change[[size + column for column in inputs.of(TORQUE)]]
+        held, asked = np.zeros_like(added), np.zeros(robot.nu)
+        found: tuple[ModeChange, ...] = ()
+        while simulation.time < end - AT_ONCE * step:
+            if self._law is not None and is_due(simulation._clock):
+                instant = self._law.now()
+                self._law.check_call(instant)
+                asked = instant.torque()
+                held = instant.gains() @ change[:size]
+                own = [size + column for column in inputs.of_parameters()]
+                held[:, own] += instant.by_parameters(inputs.parameters)
+            slopes.q[:], slopes.v[:] = simulation.state.q, simulation.state.v
+            _one_step(simulation)
+            if self._law is not None:
+                held[_at_limits(simulation, asked)] = 0.0
+            refuse_step(simulation)
+            found = other_modes(simulation, modes or {}) if single else ()
+            differentiate_step(robot.model, simulation._work, simulation._memory, slopes)
+            moved = slopes.state[:, :size] @ change[:size]
+            moved += slopes.state[:, size : size + robot.nu] @ (added + held)
+            by_number = slopes.state[:, size + robot.nu :]
+            moved += by_number @ change[[size + column for column in inputs.of_numbers()]]
+            change[:size] = moved
+        return _told(simulation, begin, change, inputs, found)
 
 
 def _one_step(simulation: Simulation) -> None:
@@ -328,10 +347,6 @@ def _one_step(simulation: Simulation) -> None:
     status = simulation.step()
     if status is not RunStatus.COMPLETED:
         raise SimulationError(f"there is no derivative of what ends a run: {simulation.message}")
-
-
-def _differentiate(simulation: Simulation, slopes: StepSlopes) -> None:
-    differentiate_step(simulation.robot.model, simulation._work, simulation._memory, slopes)
 
 
 def _at_limits(simulation: Simulation, asked: Floats) -> NDArray[np.bool_]:
@@ -347,32 +362,39 @@ def _at_limits(simulation: Simulation, asked: Floats) -> NDArray[np.bool_]:
     return clipped
 
 
-def _flowed(
-    simulation: Simulation, until: float | None, inputs: Inputs, answers: bool
-) -> StepDerivatives:
-    """Go along an event-driven motion, event by event."""
-    begin, controller, now = simulation.time, simulation.controller, simulation.snapshot()
+class _Flows:
+    """Event-driven motions, gone through event by event."""
 
-    def again() -> Simulation:
+    def __init__(self, simulation: Simulation, inputs: Inputs, answers: bool) -> None:
+        self._simulation, self._inputs, self._answers = simulation, inputs, answers
+
+    def until(self, end: float | None, modes: Mapping[str, str] | None = None) -> StepDerivatives:
+        """Go on until a time, or take one step, and say what that does."""
+        del modes
+        simulation, begin = self._simulation, self._simulation.time
+        now = simulation.snapshot()
+        if end is None:
+            beside = self._again(now)
+            _one_step(beside)
+            end = beside.time
+        beside = self._again(now)
+        beside.advance(end)
+        if beside.status is not RunStatus.COMPLETED:
+            raise SimulationError(f"there is no derivative of what ends a run: {beside.message}")
+        run = whole(beside.record)
+        controller = simulation.controller
+        variation = Variation(self._again(now), controller, self._inputs, answers=self._answers)
+        motion = linearized(run, end, variation, section=False, begin=begin)
+        simulation.advance(end)
+        return _told(simulation, begin, motion.matrix, self._inputs, ())
+
+    def _again(self, now: Snapshot) -> Simulation:
+        """Return another simulation at the same instant."""
+        its = self._simulation
         return Simulation(
-            simulation.robot, controller, state=now, method=simulation.method,
-            ground=simulation.ground, control_period=simulation._given_period,
-            stop_when_fallen=False,
+            its.robot, its.controller, state=now, method=its.method, ground=its.ground,
+            control_period=its._given_period, stop_when_fallen=False,
         )  # fmt: skip
-
-    beside = again()
-    if until is None:
-        _one_step(beside)
-        until = beside.time
-        beside = again()
-    beside.advance(until)
-    if beside.status is not RunStatus.COMPLETED:
-        raise SimulationError(f"there is no derivative of what ends a run: {beside.message}")
-    run = whole(beside.record)
-    variation = Variation(again(), controller, inputs, answers=answers)
-    motion = linearized(run, until, variation, section=False, begin=begin)
-    simulation.advance(until)
-    return _told(simulation, begin, motion.matrix, inputs, ())
 
 
 def _told(

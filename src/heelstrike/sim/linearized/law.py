@@ -139,16 +139,18 @@ class AskedAlong:
 
     def check_beginning(self) -> None:
         """Refuse a law that acts on what it made of the state in which the step began."""
-        if self._first is None:
-            return
-        first, asked, self._first = self._first, self._first.asked, None
-        changes = DISTURBANCE * np.eye(len(first.state.vector))
-        first.torque()
+        if self._first is not None:
+            first, self._first = self._first, None
+            self.check_call(first)
+
+    def check_call(self, instant: Instant) -> None:
+        """Refuse a law that acts on what it keeps of the state in a call."""
+        instant.torque()
         usual = self._remembered()
-        then = replace(first, numbers=asked.snapshot())
+        then = replace(instant, numbers=self._asked.snapshot())
         seen = []
-        for change in changes:
-            first.torque(change)
+        for change in DISTURBANCE * np.eye(len(instant.state.vector)):
+            instant.torque(change)
             seen.append(self._remembered())
         for label, held in usual.items():
             if any(each[label] != held for each in seen) and self._acts_on(label, then):

@@ -17,8 +17,6 @@ are. An impact that is whole within a step is a second such problem beside that 
 
 from __future__ import annotations
 
-import numpy as np
-
 from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.linearized.partials import (
@@ -37,12 +35,12 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.rows import (
     DRY_JOINT,
-    LOOP,
     POINT,
     STOP,
+    Rows,
     lay_out_rows,
 )
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Assembly, Memory, Surface
 from heelstrike.sim.time_stepping.method import (
     LINEARLY_IMPLICIT,
     MOREAU_JEAN,
@@ -50,6 +48,26 @@ from heelstrike.sim.time_stepping.method import (
     Stepping,
     is_linearised,
 )
+
+
+class ActiveRows(Bundle):
+    """The active rows of a contact problem, and what their impulses do."""
+
+    held: Floats = array("rows", "nv")
+    """Active rows J."""
+    change: Floats = array("rows", "columns")
+    """∂(J v⁺ + c) of them."""
+    response: Floats = array("nv", "width")
+    """What the impulses do to the velocity, A'⁻¹ Pᵀ, then what the velocity would do without."""
+    system: Floats = array("rows", "width")
+    order: Integers = array("rows", of=int)
+    """system, order: Equations of the impulses."""
+    rubbing: Floats = array("rows")
+    """Change of the tangential impulse of a point that slips by the ground's friction."""
+    point: Integers = array("rows", of=int)
+    """Which point that is."""
+    rank: int = cell(int)
+    """How many active rows are independent."""
 
 
 class StepSlopes(Bundle):
@@ -67,32 +85,19 @@ class StepSlopes(Bundle):
     tree: Workspace = part(Workspace)
     """loops, tree: Scratch."""
     dated: Integers = array(1, of=int)
-    """Whether loops turn."""
+    """Zero: velocities are looked at, not accelerations."""
     program: int = cell(int)
     """Address of the code that finds the partial derivatives."""
     rubs: int = cell(int)
     """Whether friction of the ground is the last number by which is differentiated."""
-    held: Floats = array("rows", "nv")
-    """Active rows J."""
-    change: Floats = array("rows", "columns")
-    """∂(J v⁺ + c) of them."""
-    response: Floats = array("nv", "width")
-    """What the impulses do to the velocity, A'⁻¹ Pᵀ, then what the velocity would do without."""
-    system: Floats = array("rows", "width")
-    order: Integers = array("rows", of=int)
-    """system, order: Equations of the impulses."""
-    rubbing: Floats = array("rows")
-    """Change of the tangential impulse of a point that slips by the ground's friction."""
-    point: Integers = array("rows", of=int)
-    """Which point that is."""
+    active: ActiveRows = part(ActiveRows)
+    """What was active in the problem that was looked at last."""
     arriving: Floats = array("nv", "columns")
     after: Floats = array("nv", "columns")
     """arriving, after: Derivatives of the velocity that positions move with where there is an
     impact, and of that after the step."""
     state: Floats = array("nx", "columns")
     """Derivative of the state after by position, velocity, torques and numbers before."""
-    rank: int = cell(int)
-    """How many active rows are independent."""
 
 
 def allocate_slopes(
@@ -101,11 +106,11 @@ def allocate_slopes(
     """Allocate the derivative of a step, by some `numbers` of the robot and by friction."""
     model = robot.model
     balance, partials = allocate_balance(model, numbers)
-    loops, rows = count_rows(model), 2 * len(lay_out_rows(model).kind)
+    rows = 2 * len(lay_out_rows(model).kind)
     columns = robot.nq + robot.nv + robot.nu + partials.lacking_by_numbers.shape[1] + friction
     extents = {
-        **model.extents, "components": 2, "rows": rows, "columns": columns, "loop_rows": loops,
-        "width": rows + columns, "nx": robot.nq + robot.nv,
+        **model.extents, "components": 2, "rows": rows, "columns": columns,
+        "loop_rows": count_rows(model), "width": rows + columns, "nx": robot.nq + robot.nv,
     }  # fmt: skip
     return StepSlopes.allocate(
         extents,
@@ -113,8 +118,8 @@ def allocate_slopes(
         partials=partials,
         loops=LoopRows.allocate(extents),
         tree=Workspace.allocate(extents),
-        dated=np.array([int(loops > 0)]),
-        program=partial_program(model, dated=loops > 0, numbers=numbers),
+        active=ActiveRows.allocate(extents),
+        program=partial_program(model, dated=False, numbers=numbers),
         rubs=int(friction),
     )
 
@@ -126,7 +131,8 @@ def differentiate_step(model: Model, work: Stepping, memory: Memory, slopes: Ste
     Its contact problem is still there; where an impact fell into it, both are.
     """
     assembly, impact, surface = memory.assembly, work.impact, memory.surface
-    pose_balance(model, work, memory, slopes)
+    added, normal = memory.equations.added, memory.contacts.normal
+    pose_balance(slopes.q, slopes.v, added, normal, slopes.balance)
     bounces = False
     for place in range(assembly.begin[POINT], assembly.until[POINT]):
         bounces = bounces or surface.restitution[assembly.candidate[place]] > 0.0
@@ -148,22 +154,21 @@ def differentiate_step(model: Model, work: Stepping, memory: Memory, slopes: Ste
         model, work, memory, memory.next_v, answer.impulse, answer.mode, gaps, bounces, slopes,
         slopes.after,
     )  # fmt: skip
-    write_state(model, work, slopes)
+    moves = slopes.arriving if impact.happens == 1 else slopes.after
+    write_state(model.nq, work.scheme, work.step, moves, slopes.after, slopes.state)
 
 
 @kernel
-def pose_balance(model: Model, work: Stepping, memory: Memory, slopes: StepSlopes) -> None:
+def pose_balance(q: Floats, v: Floats, added: Floats, normal: Floats, balance: Balance) -> None:
     """Write what all equations of a step have in common."""
-    balance = slopes.balance
-    for j in range(model.nv):
-        balance.q[j] = slopes.q[j]
-        balance.v[j] = slopes.v[j]
-        balance.added[j] = memory.equations.added[j]
-    for contact in range(model.nc):
+    for j in range(q.shape[0]):
+        balance.q[j] = q[j]
+    for j in range(v.shape[0]):
+        balance.v[j] = v[j]
+        balance.added[j] = added[j]
+    for contact in range(normal.shape[0]):
         for k in range(2):
-            balance.normal[contact, k] = memory.contacts.normal[contact, k]
-    balance.ahead[0] = 0.0
-    balance.ahead[1] = 0.5 * work.step
+            balance.normal[contact, k] = normal[contact, k]
 
 
 @kernel
@@ -193,136 +198,127 @@ def differentiate_problem(
     result : (nv, columns) float
         Receives the derivative.
     """
-    assembly, balance, step, nv = memory.assembly, slopes.balance, work.step, model.nv
-    for j in range(nv):
+    assembly, balance, step = memory.assembly, slopes.balance, work.step
+    for j in range(model.nv):
         balance.acceleration[j] = (after[j] - slopes.v[j]) / step
     for contact in range(model.nc):
         balance.push[contact, 0] = balance.push[contact, 1] = 0.0
     for place in range(assembly.begin[POINT], assembly.until[POINT]):
         for k in range(2):
             balance.push[assembly.candidate[place], k] = impulse[2 * place + k] / step
-    for row in range(balance.pull.shape[0]):
-        balance.pull[row] = impulse[2 * (assembly.begin[LOOP] + row)] / step
     evaluate(model, after, slopes)
+    rows, partials = slopes.active, slopes.partials
+    rate = 1.0 / step if gaps else 0.0
+    bounce = slopes.bounce_by_q
     active = write_points(
-        model, impulse, mode, 1.0 / step if gaps else 0.0, bounces, memory, slopes
-    )
-    active = write_joints(active, mode, 1.0 / step if gaps else 0.0, memory, slopes)
-    active = write_loops(active, slopes)
-    write_free(model, work, active, memory, slopes)
-    solve_columns(model, active + result.shape[1], balance.factor, slopes.response)
-    find_impulses(active, slopes)
-    response, system = slopes.response, slopes.system
-    for j in range(nv):
-        for column in range(result.shape[1]):
-            result[j, column] = response[j, active + column]
-        result[j, model.nq + j] += 1.0
-        for k in range(slopes.rank):
-            by_impulse = response[j, slopes.order[k]]
-            for column in range(result.shape[1]):
-                result[j, column] += by_impulse * system[k, active + column]
+        model, impulse, mode, rate, bounces, bounce, assembly, memory.surface, balance.rows,
+        partials, rows,
+    )  # fmt: skip
+    active = write_joints(active, mode, rate, assembly, memory.rows, rows)
+    write_free(model, step, active, partials, rows)
+    if work.scheme == LINEARLY_IMPLICIT:
+        stiffen(step, 1.0, active + model.nq, memory.stiffness, rows.response)
+    elif work.scheme == MOREAU_JEAN:
+        stiffen(step, 0.5, active + model.nq, model.stiffness, rows.response)
+    if slopes.rubs == 1:
+        rub(active, result.shape[1], balance.rows, rows)
+    solve_columns(model, active + result.shape[1], balance.factor, rows.response)
+    find_impulses(active, rows)
+    add_impulses(model.nq, active, rows, result)
+
+
+@kernel
+def add_impulses(nq: int, active: int, rows: ActiveRows, result: Floats) -> None:
+    """Write the derivative of the velocity: free, by the velocity itself, and by the impulses."""
+    columns = result.shape[1]
+    for j in range(result.shape[0]):
+        for column in range(columns):
+            result[j, column] = rows.response[j, active + column]
+        result[j, nq + j] += 1.0
+        for k in range(rows.rank):
+            by_impulse = rows.response[j, rows.order[k]]
+            for column in range(columns):
+                result[j, column] += by_impulse * rows.system[k, active + column]
 
 
 @dissolved_kernel
-def begin_row(row: int, slopes: StepSlopes) -> None:
+def begin_row(row: int, active: ActiveRows) -> None:
     """Begin an active row with nothing in it."""
-    for j in range(slopes.held.shape[1]):
-        slopes.held[row, j] = 0.0
-        slopes.response[j, row] = 0.0
-    for column in range(slopes.change.shape[1]):
-        slopes.change[row, column] = 0.0
-    slopes.rubbing[row] = 0.0
+    for j in range(active.held.shape[1]):
+        active.held[row, j] = 0.0
+        active.response[j, row] = 0.0
+    for column in range(active.change.shape[1]):
+        active.change[row, column] = 0.0
+    active.rubbing[row] = 0.0
 
 
 @kernel
 def write_points(
-    model: Model, impulse: Floats, mode: Integers, rate: float, bounces: bool, memory: Memory,
-    slopes: StepSlopes,
+    model: Model, impulse: Floats, mode: Integers, rate: float, bounces: bool, bounce: Floats,
+    assembly: Assembly, surface: Surface, jacobian: Floats, partials: Partials, rows: ActiveRows,
 ) -> int:  # fmt: skip
     """Write the active rows of contact points; return how many there are."""
-    assembly, rows, partials = memory.assembly, slopes.balance.rows, slopes.partials
     active = 0
     for place in range(assembly.begin[POINT], assembly.until[POINT]):
         if mode[place] == OPEN:
             continue
         point = assembly.candidate[place]
         normal, tangent = 2 * point, 2 * point + 1
-        friction, back = memory.surface.friction[point], memory.surface.restitution[point]
+        friction, back = surface.friction[point], surface.restitution[point]
         sticks = mode[place] == STICK and friction > 0.0
         way = 0.0 if mode[place] == STICK else (-1.0 if mode[place] == SLIP_FORWARD else 1.0)
-        begin_row(active, slopes)
-        slopes.rubbing[active] = way * impulse[2 * place] * model.friction_scale[point]
-        slopes.point[active] = point
+        begin_row(active, rows)
+        rows.rubbing[active] = way * impulse[2 * place] * model.friction_scale[point]
+        rows.point[active] = point
         for j in range(model.nv):
-            slopes.held[active, j] = rows[normal, j]
-            slopes.response[j, active] = rows[normal, j] + way * friction * rows[tangent, j]
-            slopes.change[active, j] = partials.along_by_q[normal, j] + rate * rows[normal, j]
+            rows.held[active, j] = jacobian[normal, j]
+            rows.response[j, active] = jacobian[normal, j] + way * friction * jacobian[tangent, j]
+            rows.change[active, j] = partials.along_by_q[normal, j] + rate * jacobian[normal, j]
             if bounces:
-                slopes.change[active, j] += back * slopes.bounce_by_q[normal, j]
-                slopes.change[active, model.nq + j] = back * rows[normal, j]
+                rows.change[active, j] += back * bounce[normal, j]
+                rows.change[active, model.nq + j] = back * jacobian[normal, j]
         active += 1
         if sticks:
-            begin_row(active, slopes)
+            begin_row(active, rows)
             for j in range(model.nv):
-                slopes.held[active, j] = slopes.response[j, active] = rows[tangent, j]
-                slopes.change[active, j] = partials.along_by_q[tangent, j]
+                rows.held[active, j] = rows.response[j, active] = jacobian[tangent, j]
+                rows.change[active, j] = partials.along_by_q[tangent, j]
             active += 1
     return active
 
 
 @kernel
 def write_joints(
-    active: int, mode: Integers, rate: float, memory: Memory, slopes: StepSlopes
+    active: int, mode: Integers, rate: float, assembly: Assembly, table: Rows, rows: ActiveRows
 ) -> int:
     """Write the active rows of stops, latches and dry joints; return how many there are with them.
 
     A dry joint that turns has friction that is known, and no row.
     """
-    assembly, rows = memory.assembly, memory.rows
     for place in range(assembly.begin[STOP], assembly.until[STOP]):
         if mode[place] != OPEN or assembly.problem.set[place] == LINE:
             entry = assembly.candidate[place]
-            begin_row(active, slopes)
-            slopes.held[active, rows.owner[entry]] = rows.side[entry]
-            slopes.response[rows.owner[entry], active] = rows.side[entry]
-            slopes.change[active, rows.owner[entry]] = rate * rows.side[entry]
+            begin_row(active, rows)
+            rows.held[active, table.owner[entry]] = table.side[entry]
+            rows.response[table.owner[entry], active] = table.side[entry]
+            rows.change[active, table.owner[entry]] = rate * table.side[entry]
             active += 1
     for place in range(assembly.begin[DRY_JOINT], assembly.until[DRY_JOINT]):
         if mode[place] == STICK:
             entry = assembly.candidate[place]
-            begin_row(active, slopes)
-            slopes.held[active, rows.owner[entry]] = 1.0
-            slopes.response[rows.owner[entry], active] = 1.0
+            begin_row(active, rows)
+            rows.held[active, table.owner[entry]] = 1.0
+            rows.response[table.owner[entry], active] = 1.0
             active += 1
-    return active
-
-
-@kernel
-def write_loops(active: int, slopes: StepSlopes) -> int:
-    """Write the rows of loops and couplings; return how many active rows there are with them."""
-    loops, partials = slopes.loops, slopes.partials
-    for row in range(loops.bias.shape[0]):
-        begin_row(active, slopes)
-        for j in range(slopes.held.shape[1]):
-            slopes.held[active, j] = slopes.response[j, active] = loops.jacobian[row, j]
-            slopes.change[active, j] = partials.loop_along_by_q[row, j]
-            slopes.change[active, slopes.held.shape[1] + j] = partials.loop_along_by_v[row, j]
-        active += 1
     return active
 
 
 @kernel
 def write_free(
-    model: Model, work: Stepping, active: int, memory: Memory, slopes: StepSlopes
+    model: Model, step: float, active: int, partials: Partials, rows: ActiveRows
 ) -> None:
     """Write what the velocity would do without impulses, times A', but for v itself."""
-    response, partials, step, nq, nv = (
-        slopes.response,
-        slopes.partials,
-        work.step,
-        model.nq,
-        model.nv,
-    )
+    response, nq, nv = rows.response, model.nq, model.nv
     numbers = partials.lacking_by_numbers.shape[1]
     by_torque = active + nq + nv
     by_number = by_torque + model.nu
@@ -335,21 +331,28 @@ def write_free(
             response[i, by_torque + j] = 0.0
         for j in range(numbers):
             response[i, by_number + j] = -step * partials.lacking_by_numbers[i, j]
-        if work.scheme == LINEARLY_IMPLICIT:
-            response[i, active + nq + i] -= step * step * memory.stiffness[i]
-        elif work.scheme == MOREAU_JEAN:
-            response[i, active + nq + i] -= 0.5 * step * step * model.stiffness[i]
     for j in range(model.nu):
         response[model.actuator_joint[j], by_torque + j] = step
-    if slopes.rubs == 1:
-        last = by_number + numbers
-        for i in range(nv):
-            response[i, last] = 0.0
-        for row in range(active):
-            if slopes.rubbing[row] != 0.0:
-                tangent = 2 * slopes.point[row] + 1
-                for i in range(nv):
-                    response[i, last] += slopes.rubbing[row] * slopes.balance.rows[tangent, i]
+
+
+@kernel
+def stiffen(step: float, part_ahead: float, by_v: int, stiffness: Floats, response: Floats) -> None:
+    """Add what springs do that act at a part of the step ahead."""
+    for i in range(stiffness.shape[0]):
+        response[i, by_v + i] -= part_ahead * step * step * stiffness[i]
+
+
+@kernel
+def rub(active: int, columns: int, jacobian: Floats, rows: ActiveRows) -> None:
+    """Write what the ground's friction, the last number, does to points that slip."""
+    last = active + columns - 1
+    for i in range(jacobian.shape[1]):
+        rows.response[i, last] = 0.0
+    for row in range(active):
+        if rows.rubbing[row] != 0.0:
+            tangent = 2 * rows.point[row] + 1
+            for i in range(jacobian.shape[1]):
+                rows.response[i, last] += rows.rubbing[row] * jacobian[tangent, i]
 
 
 @kernel
@@ -375,9 +378,9 @@ def solve_columns(model: Model, width: int, factor: Floats, x: Floats) -> None:
 
 
 @kernel
-def find_impulses(active: int, slopes: StepSlopes) -> None:
+def find_impulses(active: int, rows: ActiveRows) -> None:
     """Solve for the changes of the impulses, in the last columns and the order of `order`."""
-    held, response, system, change = slopes.held, slopes.response, slopes.system, slopes.change
+    held, response, system, change = rows.held, rows.response, rows.system, rows.change
     columns, nv = change.shape[1], held.shape[1]
     width = active + columns
     for row in range(active):
@@ -392,9 +395,9 @@ def find_impulses(active: int, slopes: StepSlopes) -> None:
             system[row, active + column] = -system[row, active + column] - change[row, column]
         for j in range(nv):
             system[row, active + nv + j] -= held[row, j]
-    slopes.rank = triangulate(active, width, True, system, slopes.order)
-    for k in range(slopes.rank - 1, -1, -1):
-        for j in range(k + 1, slopes.rank):
+    rows.rank = triangulate(active, width, True, system, rows.order)
+    for k in range(rows.rank - 1, -1, -1):
+        for j in range(k + 1, rows.rank):
             ratio = system[k, j]
             for column in range(active, width):
                 system[k, column] -= ratio * system[j, column]
@@ -403,16 +406,16 @@ def find_impulses(active: int, slopes: StepSlopes) -> None:
 
 
 @kernel
-def write_state(model: Model, work: Stepping, slopes: StepSlopes) -> None:
-    """Write the derivative of the state after the step."""
-    step, nq, nv, state, after = work.step, model.nq, model.nv, slopes.state, slopes.after
-    moves = slopes.arriving if work.impact.happens == 1 else after
+def write_state(
+    nq: int, scheme: int, step: float, moves: Floats, after: Floats, state: Floats
+) -> None:
+    """Write the derivative of the state after the step, from that of the velocity it moves with."""
     part_after, part_before = 1.0, 0.0
-    if work.scheme == MOREAU_JEAN:
+    if scheme == MOREAU_JEAN:
         part_after = part_before = 0.5
-    elif work.scheme == PAPER_EXPLICIT:
+    elif scheme == PAPER_EXPLICIT:
         part_after, part_before = 0.0, 1.0
-    for i in range(nv):
+    for i in range(after.shape[0]):
         for column in range(state.shape[1]):
             state[i, column] = part_after * step * moves[i, column]
             state[nq + i, column] = after[i, column]
