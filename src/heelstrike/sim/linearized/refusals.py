@@ -24,6 +24,8 @@ def refuse_step(simulation: Simulation) -> None:
     """
     reasons = {
         "closed loops and coupled joints": bool(count_rows(simulation.robot.model)),
+        "constraints from outside": bool(simulation.robot.constraints),
+        "smooth ground": bool(simulation.ground.model().curved),
         "brakes": bool(simulation.braked),
         "pushes": any(
             push.end > simulation.time - _step(simulation) and push.start < simulation.time

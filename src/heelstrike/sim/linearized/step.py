@@ -147,6 +147,11 @@ def _refuse(robot: Robot, run: Run, period: float) -> None:
             f"dry friction in the joints of {robot.name!r} cannot be linearised here; "
             "hs.find_limit_cycle takes differences instead"
         )
+    if robot.constraints:
+        raise SimulationError(
+            f"constraints from outside of {robot.name!r} are not linearised here; "
+            "hs.find_limit_cycle takes differences instead"
+        )
     if np.any(run.brake_torque):
         raise SimulationError(
             f"brakes of {robot.name!r} are on, which is not linearised here; "

@@ -106,7 +106,7 @@ def allocate_slopes(
     """Allocate the derivative of a step, by some `numbers` of the robot and by friction."""
     model = robot.model
     balance, partials = allocate_balance(model, numbers)
-    rows = 2 * len(lay_out_rows(model).kind)
+    rows = 2 * len(lay_out_rows(robot).kind)
     columns = robot.nq + robot.nv + robot.nu + partials.lacking_by_numbers.shape[1] + friction
     extents = {
         **model.extents, "components": 2, "rows": rows, "columns": columns,
