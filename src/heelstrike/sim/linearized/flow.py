@@ -15,8 +15,9 @@ from heelstrike.sim.simulation import Simulation
 
 Floats = NDArray[np.float64]
 
-PANEL = 0.005
-"""Longest stretch of time (s) that is taken at once: gaits are smooth by pieces only."""
+PANEL, ALONE = 0.005, 0.05
+"""Longest stretch of time (s) that is taken at once under a law, as gaits are smooth by pieces
+only; and without one."""
 
 FASTEST = 0.5
 """Longest stretch in parts of the time in which the fastest error of the closed loop changes."""
@@ -85,9 +86,10 @@ class Variation:
         """
         size = self._robot.nq + self._robot.nv
         error = np.eye(size + self.inputs.size)
+        longest = ALONE if self._law is None else PANEL
         start, fastest = begin, _rate(self._slope(begin, active)[:, :size])
         while (left := end - start) > 0.0:
-            span = left / np.ceil(left / min(PANEL, FASTEST / fastest))
+            span = left / np.ceil(left / min(longest, FASTEST / fastest))
             if self._law is not None and self._answers:
                 self._simulation.advance(start + span * NODES[0])
                 self._law.check_memory()

@@ -37,7 +37,6 @@ from heelstrike.sim.contacts.rows import (
     DRY_JOINT,
     POINT,
     STOP,
-    Rows,
     lay_out_rows,
 )
 from heelstrike.sim.memory import Assembly, Memory, Surface
@@ -214,7 +213,7 @@ def differentiate_problem(
         model, impulse, mode, rate, bounces, bounce, assembly, memory.surface, balance.rows,
         partials, rows,
     )  # fmt: skip
-    active = write_joints(active, mode, rate, assembly, memory.rows, rows)
+    active = write_joints(active, mode, rate, assembly, memory.rows.owner, memory.rows.side, rows)
     write_free(model, step, active, partials, rows)
     if work.scheme == LINEARLY_IMPLICIT:
         stiffen(step, 1.0, active + model.nq, memory.stiffness, rows.response)
@@ -289,8 +288,9 @@ def write_points(
 
 @kernel
 def write_joints(
-    active: int, mode: Integers, rate: float, assembly: Assembly, table: Rows, rows: ActiveRows
-) -> int:
+    active: int, mode: Integers, rate: float, assembly: Assembly, owner: Integers, side: Floats,
+    rows: ActiveRows,
+) -> int:  # fmt: skip
     """Write the active rows of stops, latches and dry joints; return how many there are with them.
 
     A dry joint that turns has friction that is known, and no row.
@@ -299,16 +299,16 @@ def write_joints(
         if mode[place] != OPEN or assembly.problem.set[place] == LINE:
             entry = assembly.candidate[place]
             begin_row(active, rows)
-            rows.held[active, table.owner[entry]] = table.side[entry]
-            rows.response[table.owner[entry], active] = table.side[entry]
-            rows.change[active, table.owner[entry]] = rate * table.side[entry]
+            rows.held[active, owner[entry]] = side[entry]
+            rows.response[owner[entry], active] = side[entry]
+            rows.change[active, owner[entry]] = rate * side[entry]
             active += 1
     for place in range(assembly.begin[DRY_JOINT], assembly.until[DRY_JOINT]):
         if mode[place] == STICK:
             entry = assembly.candidate[place]
             begin_row(active, rows)
-            rows.held[active, table.owner[entry]] = 1.0
-            rows.response[table.owner[entry], active] = 1.0
+            rows.held[active, owner[entry]] = 1.0
+            rows.response[owner[entry], active] = 1.0
             active += 1
     return active
 
