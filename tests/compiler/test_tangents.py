@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from math import cos, sin
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ def number(value: Any, given: dict[str, Floats]) -> float:
 @kernel
 def everything(x: Floats, y: Floats, result: Floats) -> None:
     """All operations that a tape knows."""
-    result[0] = math.sin(x[0] * y[0]) / (2.0 + math.cos(x[1]))
+    result[0] = sin(x[0] * y[0]) / (2.0 + cos(x[1]))
     result[1] = -x[0] + y[0] * y[0] - 3.0
     result[2] = inverse_above(x[1], 0.5) * y[1]
     result[3] = 7.0
