@@ -250,6 +250,23 @@ def test_a_law_that_answers_closes_the_loop() -> None:
         assert error <= ENOUGH
 
 
+def test_a_point_that_bounces_within_a_step_leaves_with_a_part_of_its_speed() -> None:
+    """v⁺ = −e v, wherever it was; positions arrive on the ground, whatever the speed."""
+    robot, nq = mechanisms.point(), mechanisms.point().nq
+    x = robot.reference_state().vector.copy()
+    x[1] += 1e-4 - hs.contact_kinematics(robot, x[:nq], x[nq:]).gap[0]
+    x[nq + 1] = -1.0
+    simulation = hs.Simulation(
+        robot, state=hs.State(x[:nq], x[nq:]), ground=hs.Ground(restitution=0.5),
+        method=hs.TimeStepping(step=1e-3), stop_when_fallen=False,
+    )  # fmt: skip
+    found = hs.step_derivatives(simulation).state
+    assert simulation.state.v[1] == pytest.approx(0.5, abs=1e-12)
+    assert found[nq + 1, nq + 1] == pytest.approx(-0.5, abs=1e-12)
+    assert found[nq + 1, 1] == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(found[1, [1, nq + 1]], 0.0, atol=1e-12)
+
+
 FINE = hs.EventDriven(rtol=1e-13, atol=1e-14)
 
 

@@ -31,6 +31,9 @@ def refuse_step(simulation: Simulation) -> None:
             push.end > simulation.time - _step(simulation) and push.start < simulation.time
             for push in simulation._pushes
         ),
+        "a motor on its speed-torque line, or under a voltage,": bool(
+            np.any(simulation._memory.torque != simulation._memory.command)
+        ),
         "a wedge": bool(simulation._work.impact.relaxed),
         "restitution that is scaled back": bool(
             simulation._work.impact.gains and simulation._work.impact.bounded
