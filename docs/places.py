@@ -1,4 +1,4 @@
-"""What the functions that a page leads to say of themselves, at its end: in the page's own order."""
+"""What the functions a page leads to say of themselves, at its end, in the order of the page."""
 
 from __future__ import annotations
 

@@ -24,11 +24,9 @@ GROUNDS = {
 """Kinds of ground that have a name, and how each is written."""
 
 AHEAD = 0.5
-"""Where stairs and roughness begin, in m: in front of the feet of the start."""
+"""Where stairs begin, in m: in front of the feet of the start, as rough ground does."""
 STAIRS = 100
 """Number of stairs."""
-SPACING, ROUGH_LENGTH = 0.1, 100.0
-"""Distance between the corners of rough ground, and how far it is rough, in m."""
 LARGEST_FILE = 2**20
 """Bytes of the largest file of corners that is read."""
 
@@ -79,9 +77,7 @@ def ground_called(words: str, *, friction: float = 0.75, restitution: float = 0.
             case ["rough", height, seed]:
                 if not seed.isdecimal():
                     raise SimulationError(f"{where}: the seed is a whole number, not {seed!r}.")
-                amplitude = number(height)
-                rough = partial(Ground.rough, spacing=SPACING, length=ROUGH_LENGTH, start=AHEAD)
-                shaped = partial(rough, amplitude=amplitude, seed=int(seed))
+                shaped = partial(Ground.rough, amplitude=number(height), seed=int(seed))
             case _:
                 raise SimulationError(f"{where}: write {GROUNDS[kind]}.")
     try:

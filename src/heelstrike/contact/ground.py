@@ -193,9 +193,9 @@ class Ground(ShownInNotebooks):
         cls,
         *,
         amplitude: float,
-        spacing: float,
-        length: float,
         seed: int,
+        spacing: float = 0.1,
+        length: float = 100.0,
         start: float = 0.5,
         friction: ArrayLike = 0.75,
         restitution: ArrayLike = 0.0,
@@ -206,14 +206,14 @@ class Ground(ShownInNotebooks):
         ----------
         amplitude : float
             Greatest height or depth of a corner (m).
+        seed : int
+            Of the random heights; the same seed gives the same ground.
         spacing : float
             Distance between corners (m).
         length : float
             How far it is rough (m).
-        seed : int
-            Of the random heights; the same seed gives the same ground.
         start : float
-            Where it begins to be rough (m).
+            Where it begins to be rough (m): in front of the feet of most robots.
         friction, restitution : float or array
             As for the class.
 

@@ -45,7 +45,8 @@ LAID_OUT = """() => {
     if (!(each.getAttribute("aria-label") || each.textContent.trim() || each.labels?.length))
       wrong.push(`${each.tagName} ${each.id} has no name`);
   for (const each of document.querySelectorAll("#sliders b"))
-    if (shown(each) && each.scrollWidth > each.clientWidth) wrong.push(`${each.textContent} is cut`);
+    if (shown(each) && each.scrollWidth > each.clientWidth)
+      wrong.push(`${each.textContent} is cut`);
   const side = document.getElementById("side");
   if (innerWidth >= 1440 && side.scrollHeight > side.clientHeight) wrong.push("a panel is cut");
   const plane = document.getElementById("plane").getBoundingClientRect();
