@@ -116,7 +116,8 @@ class AskedAlong:
     def __init__(self, simulation: Simulation, controller: Controller) -> None:
         law = law_of(controller)
         if law is None or not law.function.compiles or law.commands_voltage:
-            wrong = "commands voltages" if law is not None and law.function.compiles else "is not"
+            compiled = law is not None and law.function.compiles
+            wrong = "commands voltages" if compiled else "is sampled, in Python"
             raise SimulationError(
                 f"only a compiled controller that asks for torques can be linearised; this one "
                 f"{wrong}. hs.find_limit_cycle takes differences of whole steps instead"
