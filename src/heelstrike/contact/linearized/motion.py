@@ -177,6 +177,8 @@ def linearize_impact(
     ground : Ground, optional
         Level or sloping ground; ``Ground()`` by default. Points bounce by its restitution if they
         come down, joints do not.
+    numbers : sequence of str
+        Numbers by which to differentiate too, as of :func:`linearize_contact`.
 
     Returns
     -------

@@ -69,6 +69,11 @@ class StepDerivatives:
             Changes of the state at the beginning and of the torques.
         numbers, gains : mapping of str to (k,) array
             Changes of those that were asked for.
+
+        Returns
+        -------
+        (nq + nv,) float
+            The change.
         """
         change = self.state @ np.broadcast_to(state, len(self.state))
         change = change + self.torque @ np.broadcast_to(torque, self.torque.shape[1])
@@ -84,6 +89,11 @@ class StepDerivatives:
         ----------
         gradient : (nq + nv,) array
             Its gradient by that state.
+
+        Returns
+        -------
+        Gradient
+            By the state at the beginning, the torques and the numbers.
         """
         back = np.asarray(gradient, np.float64)
         return Gradient(
@@ -149,6 +159,11 @@ class RunDerivatives:
         ----------
         gradient : (nq + nv,) or (steps + 1, nq + nv) array
             Its gradient by the last state, or by that at the beginning and those after every step.
+
+        Returns
+        -------
+        Gradient
+            By the state at the beginning, the torques of every step and the numbers.
         """
         given, size = np.asarray(gradient, np.float64), len(self.steps[0].state)
         by_states = np.zeros((len(self.steps) + 1, size))
