@@ -19,7 +19,7 @@ from heelstrike.sim.linearized.flow import Variation
 from heelstrike.sim.linearized.inputs import LAW, TORQUE, Inputs, inputs_of
 from heelstrike.sim.linearized.law import AskedAlong, parameter_sizes
 from heelstrike.sim.linearized.mode_changes import ModeChange, other_modes
-from heelstrike.sim.linearized.refusals import refuse_step
+from heelstrike.sim.linearized.refusals import refuse_inputs, refuse_step
 from heelstrike.sim.linearized.step import linearized
 from heelstrike.sim.linearized.time_step import allocate_slopes, differentiate_step
 from heelstrike.sim.simulation import Simulation
@@ -306,6 +306,7 @@ def _stepper(
     sizes = parameter_sizes(simulation.controller, gains)
     inputs = inputs_of(simulation.robot, numbers, sizes)
     if isinstance(simulation.method, TimeStepping):
+        refuse_inputs(simulation.method.scheme, inputs)
         return _TimeSteps(simulation, inputs, answers)
     if isinstance(simulation.method, EventDriven):
         return _Flows(simulation, inputs, answers)

@@ -7,11 +7,36 @@ import numpy as np
 from heelstrike.contact.modes import OPEN
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.errors import SimulationError
+from heelstrike.sim.closed_sets import Scheme
 from heelstrike.sim.contacts.rows import POINT, SECOND_FACE
+from heelstrike.sim.linearized.inputs import Inputs
 from heelstrike.sim.simulation import Simulation
 
 ONE_NORMAL = 1e-12
 """Normals that differ by less are those of one face of the ground."""
+
+
+IMPLICIT = (Scheme.MOREAU_JEAN, Scheme.LINEARLY_IMPLICIT)
+"""Schemes that take springs and dampers ahead, into the mass matrix."""
+
+
+def refuse_inputs(scheme: Scheme, inputs: Inputs) -> None:
+    """Refuse numbers that are in the mass matrix of a step, which is not differentiated by them.
+
+    Raises
+    ------
+    SimulationError
+        That names them.
+    """
+    ahead = [name for name in inputs.numbers if name in ("stiffness", "damping")]
+    wrong = ahead if scheme in IMPLICIT else []
+    if scheme is Scheme.LINEARLY_IMPLICIT:
+        wrong += inputs.parameters
+    if wrong:
+        raise SimulationError(
+            f"Scheme.{scheme.name} takes {', '.join(wrong)} into the mass matrix, which is not "
+            "differentiated by them; use Scheme.IMPACT_RESOLVED"
+        )
 
 
 def refuse_step(simulation: Simulation) -> None:
