@@ -88,17 +88,20 @@ def usual() -> dict[str, dict[str, Any]]:
         "monodromy": walked,
         "optimize_gait": {"robot": robot},
         "report": {"runs": [], "path": "report.html"},
+        "run_derivatives": {"simulation": hs.Simulation(**walked), "until": 0.001},
         "saltation_matrix": {"reset": ONE, "gradient": FLAT, "before": FLAT, "after": FLAT},
         "simulate": {**walked, "duration": 0.1},
         "simulate_batch": {**walked, "duration": 0.1},
         "solve_contact": {"delassus": ONE, "free": FLAT, "friction": 0.5},
         "solve_quadratic_program": {"hessian": ONE, "gradient": FLAT},
+        "step_derivatives": {"simulation": hs.Simulation(**walked)},
         "zero_dynamics": {"gait": PhasedGait()},
     }
 
 
-RESULTS = """ActiveContacts Batch DisturbanceResponse Floquet Gait Largest LimitCycle Monodromy
-PhasedGait Robot Run Snapshot StepFamily ZeroDynamics"""
+RESULTS = """ActiveContacts Batch DisturbanceResponse Floquet Gait Gradient Largest LimitCycle
+ModeChange Monodromy PhasedGait Robot Run RunDerivatives Snapshot StepDerivatives StepFamily
+ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
 TOLD_APART = """Bundle Constraint EndOfRun GaitLQR GroundShape SteppingConstraints
 VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell controller number part

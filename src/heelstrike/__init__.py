@@ -137,6 +137,12 @@ if TYPE_CHECKING:
     from heelstrike.sim import load_snapshot as load_snapshot
     from heelstrike.sim import simulate as simulate
     from heelstrike.sim import simulate_batch as simulate_batch
+    from heelstrike.sim.linearized.derivatives import Gradient as Gradient
+    from heelstrike.sim.linearized.derivatives import RunDerivatives as RunDerivatives
+    from heelstrike.sim.linearized.derivatives import StepDerivatives as StepDerivatives
+    from heelstrike.sim.linearized.derivatives import run_derivatives as run_derivatives
+    from heelstrike.sim.linearized.derivatives import step_derivatives as step_derivatives
+    from heelstrike.sim.linearized.mode_changes import ModeChange as ModeChange
     from heelstrike.view.live import watch as watch
     from heelstrike.view.report import report as report
 
@@ -170,6 +176,7 @@ _HOME = {
     "Gait": "heelstrike.gait",
     "GaitError": "heelstrike.errors",
     "GaitLQR": "heelstrike.control",
+    "Gradient": "heelstrike.sim.linearized.derivatives",
     "Ground": "heelstrike.contact",
     "GroundShape": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
@@ -182,6 +189,7 @@ _HOME = {
     "Largest": "heelstrike.analysis.stability.largest",
     "LimitCycle": "heelstrike.analysis.limit_cycle",
     "LimitCycleError": "heelstrike.errors",
+    "ModeChange": "heelstrike.sim.linearized.mode_changes",
     "Monodromy": "heelstrike.analysis.stability.monodromy",
     "PhasedGait": "heelstrike.gait",
     "Push": "heelstrike.sim",
@@ -190,6 +198,7 @@ _HOME = {
     "RobotError": "heelstrike.errors",
     "RobotWarning": "heelstrike.robot",
     "Run": "heelstrike.sim",
+    "RunDerivatives": "heelstrike.sim.linearized.derivatives",
     "RunFileError": "heelstrike.errors",
     "RunStatus": "heelstrike.sim",
     "Scheme": "heelstrike.sim",
@@ -201,6 +210,7 @@ _HOME = {
     "SpringMass": "heelstrike.experiments.spring_mass",
     "StandingLQR": "heelstrike.control",
     "State": "heelstrike.robot",
+    "StepDerivatives": "heelstrike.sim.linearized.derivatives",
     "StepFamily": "heelstrike.gait",
     "SteppingConstraints": "heelstrike.control",
     "TimeStepping": "heelstrike.sim",
@@ -242,11 +252,13 @@ _HOME = {
     "optimize_gait": "heelstrike.gait",
     "part": "heelstrike.compiler.bundle",
     "report": "heelstrike.view.report",
+    "run_derivatives": "heelstrike.sim.linearized.derivatives",
     "saltation_matrix": "heelstrike.contact",
     "simulate": "heelstrike.sim",
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",
     "solve_quadratic_program": "heelstrike.control",
+    "step_derivatives": "heelstrike.sim.linearized.derivatives",
     "watch": "heelstrike.view.live",
     "zero_dynamics": "heelstrike.analysis.stability.zero_dynamics",
 }

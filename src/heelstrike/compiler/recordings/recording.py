@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.compilation import kernel, uncompiled
 from heelstrike.compiler.recordings import tape
+from heelstrike.compiler.recordings.tangents import tangents
 from heelstrike.compiler.recordings.tape import Entry, Symbols, Tape, Value
 from heelstrike.field_texts import dataclass
 
@@ -44,14 +46,22 @@ class Program:
     afterwards."""
     name: str = ""
     """Name of the function that is made of it; else the kernel's."""
+    derivatives: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
+    """Arrays of arguments that the kernel does not take and that receive derivatives, (m, k): each
+    with the array that the kernel has written, of m numbers, and those of k numbers by which."""
 
     def __post_init__(self) -> None:
         if not self.name:
             object.__setattr__(self, "name", self.kernel.__name__)
 
+    def structural(self, name: str, value: Any) -> Any:
+        """Tell which numbers of an array of the model are so in all robots that share the code."""
+        by = {each for _, entries in self.derivatives.values() for each in entries}
+        return np.zeros(value.shape, dtype=bool) if name in by else _structural(value)
+
     def description(self) -> bytes:
         """What its recording depends on besides the source of its kernel."""
-        parts = [self.name, *self.scratch]
+        parts = [self.name, *self.scratch, repr(sorted(self.derivatives.items()))]
         for name, value in self._members():
             parts.append(name)
             if isinstance(value, Bundle):  # it does not take part
@@ -59,7 +69,7 @@ class Program:
             if not _is_floats(value):
                 parts.append(repr(np.asarray(value).tolist()))
             elif name.split(".")[0] == CONSTANT:
-                parts.append(repr(np.where(_structural(value), value, 2.0).tolist()))
+                parts.append(repr(np.where(self.structural(name, value), value, 2.0).tolist()))
             else:
                 parts.append(repr(value.shape))
         return "\0".join(parts).encode()
@@ -105,7 +115,10 @@ class Recording:
         self.tape = Tape()
         self.arrays: dict[str, Symbols] = {}
         operands: list[Any] = []
+        receiving = {name.split(".")[0] for name in program.derivatives}
         for name, argument in program.arguments.items():
+            if name in receiving:
+                continue
             if isinstance(argument, Bundle):
                 cells = any(member.role == "cell" for member in argument.declared.values())
                 if cells and not program.leaves_unread(name):
@@ -117,14 +130,18 @@ class Recording:
                 operands.append(type(argument)(**members))
             else:
                 operands.append(self._symbols(name, argument, known or {}))
+        began = {name: array.copy() for name, array in self.arrays.items()}
         uncompiled(program.kernel, replace=_RECORDED)(*operands)
+        for name, (of, by) in program.derivatives.items():
+            entries = np.concatenate([began[each].ravel() for each in by])
+            self.arrays[name] = tangents(self.arrays[of].ravel(), list(entries))
 
     def _symbols(self, name: str, value: Any, known: Mapping[str, Symbols]) -> Any:
         if not _is_floats(value):
             return value
         array = self.tape.array(name, value.shape)
         if name.split(".")[0] == CONSTANT:
-            structural = _structural(value)
+            structural = self.program.structural(name, value)
             array[structural] = value[structural].astype(float)
         elif name in known:
             for index, entry in enumerate(known[name].astype(object).flat):

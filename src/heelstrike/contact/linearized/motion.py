@@ -2,32 +2,28 @@
 
 Between two events a robot moves under equations, those of the contact points that rest or slide, of
 joints at their stops and of its loops; an impact is an equation between two velocities. Both are
-linearised here from the traced kernels. With the formula of :func:`saltation_matrix` they are all
+linearised here from the kernels' tape. With the formula of :func:`saltation_matrix` they are all
 that the linearisation of a walk is made of.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.linearized.partials import chosen_numbers, differentiated
 from heelstrike.contact.linearized.slopes import plane
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics.loops import count_rows
-from heelstrike.dynamics.places import write_point_rows
 from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
-from heelstrike.dynamics.queries.linearization import implicit_motion, solved
+from heelstrike.dynamics.queries.linearization import solved
 from heelstrike.errors import ContactProblemError, RobotError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
-
-if TYPE_CHECKING:
-    import casadi
 
 GRAZING = 1e-9
 """An event whose function changes more slowly than this, of unit gradient, is a graze."""
@@ -61,6 +57,9 @@ class PhaseLinearization:
     """(nq + nv, nu) Derivative by the joint torques."""
     rate: Floats
     """(nq + nv,) (v, v̇) itself."""
+    by_numbers: Floats
+    """(nq + nv, k) Derivative of (v, v̇) by the numbers that were asked for, the ground's friction
+    last."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -71,6 +70,9 @@ class ImpactLinearization:
     """(nv,) Velocity after it."""
     reset: Floats
     """(nq + nv, nq + nv) Derivative of the state after by the state before, DΔ."""
+    by_numbers: Floats
+    """(nq + nv, k) Derivative of the state after by the numbers that were asked for, the ground's
+    friction last."""
 
 
 @takes(ContactProblemError)
@@ -82,6 +84,7 @@ def linearize_contact(
     active: ActiveContacts,
     *,
     ground: Ground | None = None,
+    numbers: Sequence[str] = (),
 ) -> PhaseLinearization:
     """Linearise the motion of a robot on the ground while its contacts stay as they are.
 
@@ -100,6 +103,9 @@ def linearize_contact(
         What holds. Redundant points, such as heel and toe of one flat foot, are welcome.
     ground : Ground, optional
         Level or sloping ground; ``Ground()`` by default.
+    numbers : sequence of str
+        Numbers by which to differentiate too: ``"friction"`` of the ground, ``"mass"`` and others
+        of the robot's :class:`~heelstrike.robot.model.Model`, all of a name.
 
     Returns
     -------
@@ -111,7 +117,7 @@ def linearize_contact(
     RobotError
         If a vector has the wrong length or there is no such point or joint.
     SimulationError
-        If the ground is not one line.
+        If the ground is not one line, or there is no such number.
 
     Examples
     --------
@@ -122,17 +128,30 @@ def linearize_contact(
     >>> hs.linearize_contact(robot, state.q, state.v, [0.0] * robot.nu, held).A.shape
     (18, 18)
     """
-    position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
-    gamma = joint_vector(robot, "torque", torque)
-    flow, slopes, _ = _equations(robot, _checked(robot, active), *plane(ground))
-    solution, by_state, by_torque = implicit_motion(flow, slopes, position, velocity, gamma)
-    n = robot.nv
-    upper = np.hstack([np.zeros((robot.nq, robot.nq)), np.eye(robot.nq, n)])
-    return PhaseLinearization(
-        A=np.vstack([upper, by_state[:n]]),
-        B=np.vstack([np.zeros((robot.nq, robot.nu)), by_torque[:n]]),
-        rate=np.concatenate([velocity, solution[:n]]),
+    held = _Held(robot, q, v, active, ground, numbers)
+    gamma = held.spread(joint_vector(robot, "torque", torque))
+    at, nv, nq = held.at, robot.nv, robot.nq
+    at.look(ahead=1.0)
+    held.find_rows()
+    solution = held.solved(np.concatenate([gamma - at.balance.lacking, -held.rates()])[:, None])[
+        :, 0
+    ]
+    force = solution[nv:]
+    at.look(ahead=1.0, going=solution[:nv], acceleration=solution[:nv], **held.forces(force))
+    own = at.partials
+    by_state = np.hstack([held.change("q"), held.change("v")])
+    lacking = np.hstack([own.lacking_by_q, own.lacking_by_v])
+    right = np.zeros((len(solution), by_state.shape[1] + robot.nu + held.columns))
+    right[:nv, : nq + nv], right[nv:, : nq + nv] = -lacking, -by_state
+    right[robot.model.actuator_joint, nq + nv + np.arange(robot.nu)] = 1.0
+    right[:nv, nq + nv + robot.nu :] = held.by_numbers(own.lacking_by_numbers, force)
+    found = held.solved(right)[:nv]
+    A, B, by_numbers = np.split(
+        np.vstack([np.zeros((nq, right.shape[1])), found]), [nq + nv, nq + nv + robot.nu], axis=1
     )
+    A[:nq, nq:] = np.eye(nq, nv)
+    rate = np.concatenate([at.balance.v, solution[:nv]])
+    return PhaseLinearization(A=A, B=B, rate=rate, by_numbers=by_numbers)
 
 
 @takes(ContactProblemError)
@@ -143,6 +162,7 @@ def linearize_impact(
     active: ActiveContacts,
     *,
     ground: Ground | None = None,
+    numbers: Sequence[str] = (),
 ) -> ImpactLinearization:
     """Linearise an impact: the velocity after it, and the derivative of the state after it.
 
@@ -157,6 +177,8 @@ def linearize_impact(
     ground : Ground, optional
         Level or sloping ground; ``Ground()`` by default. Points bounce by its restitution if they
         come down, joints do not.
+    numbers : sequence of str
+        Numbers by which to differentiate too, as of :func:`linearize_contact`.
 
     Returns
     -------
@@ -168,7 +190,7 @@ def linearize_impact(
     RobotError
         If a vector has the wrong length or there is no such point or joint.
     SimulationError
-        If the ground is not one line.
+        If the ground is not one line, or there is no such number.
 
     Examples
     --------
@@ -181,17 +203,30 @@ def linearize_impact(
     >>> bool(abs(still).max() < 1e-12)
     True
     """
-    position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
-    _, _, slopes = _equations(robot, _checked(robot, active), *plane(ground))
-    n, m = robot.nv, slopes.size1_in(2)
-    nothing = np.zeros(m)
-    system, _, by_velocity, _ = map(np.array, slopes(position, velocity, nothing))
-    constant = np.array(slopes(position, velocity, nothing)[3])
-    solution = solved(system, -constant.reshape(-1, 1), n)[:, 0]
-    by_position = np.array(slopes(position, velocity, solution)[1])
-    after = solved(system, -np.hstack([by_position, by_velocity]), n)[:n]
-    upper = np.hstack([np.eye(robot.nq), np.zeros((robot.nq, n))])
-    return ImpactLinearization(velocity=solution[:n], reset=np.vstack([upper, after]))
+    held = _Held(robot, q, v, active, ground, numbers)
+    at, nv, nq = held.at, robot.nv, robot.nq
+    v_before = at.balance.v
+    at.look(ahead=0.0, going=v_before)
+    held.find_rows()
+    came = held.rates()
+    # Points that are on their way up are not thrown down.
+    back = held.bounces * (came < GRAZING)
+    resting = {name: value.copy() for name, value in at.partials.members().items()}
+    before = held.change("q")
+    momentum = at.balance.matrix @ v_before
+    solution = held.solved(np.concatenate([momentum, -back * came])[:, None])[:, 0]
+    after, force = solution[:nv], solution[nv:]
+    at.look(ahead=0.0, going=after, acceleration=after - v_before, **held.forces(force))
+    right = np.zeros((len(solution), nq + nv + held.columns))
+    right[:nv, :nq] = resting["lacking_by_q"] - at.partials.lacking_by_q
+    right[nv:, :nq] = -held.change("q") - back[:, None] * before
+    right[:nv, nq : nq + nv] = at.balance.matrix
+    right[nv:, nq : nq + nv] = -back[:, None] * held.rows
+    numbers_alone = at.partials.lacking_by_numbers - resting["lacking_by_numbers"]
+    right[:nv, nq + nv :] = held.by_numbers(numbers_alone, force)
+    found = held.solved(right)[:nv]
+    reset, by_numbers = np.split(np.vstack([np.eye(nq, right.shape[1]), found]), [nq + nv], axis=1)
+    return ImpactLinearization(velocity=after, reset=reset, by_numbers=by_numbers)
 
 
 @takes(ContactProblemError)
@@ -263,98 +298,88 @@ def _checked(robot: Robot, active: ActiveContacts) -> ActiveContacts:
     return active
 
 
-@lru_cache(maxsize=64)
-def _equations(
-    robot: Robot, active: ActiveContacts, normal: tuple[float, float], friction: float,
-    restitution: float,
-) -> tuple[casadi.Function, casadi.Function, casadi.Function]:  # fmt: skip
-    """Equations of motion under the contacts, their Jacobians, and those of an impact.
+class _Held:
+    """Equations of a robot under contacts: rows J of what is held, and rows P of its forces.
 
-    The motion's are functions of (q, v, (v̇, λ), Γ) with Jacobians by (v̇, λ), (q, v) and Γ; the
-    impact's of (q, v⁻, (v⁺, p)), given as Jacobians by (v⁺, p), q, v⁻ and the equations themselves.
+    They differ where a point slides: its friction acts with its normal force.
     """
-    import casadi
 
-    from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
+    def __init__(
+        self, robot: Robot, q: ArrayLike, v: ArrayLike, active: ActiveContacts,
+        ground: Ground | None, numbers: Sequence[str],
+    ) -> None:  # fmt: skip
+        normal, friction, restitution = plane(ground)
+        position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
+        self._robot, self._active = robot, _checked(robot, active)
+        dynamic, self._rubs = chosen_numbers(numbers)
+        self.at = differentiated(robot.model, dynamic)
+        self.at.place(position, velocity, normal)
+        self.columns = self.at.partials.lacking_by_numbers.shape[1] + self._rubs
+        model = robot.model
+        self._scale = model.friction_scale
+        self._way = {point: -way * friction * self._scale[point] for point, way in active.sliding}
+        self._points = [
+            row
+            for point in dict.fromkeys(active.points)
+            for row in ((2 * point,) if point in self._way else (2 * point, 2 * point + 1))
+        ]
+        ends = len(self._points), len(active.joints), count_rows(model)
+        self._split = np.cumsum(ends)
+        back = restitution * model.restitution_scale
+        self.bounces = np.zeros(sum(ends))
+        self.bounces[: ends[0]] = [back[row // 2] * (row % 2 == 0) for row in self._points]
 
-    n = robot.nv
-    sizes = {"q": robot.nq, "v": n, "acceleration": n, "torque": robot.nu}
-    q, v, acceleration, torque = (casadi.SX.sym(name, size) for name, size in sizes.items())
-    at = TracedDynamics(robot, symbols(q), symbols(v))
-    rows, bias, pushes, bounces = _rows(at, active, normal, friction, restitution)
-    force = casadi.SX.sym("force", rows.size1())
-    motion = at.inverse_dynamics(symbols(acceleration)) - at.passive_force()
-    motion[robot.model.actuator_joint] -= symbols(torque)
-    moved = casadi.vertcat(expression(motion) - pushes.T @ force, rows @ acceleration + bias)
-    mass = expression(at.mass_matrix())
-    came = rows @ v
-    # Points that are on their way up are not thrown down.
-    thrown = casadi.DM(bounces) * (came < GRAZING) * came
-    collided = casadi.vertcat(
-        mass @ (acceleration - v) - pushes.T @ force, rows @ acceleration + thrown
-    )
-    unknown = casadi.vertcat(acceleration, force)
-    ways = unknown, casadi.vertcat(q, v), torque
-    given = casadi.SX.sym("unknown", n + rows.size1())
-    arguments = [q, v, given, torque]
+    def find_rows(self) -> None:
+        """Take the rows of what is held from where the equations are looked at."""
+        rows, loops = self.at.balance.rows, self.at.loops.jacobian
+        joints = np.eye(self._robot.nv)[list(self._active.joints)]
+        self.rows = np.vstack([rows[self._points], joints, loops])
+        pushes = self.rows.copy()
+        for place, row in enumerate(self._points):
+            pushes[place] += self._way.get(row // 2, 0.0) * rows[row // 2 * 2 + 1]
+        n, m = self._robot.nv, len(self.rows)
+        self._system = np.zeros((n + m, n + m))
+        self._system[:n, :n], self._system[:n, n:] = self.at.balance.matrix, -pushes.T
+        self._system[n:, :n] = self.rows
 
-    def of(value: Any) -> Any:
-        return casadi.densify(casadi.substitute(value, unknown, given))
+    def spread(self, torque: Floats) -> Floats:
+        """Return generalised forces of torques."""
+        force = np.zeros(self._robot.nv)
+        force[self._robot.model.actuator_joint] = torque
+        return force
 
-    return (
-        casadi.Function("motion", arguments, [of(moved)]),
-        casadi.Function("slopes", arguments, [of(casadi.jacobian(moved, x)) for x in ways]),
-        casadi.Function(
-            "impact", arguments[:3],
-            [*(of(casadi.jacobian(collided, x)) for x in (unknown, q, v)), of(collided)],
-        ),
-    )  # fmt: skip
+    def rates(self) -> Floats:
+        """How what is held goes: s."""
+        balance, joints = self.at.balance, list(self._active.joints)
+        still = balance.going[joints] if balance.ahead[0] == 0.0 else np.zeros(len(joints))
+        return np.concatenate([balance.along[self._points], still, balance.loop_along])
 
+    def change(self, x: str) -> Floats:
+        """Derivative of s by q or v, but for what x is in it."""
+        partials = self.at.partials
+        along, loops = getattr(partials, f"along_by_{x}"), getattr(partials, f"loop_along_by_{x}")
+        joints = np.zeros((len(self._active.joints), along.shape[1]))
+        return np.vstack([along[self._points], joints, loops])
 
-def _rows(
-    at: Any, active: ActiveContacts, normal: tuple[float, float], friction: float,
-    restitution: float,
-) -> tuple[Any, Any, Any, list[float]]:  # fmt: skip
-    """Rows J of what is held, J̇v, rows along which forces act, and how much of J v⁻ comes back."""
-    import casadi
+    def forces(self, found: Floats) -> dict[str, Floats]:
+        """Return what holds, by points and loops."""
+        push = np.zeros((self._robot.nc, 2))
+        for row, force in zip(self._points, found, strict=False):
+            push[divmod(row, 2)] = force
+            if row // 2 in self._way:
+                push[row // 2, 1] = self._way[row // 2] * force
+        return {"push": push, "pull": found[self._split[1] :]}
 
-    from heelstrike.dynamics.queries.symbolic import expression
+    def by_numbers(self, lacking: Floats, found: Floats) -> Floats:
+        """Force by numbers of the robot, then by the ground's friction."""
+        friction = np.zeros((self._robot.nv, int(self._rubs)))
+        ways = dict(self._active.sliding)
+        for row, force in zip(self._points, found, strict=False):
+            if self._rubs and row // 2 in ways:
+                along = -ways[row // 2] * self._scale[row // 2] * force
+                friction[:, 0] += along * self.at.balance.rows[row + 1]
+        return np.hstack([-lacking, friction])
 
-    model, up = at.model, np.array(normal)
-    directions = dict(active.sliding)
-    rows, bias, pushes, bounces = [], [], [], []
-    for i, link, center in at.contact_centers(active.points):
-        radius = float(model.contact_radius[i])
-        x, z, turn = at.bias_acceleration(link, center)
-        two = at.zeros(2, model.nv)
-        at.run(write_point_rows, model, at.work, link, center - radius * up, up, 0, two)
-        rows.append(two[0])
-        bias.append(up[0] * x + up[1] * z)
-        bounces.append(restitution * float(model.restitution_scale[i]))
-        if i in directions:
-            rubbing = friction * float(model.friction_scale[i])
-            pushes.append(two[0] - directions[i] * rubbing * two[1])
-        else:
-            rows.append(two[1])
-            bias.append(up[1] * x - up[0] * z - radius * turn)
-            pushes += list(two)
-            bounces.append(0.0)
-    for joint in active.joints:
-        unit = at.zeros(model.nv)
-        unit[joint] = 1.0
-        rows.append(unit)
-        pushes.append(unit)
-        bias.append(0.0)
-        bounces.append(0.0)
-    if count_rows(model):
-        loops = list(at.loop_jacobian())
-        rows += loops
-        pushes += loops
-        bias += list(at.loop_bias_acceleration())
-        bounces += [0.0] * len(loops)
-    if not rows:
-        empty = casadi.SX(0, model.nv)
-        return empty, casadi.SX(0, 1), empty, bounces
-    return (
-        expression(np.array(rows)), casadi.vertcat(*bias), expression(np.array(pushes)), bounces,
-    )  # fmt: skip
+    def solved(self, right: Floats) -> Floats:
+        """Solve for accelerations or velocities, then forces."""
+        return solved(self._system, right, self._robot.nv)

@@ -46,6 +46,7 @@ class Strike:
 def strikes(
     robot: Robot, q: Floats, v: Floats, rate: Floats, torque: Floats,
     order: Sequence[tuple[Floats, ActiveContacts]], ground: Ground | None = None,
+    numbers: Sequence[str] = (),
 ) -> list[Strike]:  # fmt: skip
     """Let contact points, or joints at stops, come down in an order.
 
@@ -61,7 +62,7 @@ def strikes(
         Joint torques afterwards.
     order : sequence of ((nq + nv,) float, ActiveContacts)
         Of each the derivative of its gap, and what takes part in its impact and holds after it.
-    ground : Ground, optional
+    ground, numbers
         As of :func:`~heelstrike.linearize_impact`.
 
     Returns
@@ -73,7 +74,7 @@ def strikes(
     for gradient, active in order:
         if found and gradient @ rate >= 0.0:
             return []
-        impact = linearize_impact(robot, q, v, active, ground=ground)
+        impact = linearize_impact(robot, q, v, active, ground=ground, numbers=numbers)
         v, before = impact.velocity, rate
         rate = linearize_contact(robot, q, v, torque, active, ground=ground).rate
         found.append(Strike(gradient, before, rate, impact))

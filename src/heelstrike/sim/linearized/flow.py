@@ -2,40 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any
-
 import numpy as np
 from numpy.polynomial import Polynomial, legendre
 from numpy.typing import NDArray
 
 from heelstrike.contact.linearized.motion import ActiveContacts, linearize_contact
-from heelstrike.contact.linearized.slopes import ContactSlopes, contact_slopes
-from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
 from heelstrike.errors import SimulationError
-from heelstrike.robot.state import State
-from heelstrike.sim.controller.in_python import AskedLaw
-from heelstrike.sim.controller.interface import Contacts, Controller
-from heelstrike.sim.controller.law import law_of
+from heelstrike.sim.controller.interface import Controller
+from heelstrike.sim.linearized.inputs import NONE, TORQUE, Inputs
+from heelstrike.sim.linearized.law import AskedAlong
 from heelstrike.sim.simulation import Simulation
 
 Floats = NDArray[np.float64]
 
-PANEL = 0.005
-"""Longest stretch of time (s) that is taken at once: gaits are smooth by pieces only."""
+PANEL, ALONE = 0.005, 0.05
+"""Longest stretch of time (s) that is taken at once under a law, as gaits are smooth by pieces
+only; and without one."""
 
 FASTEST = 0.5
 """Longest stretch in parts of the time in which the fastest error of the closed loop changes."""
 
 STAGES = 4
 """Gauss's nodes in it: collocation of order 8."""
-
-DISTURBANCE = 3e-6
-"""Disturbance (m, rad, m/s, rad/s) of the law's derivative: small, as laws have kinks."""
-
-PRESSED = 1e-3
-"""Change of a number that a law remembers, by which is seen whether torques hang on it."""
 
 
 def _rate(slope: Floats) -> float:
@@ -67,6 +55,10 @@ class Variation:
         At its beginning; it is advanced from one node to the next.
     controller : object with ``torque(t, state, contacts)``, or None
         That of the simulation.
+    inputs : Inputs
+        What else may change, k numbers.
+    answers : bool
+        Whether its torques answer to errors, or stay what they are.
 
     Raises
     ------
@@ -74,162 +66,66 @@ class Variation:
         If the controller does not act continuously.
     """
 
-    def __init__(self, simulation: Simulation, controller: Controller | None) -> None:
-        self._simulation = simulation
+    def __init__(
+        self, simulation: Simulation, controller: Controller | None, inputs: Inputs = NONE, *,
+        answers: bool = True,
+    ) -> None:  # fmt: skip
+        self._simulation, self.inputs, self._answers = simulation, inputs, answers
         self._robot, self._ground = simulation.robot, simulation.ground
-        self._asked: AskedLaw | None = None
-        self._first: _Instant | None = None
-        self._constant: dict[str, float] = {}
-        if controller is None:
-            return
-        law = law_of(controller)
-        if law is None or not law.function.compiles or law.period is not None:
+        self._law = None if controller is None else AskedAlong(simulation, controller)
+        if self._law is not None and simulation.control_period > 0.0:
             raise SimulationError(
                 "only a compiled controller that acts continuously can be linearised along a step; "
                 "this one is sampled. hs.find_limit_cycle takes differences instead"
             )
-        if law.commands_voltage:
-            raise SimulationError(
-                "a controller that commands voltages cannot be linearised along a step; "
-                "hs.find_limit_cycle takes differences instead"
-            )
-        self._asked = AskedLaw(self._robot, law, compiled=True)
-        self._first = replace(self._instant(), numbers=self._asked.snapshot())
 
     def flow(self, begin: float, end: float, active: ActiveContacts) -> Floats:
-        """Return what the motion from one time to another does to errors, (nq + nv, nq + nv)."""
+        """Return what the motion from one time to another does to errors and changes of inputs.
+
+        (nq + nv + k, nq + nv + k): inputs stay as they are.
+        """
         size = self._robot.nq + self._robot.nv
-        error = np.eye(size)
-        start, fastest = begin, self._fastest(begin, active)
+        error = np.eye(size + self.inputs.size)
+        longest = ALONE if self._law is None else PANEL
+        start, fastest = begin, _rate(self._slope(begin, active)[:, :size])
         while (left := end - start) > 0.0:
-            span = left / np.ceil(left / min(PANEL, FASTEST / fastest))
-            self._check_memory(start + span * NODES[0])
+            span = left / np.ceil(left / min(longest, FASTEST / fastest))
+            if self._law is not None and self._answers:
+                self._simulation.advance(start + span * NODES[0])
+                self._law.check_memory()
             slopes = [self._slope(start + span * node, active) for node in NODES]
             system = np.eye(STAGES * size)
             for i, j in np.ndindex(STAGES, STAGES):
-                block = span * MATRIX[i, j] * slopes[i]
+                block = span * MATRIX[i, j] * slopes[i][:, :size]
                 system[i * size : (i + 1) * size, j * size : (j + 1) * size] -= block
             rates = np.linalg.solve(system, np.vstack([slope @ error for slope in slopes]))
-            stages = rates.reshape(STAGES, size, size)
-            error = error + span * np.tensordot(WEIGHTS, stages, axes=1)
-            fastest = _rate(slopes[-1])
+            stages = rates.reshape(STAGES, size, error.shape[1])
+            error[:size] += span * np.tensordot(WEIGHTS, stages, axes=1)
+            fastest = _rate(slopes[-1][:, :size])
             start = end if span == left else start + span
-        self._check_beginning()
+        if self._law is not None and self._answers:
+            self._law.check_beginning()
         return error
 
-    def _fastest(self, time: float, active: ActiveContacts) -> float:
-        """How fast errors change at the beginning of a flow (1/s)."""
-        return _rate(self._slope(time, active))
-
     def _slope(self, time: float, active: ActiveContacts) -> Floats:
-        """Derivative of the closed loop's rate by the state."""
-        self._simulation.advance(time)
-        state, nothing = self._simulation.state, np.zeros(self._robot.nu)
-        instant = None if self._asked is None else self._instant()
-        torque = nothing if instant is None else instant.torque()
+        """Derivative of the closed loop's rate by the state and the inputs."""
+        simulation, inputs = self._simulation, self.inputs
+        simulation.advance(time)
+        state, size = simulation.state, self._robot.nq + self._robot.nv
+        law = None if self._law is None else self._law.now()
+        torque = np.zeros(self._robot.nu) if law is None else law.torque()
         found = linearize_contact(
-            self._robot, state.q, state.v, torque, active, ground=self._ground
-        )
-        return found.A if instant is None else found.A + found.B @ instant.gains()
-
-    def _instant(self) -> _Instant:
-        simulation, state = self._simulation, self._simulation.state
-        assert self._asked is not None
-        kept = simulation.snapshot().part("control")
-        numbers = np.concatenate((kept["parameters"], kept["kept"]))
-        at = contact_kinematics(self._robot, state.q, state.v, self._ground)
-        slopes = contact_slopes(self._robot, state.q, state.v, self._ground)
-        force = simulation.contacts.force
-        return _Instant(self._asked, numbers, simulation.time, state, at, slopes, force)
-
-    def _check_beginning(self) -> None:
-        """Refuse a law that acts on what it made of the state in which the step began."""
-        if self._first is None:
-            return
-        first, asked, self._first = self._first, self._first.asked, None
-        changes = DISTURBANCE * np.eye(self._robot.nq + self._robot.nv)
-        first.torque()
-        usual = self._remembered()
-        then = replace(first, numbers=asked.snapshot())
-        seen = []
-        for change in changes:
-            first.torque(change)
-            seen.append(self._remembered())
-        for label, held in usual.items():
-            if any(each[label] != held for each in seen) and self._acts_on(label, then):
-                raise SimulationError(
-                    f"the controller's memory.{label} keeps something of the state in which the "
-                    "step begins and its torques hang on it, which is not linearised here. "
-                    "hs.find_limit_cycle takes differences instead"
-                )
-
-    def _check_memory(self, time: float) -> None:
-        """Refuse a law that acts on something that changes within the step: a state of its own."""
-        if self._asked is None:
-            return
-        self._simulation.advance(time)
-        instant = self._instant()
-        self._asked.restore(instant.numbers)
-        for label, held in self._remembered().items():
-            if self._constant.setdefault(label, held) == held:
-                continue
-            if self._acts_on(label, instant):
-                raise SimulationError(
-                    f"the controller's memory.{label} changes within a step and its torques "
-                    "hang on it: it is a state of its own, which is not linearised here. "
-                    "hs.floquet_multipliers takes differences of whole steps instead"
-                )
-
-    def _remembered(self) -> dict[str, float]:
-        """The numbers of the law's memory now, by name."""
-        return {label: float(values[place]) for label, values, place in self._numbers()}
-
-    def _numbers(self) -> Iterator[tuple[str, Floats, tuple[int, ...]]]:
-        assert self._asked is not None
-        for name, member, values in self._asked.numbers.memory.views():
-            if member.kind is float:
-                for place in np.ndindex(values.shape):
-                    yield f"{name}{list(place) if place else ''}", values, place
-
-    def _acts_on(self, wanted: str, instant: _Instant) -> bool:
-        """Whether torques hang on a number of the memory at an instant."""
-        usual = instant.torque()
-        instant.asked.restore(instant.numbers)
-        for label, values, place in self._numbers():
-            if label == wanted:
-                values[place] += PRESSED
-        pressed = replace(instant, numbers=instant.asked.snapshot())
-        return not np.array_equal(pressed.torque(), usual)
-
-
-@dataclass(frozen=True)
-class _Instant:
-    """A law at an instant: what it remembers, and what it sees."""
-
-    asked: AskedLaw
-    numbers: Any
-    time: float
-    state: State
-    at: ContactKinematics
-    slopes: ContactSlopes
-    force: Floats
-
-    def torque(self, change: Floats | None = None) -> Floats:
-        """What it asks for in a state changed by so little; it forgets the call."""
-        nq = len(self.state.q)
-        change = np.zeros(nq + len(self.state.v)) if change is None else change
-        normal, gap, place = self.at.normal, self.slopes.gap @ change, self.slopes.place @ change
-        along = np.column_stack((normal[:, 1], -normal[:, 0]))
-        seen = Contacts(
-            position=self.at.position + gap[:, None] * normal + place[:, None] * along,
-            normal=normal, gap=self.at.gap + gap, force=self.force,
+            self._robot, state.q, state.v, torque, active, ground=self._ground,
+            numbers=inputs.numbers,
         )  # fmt: skip
-        self.asked.restore(self.numbers)
-        there = State(self.state.q + change[:nq], self.state.v + change[nq:])
-        return self.asked.torque(self.time, there, seen)
-
-    def gains(self) -> Floats:
-        """Derivative of the torques by the state, (nu, nq + nv)."""
-        changes = DISTURBANCE * np.eye(len(self.state.q) + len(self.state.v))
-        columns = [self.torque(each) - self.torque(-each) for each in changes]
-        return np.array(columns).T / (2.0 * DISTURBANCE)
+        slope = np.zeros((size, size + inputs.size))
+        slope[:, :size] = found.A
+        if inputs.size:
+            by_input = slope[:, size:]
+            by_input[:, inputs.of(TORQUE)] = found.B
+            by_input[:, inputs.of_numbers()] = found.by_numbers
+        if law is not None and self._answers:
+            slope[:, :size] += found.B @ law.gains()
+            if inputs.parameters:
+                by_input[:, inputs.of_parameters()] = found.B @ law.by_parameters(inputs.parameters)
+        return slope

@@ -26,6 +26,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.linearized.flow import Variation
+from heelstrike.sim.linearized.inputs import Inputs
 from heelstrike.sim.run import Event, Run
 
 Floats = NDArray[np.float64]
@@ -63,9 +64,10 @@ class Saltation:
     kinds: tuple[EventKind, ...]
     """What happened then."""
     matrix: Floats
-    """(nq + nv, nq + nv) The saltation matrix: error just after of an error just before. The
-    identity at lift-offs and where slip begins, as forces are continuous there. Of the touchdown
-    that ends a step, that of the error on the section: at touchdown, whenever that is."""
+    """(nq + nv + k, nq + nv + k) The saltation matrix: error just after of an error just
+    before, and of a change of k inputs. The identity at lift-offs and where slip begins, as forces
+    are continuous there. Of the touchdown that ends a step, that of the error on the section: at
+    touchdown, whenever that is."""
     spread: float
     """Where several points come down in one instant, errors decide in which order; the matrix is
     then the mean of those of all orders, which differ by so much at most."""
@@ -76,38 +78,46 @@ class Motion:
     """A motion, linearised from its beginning to its last event."""
 
     flows: tuple[Floats, ...]
-    """Tuple of (nq + nv, nq + nv) float. What the smooth motion before each event does to errors
-    (δq, δv)."""
+    """Tuple of (nq + nv + k, nq + nv + k) float. What the smooth motion before each event, and
+    after the last if it goes on, does to errors (δq, δv) and to changes of k inputs, which stay."""
     saltations: tuple[Saltation, ...]
-    """What the events do, in their order; the last is a section."""
+    """What the events do, in their order; the last is a section if the motion ends with it."""
     arrival: Strike | None
-    """The one contact point that comes down in the last, if it is one."""
+    """The one contact point that comes down in that section, if it is one."""
 
     @property
     def matrix(self) -> Floats:
-        """Errors at the last event by errors at the beginning, (nq + nv, nq + nv)."""
+        """Errors at the end by errors at the beginning, and inputs."""
+        if len(self.flows) > len(self.saltations):
+            return self.until_the_last
         return self.saltations[-1].matrix @ self.until_the_last
 
     @property
     def until_the_last(self) -> Floats:
-        """The same just before the last event."""
+        """The same just before the section."""
         matrix = self.flows[0]
         for event, flow in zip(self.saltations, self.flows[1:], strict=False):
             matrix = flow @ event.matrix @ matrix
         return matrix
 
 
-def linearized(run: Run, until: float, variation: Variation) -> Motion:
-    """Linearise the beginning of a run, up to an event.
+def linearized(
+    run: Run, until: float, variation: Variation, *, section: bool = True, begin: float = 0.0
+) -> Motion:
+    """Linearise a part of a run, up to an event or a time.
 
     Parameters
     ----------
     run : Run
-        A run of an event-driven simulation that goes a little beyond.
+        A run of an event-driven simulation that goes a little beyond an event.
     until : float
-        When the event is (s).
+        When it ends (s).
     variation : Variation
         The variational equation of the same motion.
+    section : bool
+        Whether it ends with an event, whenever that is; or at that time.
+    begin : float
+        When it begins (s).
 
     Raises
     ------
@@ -115,17 +125,19 @@ def linearized(run: Run, until: float, variation: Variation) -> Motion:
         If a controller or an event cannot be linearised; the message says which and why.
     """
     _refuse(run.robot, run, until)
-    instants = _instants(run, until)
-    bounds = list(pairwise([0.0, *(events[0].time for events in instants)]))
-    held: list[ActiveContacts | None] = [_active(run, *each) for each in bounds]
-    flows, saltations = [], []
-    for k, (events, begin_and_end) in enumerate(zip(instants, bounds, strict=True)):
-        before = held[k]
-        assert before is not None
-        flows.append(variation.flow(*begin_and_end, before))
-        instant = _Instant(run, tuple(events), before, [*held, None][k + 1])
-        saltations.append(instant.saltation())
-    return Motion(tuple(flows), tuple(saltations), instant.arrival())
+    instants = _instants(run, begin, until)
+    times = [begin, *(events[0].time for events in instants)]
+    bounds = list(pairwise(times if section else [*times, until]))
+    held = [_active(run, *each) for each in bounds]
+    flows, saltations, arrival = [], [], None
+    for k, begin_and_end in enumerate(bounds):
+        flows.append(variation.flow(*begin_and_end, held[k]))
+        if k < len(instants):
+            after = held[k + 1] if k + 1 < len(held) else None
+            instant = _Instant(run, tuple(instants[k]), held[k], after, variation.inputs)
+            saltations.append(instant.saltation())
+            arrival = instant.arrival() if after is None else None
+    return Motion(tuple(flows), tuple(saltations), arrival)
 
 
 def _refuse(robot: Robot, run: Run, period: float) -> None:
@@ -133,6 +145,11 @@ def _refuse(robot: Robot, run: Run, period: float) -> None:
     if np.any(robot.model.dry_friction > 0.0):
         raise SimulationError(
             f"dry friction in the joints of {robot.name!r} cannot be linearised here; "
+            "hs.find_limit_cycle takes differences instead"
+        )
+    if robot.constraints:
+        raise SimulationError(
+            f"constraints from outside of {robot.name!r} are not linearised here; "
             "hs.find_limit_cycle takes differences instead"
         )
     if np.any(run.brake_torque):
@@ -153,11 +170,11 @@ def _refuse(robot: Robot, run: Run, period: float) -> None:
             )
 
 
-def _instants(run: Run, period: float) -> list[list[Event]]:
-    """Events of the step, those of one instant together."""
+def _instants(run: Run, begin: float, period: float) -> list[list[Event]]:
+    """Events between two times, those of one instant together."""
     instants: list[list[Event]] = []
     for event in run.events:
-        if not 0.0 < event.time <= period + SAME_INSTANT:
+        if not begin < event.time <= period + SAME_INSTANT:
             continue
         if instants and event.time - instants[-1][0].time <= SAME_INSTANT:
             instants[-1].append(event)
@@ -189,6 +206,7 @@ class _Instant:
     events: tuple[Event, ...]
     held: ActiveContacts
     after: ActiveContacts | None
+    inputs: Inputs
 
     @property
     def time(self) -> float:
@@ -233,7 +251,7 @@ class _Instant:
     def saltation(self) -> Saltation:
         kinds = tuple(dict.fromkeys(event.kind for event in self.events))
         switched = [event.contact for event in self.events if event.kind in SWITCHES]
-        spread, matrix = 0.0, np.eye(len(self.before))
+        spread, matrix = 0.0, np.eye(len(self._wide(self.before)))
         if self.struck:
             matrices = [self._through(order) for order in self._orders()]
             matrix = np.mean(matrices, axis=0)
@@ -242,7 +260,7 @@ class _Instant:
             )
         elif switched and self.after is not None:  # a speed that vanishes is the event
             speed = self.slopes.velocity[switched[0], 1]
-            matrix = saltation_matrix(matrix, speed, self.before, self.rate)
+            matrix = saltation_matrix(matrix, *map(self._wide, (speed, self.before, self.rate)))
         return Saltation(time=self.time, kinds=kinds, matrix=matrix, spread=spread)
 
     def arrival(self) -> Strike | None:
@@ -258,10 +276,26 @@ class _Instant:
 
     def _through(self, order: list[Strike]) -> Floats:
         """Matrix of what comes down in an order."""
-        matrix = order[-1].saltation(self.rate)
-        for strike in order[-2::-1]:
-            matrix = matrix @ strike.saltation()
+        matrix = np.eye(len(self._wide(self.before)))
+        for strike in order:
+            after = self.rate if strike is order[-1] else strike.after
+            rates = map(self._wide, (strike.gradient, strike.before, after))
+            matrix = saltation_matrix(self._reset(strike), *rates) @ matrix
         return matrix
+
+    def _wide(self, vector: Floats) -> Floats:
+        """Return a vector over the state as one over state and inputs."""
+        return np.concatenate([vector, np.zeros(self.inputs.size)])
+
+    def _reset(self, strike: Strike) -> Floats:
+        """Derivative of state and inputs after an impact by those before."""
+        size = len(self.before)
+        reset = np.eye(size + self.inputs.size)
+        reset[:size, :size] = strike.impact.reset
+        reset[:size, [size + column for column in self.inputs.of_numbers()]] = (
+            strike.impact.by_numbers
+        )
+        return reset
 
     def _orders(self) -> list[list[Strike]]:
         """The orders in which points that come down together may do so."""
@@ -289,7 +323,7 @@ class _Instant:
         ]
         found = strikes(
             run.robot, run.position[first], run.velocity[first], self.before, run.torque[last],
-            down, run.ground,
+            down, run.ground, self.inputs.numbers,
         )  # fmt: skip
         if found:
             v = found[-1].impact.velocity

@@ -100,7 +100,10 @@ class Impact(Bundle):
     kept: Integers = array("capacity", of=int)
     """Modes of the members in the last answer that made no energy."""
     arriving: Floats = array("nv")
-    """Where there is an impact, the velocity that positions move with."""
+    arriving_impulse: Floats = array("2 capacity")
+    arriving_mode: Integers = array("capacity", of=int)
+    """arriving, arriving_impulse, arriving_mode: Where there is an impact, the velocity that
+    positions move with, and the answer of their problem."""
     member: Integers = array("capacity", of=int)
     """The candidates that take part."""
     problem: ContactProblem = part(ContactProblem)
@@ -443,6 +446,9 @@ def solve_impact(
     status = solve_restitution(order, impact.problem, solver, impact, impact.answer)
     answer, its = assembly.answer, impact.answer
     for place in range(problem.count):
+        impact.arriving_mode[place] = answer.mode[place]
+        impact.arriving_impulse[2 * place] = answer.impulse[2 * place]
+        impact.arriving_impulse[2 * place + 1] = answer.impulse[2 * place + 1]
         answer.mode[place] = OPEN
         answer.impulse[2 * place] = 0.0
         answer.impulse[2 * place + 1] = 0.0

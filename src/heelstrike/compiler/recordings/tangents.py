@@ -1,0 +1,84 @@
+"""Derivatives of what a tape computes, recorded on the same tape.
+
+Every value carries its derivatives by the chosen entries along, those that are not zero by its
+structure (forward accumulation: A. Griewank, A. Walther, *Evaluating derivatives*, 2008, chapter
+3). What the values and their derivatives have in common is on the tape once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from heelstrike.compiler.recordings.tape import (
+    Entry,
+    Operation,
+    Result,
+    Symbols,
+    Value,
+    cosine,
+    sine,
+)
+
+_PARTIAL: dict[Operation, Callable[..., tuple[Any, ...]]] = {
+    Operation.ADD: lambda _, *__: (1.0, 1.0),
+    Operation.SUBTRACT: lambda _, *__: (1.0, -1.0),
+    Operation.MULTIPLY: lambda _, one, other: (other, one),
+    Operation.DIVIDE: lambda ratio, _, below: (1.0 / below, -ratio / below),
+    Operation.NEGATE: lambda _, __: (-1.0,),
+    Operation.SINE: lambda _, angle: (cosine(angle),),
+    Operation.COSINE: lambda _, angle: (-sine(angle),),
+    Operation.INVERT_ABOVE: lambda inverse, *_: (-inverse * inverse, 0.0),
+}
+"""Derivatives of a result by its operands, of the result and of these."""
+
+
+def tangents(values: Symbols, by: Sequence[Any]) -> Symbols:
+    """Return the derivatives of values by entries of their tape.
+
+    Parameters
+    ----------
+    values : (m,) array
+        Values of a tape, or numbers.
+    by : sequence of k
+        Entries of the tape. What is a number has no derivative by it.
+
+    Returns
+    -------
+    (m, k) array
+        Values of the tape, or numbers.
+    """
+    seeds = {entry: {k: 1.0} for k, entry in enumerate(by) if isinstance(entry, Entry)}
+    known: dict[Value, dict[int, Any]] = {}
+    for value in _needed(values):
+        known[value] = seeds.get(value, {}) if isinstance(value, Entry) else _carried(value, known)
+    found = np.zeros((len(values), len(by)), dtype=object)
+    for row, value in enumerate(values):
+        for column, slope in known.get(value, {}).items() if isinstance(value, Value) else ():
+            found[row, column] = slope
+    return found
+
+
+def _needed(values: Symbols) -> list[Any]:
+    """Values on which some hang, and themselves, operands before their results."""
+    waiting = [value for value in values if isinstance(value, Value)]
+    found = set(waiting)
+    while waiting:
+        value = waiting.pop()
+        operands = value.operands if isinstance(value, Result) else ()
+        new = {each for each in operands if isinstance(each, Value)} - found
+        found |= new
+        waiting += new
+    return sorted(found, key=lambda value: value.place)
+
+
+def _carried(result: Result, known: dict[Value, dict[int, Any]]) -> dict[int, Any]:
+    """Derivatives of a result, from those of its operands."""
+    total: dict[int, Any] = {}
+    partial = _PARTIAL[result.operation](result, *result.operands)
+    for operand, slope in zip(result.operands, partial, strict=True):
+        for k, change in known[operand].items() if isinstance(operand, Value) else ():
+            total[k] = total.get(k, 0.0) + slope * change
+    return total

@@ -1,0 +1,308 @@
+"""Partial derivatives of the equations of a motion under contact, for implicit differentiation.
+
+A motion with the acceleration a under given forces p of contact points and l of loops lacks the
+generalised force
+
+    r(q, v, a, p, l) = A a + H − passive − Jᵀ p − Lᵀ l
+
+but for that of its motors, and under a velocity (or acceleration) x the points and loops go at
+
+    s(q, v, x) = J x + t J̇ v,   with L the same.
+
+Whatever a method solves - accelerations under contact with x = a and t = 1, velocities at the end
+of a step with t = 0, and h/2 for its loops - is made of r and s; so are its derivatives, with those
+of r and s at fixed a, p, l, x. The tape of the kernel is differentiated
+(:mod:`heelstrike.compiler.recordings.tangents`) and compiled once for a robot's structure.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from typing import Any
+from weakref import WeakKeyDictionary, ref
+
+import numpy as np
+
+from heelstrike.compiler.bundle import Bundle, array
+from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.recordings.recording import Program
+from heelstrike.compiler.straight_line import play, straight_line_code
+from heelstrike.contact.workspace import Floats
+from heelstrike.dynamics.frames import into_frame
+from heelstrike.dynamics.kernels import (
+    factorize,
+    forward_kinematics,
+    inverse_dynamics,
+    link_velocities,
+    mass_matrix,
+    passive_force,
+    point_position,
+)
+from heelstrike.dynamics.loops import LoopRows, count_rows, find_rows
+from heelstrike.dynamics.places import bias_at, place_of, write_point_rows
+from heelstrike.dynamics.workspace import Workspace
+from heelstrike.errors import SimulationError
+from heelstrike.robot.model import Integers, Model
+
+DYNAMIC = (
+    "mass", "inertia", "center_of_mass", "armature", "damping", "stiffness", "rest", "gravity"
+)  # fmt: skip
+"""Numbers of a robot that say how heavy, stiff or damped it is: they are in r alone."""
+
+
+FRICTION = "friction"
+"""The ground's coefficient."""
+
+
+class Balance(Bundle):
+    """A motion under forces, and what is found of it."""
+
+    q: Floats = array("nq")
+    v: Floats = array("nv")
+    acceleration: Floats = array("nv")
+    """q, v, acceleration: The motion."""
+    going: Floats = array("nv")
+    """The velocity or acceleration x of the points and loops that are looked at."""
+    ahead: Floats = array(2)
+    """The time t of points, and of loops."""
+    normal: Floats = array("nc", "components")
+    """Of the ground at every contact point, in world axes; it stays."""
+    push: Floats = array("nc", "components")
+    pull: Floats = array("loop_rows")
+    """push, pull: Forces of contact points (normal, tangent) and of loops."""
+    added: Floats = array("nv")
+    """What is added to the diagonal of the mass matrix."""
+    point: Floats = array("nc", "components")
+    """Where the contact points are."""
+    matrix: Floats = array("nv", "nv")
+    factor: Floats = array("nv", "nv")
+    """matrix, factor: The mass matrix, with what is added, and its factor."""
+    passive: Floats = array("nv")
+    """Force of springs and dampers; scratch."""
+    lacking: Floats = array("nv")
+    """The force r."""
+    rows: Floats = array("2 nc", "nv")
+    """Jacobian of the contact points (normal, tangent)."""
+    along: Floats = array("2 nc")
+    loop_along: Floats = array("loop_rows")
+    """along, loop_along: The s of points and loops."""
+
+
+class Partials(Bundle):
+    """Derivatives of r and s, which leave all else as it is."""
+
+    lacking_by_q: Floats = array("nv", "nq")
+    lacking_by_v: Floats = array("nv", "nv")
+    along_by_q: Floats = array("2 nc", "nq")
+    along_by_v: Floats = array("2 nc", "nv")
+    loop_along_by_q: Floats = array("loop_rows", "nq")
+    loop_along_by_v: Floats = array("loop_rows", "nv")
+    """By position and velocity."""
+    lacking_by_numbers: Floats = array("nv", "numbers")
+    """By numbers of the robot."""
+
+
+@kernel
+def find_balance(
+    model: Model, dated: Integers, tree: Workspace, loops: LoopRows, balance: Balance
+) -> None:
+    """Write what a motion lacks and how its points and loops go, with its Jacobians and factor.
+
+    Where ``dated[0]`` is zero, J̇ v is left out.
+    """
+    forward_kinematics(model, balance.q, tree)
+    link_velocities(model, balance.v, tree)
+    mass_matrix(model, tree, balance.matrix)
+    for i in range(model.nv):
+        balance.matrix[i, i] += balance.added[i]
+    factorize(model, balance.matrix, balance.factor)
+    inverse_dynamics(model, balance.acceleration, tree, balance.lacking)
+    passive_force(model, balance.q, balance.v, balance.passive)
+    for i in range(model.nv):
+        balance.lacking[i] -= balance.passive[i]
+    for contact in range(model.nc):
+        balance_point(model, dated, tree, contact, balance)
+    if loops.bias.shape[0] > 0:
+        find_rows(model, balance.q, balance.v, tree, loops)
+        for row in range(loops.bias.shape[0]):
+            balance.loop_along[row] = balance.ahead[1] * loops.bias[row]
+            for j in range(model.nv):
+                balance.loop_along[row] += loops.jacobian[row, j] * balance.going[j]
+                balance.lacking[j] -= loops.jacobian[row, j] * balance.pull[row]
+
+
+@kernel
+def balance_point(
+    model: Model, dated: Integers, tree: Workspace, contact: int, balance: Balance
+) -> None:
+    """Add what the force on a contact point does, and write how the point goes.
+
+    A disc touches where its normal says, and turns about its centre.
+    """
+    link, first = model.contact_link[contact], 2 * contact
+    point, normal, rows = balance.point[contact], balance.normal[contact], balance.rows
+    point_position(tree, link, model.contact_position[contact], point)
+    bias = 0.0, 0.0
+    if dated[0] == 1:
+        bias = into_frame(normal, bias_at(tree, link, place_of(tree, point)))
+    for axis in range(2):
+        point[axis] -= model.contact_radius[contact] * normal[axis]
+    write_point_rows(model, tree, link, point, normal, first, rows)
+    for k in range(2):
+        balance.along[first + k] = balance.ahead[0] * bias[k]
+        for j in range(model.nv):
+            balance.along[first + k] += rows[first + k, j] * balance.going[j]
+            balance.lacking[j] -= rows[first + k, j] * balance.push[contact, k]
+
+
+def allocate_balance(model: Model, numbers: Sequence[str] = ()) -> tuple[Balance, Partials]:
+    """Allocate a motion and its derivatives, those by some `numbers` of the robot too."""
+    extents = {
+        **model.extents, "components": 2, "loop_rows": count_rows(model),
+        "numbers": sum(getattr(model, name).size for name in numbers),
+    }  # fmt: skip
+    return Balance.allocate(extents), Partials.allocate(extents)
+
+
+_known: WeakKeyDictionary[Model, dict[tuple[bool, tuple[str, ...]], int]] = WeakKeyDictionary()
+
+
+def partial_program(model: Model, *, dated: bool, numbers: tuple[str, ...] = ()) -> int:
+    """Return the address of code that finds a balance and its partial derivatives.
+
+    :func:`~heelstrike.compiler.straight_line.play` calls it with the arguments of
+    :func:`find_balance` and :class:`Partials`.
+
+    Parameters
+    ----------
+    model : Model
+        The robot. Those of the same structure share the code.
+    dated : bool
+        Whether J̇ v of contact points is wanted.
+    numbers : tuple of str
+        Of `DYNAMIC`, by which r is differentiated.
+    """
+    programs = _known.setdefault(model, {})
+    if (dated, numbers) not in programs:
+        programs[dated, numbers] = _compiled(model, dated, numbers)
+    return programs[dated, numbers]
+
+
+def _compiled(model: Model, dated: bool, numbers: tuple[str, ...]) -> int:
+    balance, partials = allocate_balance(model, numbers)
+    tree = Workspace.allocate({**model.extents, "components": 2})
+    names = ["lacking"]
+    names += ["along"] if model.nc else []
+    names += ["loop_along"] if count_rows(model) else []
+    derivatives: dict[str, tuple[str, tuple[str, ...]]] = {
+        f"partials.{name}_by_{x}": (f"balance.{name}", (f"balance.{x}",))
+        for name in names
+        for x in "qv"
+    }
+    if numbers:
+        by = tuple(f"model.{name}" for name in numbers)
+        derivatives["partials.lacking_by_numbers"] = "balance.lacking", by
+    hidden = ("balance.passive", "balance.point", *(f"tree.{n}" for n in tree.members()))
+    program = Program(
+        find_balance,
+        {
+            "model": model, "dated": np.array([int(dated)]), "tree": tree,
+            "loops": LoopRows.allocate(nv=model.nv, loop_rows=count_rows(model)),
+            "balance": balance, "partials": partials,
+        },
+        scratch=hidden,
+        derivatives=derivatives,
+    )  # fmt: skip
+    (address,) = straight_line_code([program], known={"tree.zero": np.zeros(model.nv)})
+    return address
+
+
+@kernel
+def find_partials(
+    model: Model, program: int, dated: Integers, tree: Workspace, loops: LoopRows,
+    balance: Balance, partials: Partials,
+) -> None:  # fmt: skip
+    """Find a balance and its partial derivatives."""
+    play(program, (model, dated, tree, loops, balance, partials))
+
+
+class Differentiated:
+    """The equations of a robot, differentiated wherever they are looked at.
+
+    Parameters
+    ----------
+    model : Model
+        The robot.
+    numbers : tuple of str
+        Of `DYNAMIC`, by which r is differentiated too.
+    """
+
+    def __init__(self, model: Model, numbers: tuple[str, ...] = ()) -> None:
+        self._model = ref(model)
+        self._program = partial_program(model, dated=True, numbers=numbers)
+        self.balance, self.partials = allocate_balance(model, numbers)
+        self._tree = Workspace.allocate({**model.extents, "components": 2})
+        self.loops = LoopRows.allocate(nv=model.nv, loop_rows=count_rows(model))
+        self._dated = np.array([1])
+
+    def place(self, q: Floats, v: Floats, normal: Any) -> None:
+        """Put the robot into a state, with a normal (2,) of the ground under all its points."""
+        self.balance.q[:], self.balance.v[:], self.balance.normal[:] = q, v, normal
+
+    def look(
+        self, *, ahead: float, going: Floats | float = 0.0, acceleration: Floats | float = 0.0,
+        push: Floats | float = 0.0, pull: Floats | float = 0.0,
+    ) -> None:  # fmt: skip
+        """Find r, s and their derivatives, of a motion under forces; see the module."""
+        balance = self.balance
+        balance.ahead[:], balance.going[:], balance.acceleration[:] = ahead, going, acceleration
+        balance.push[:], balance.pull[:] = push, pull
+        model: Any = self._model()
+        find_partials(
+            model, self._program, self._dated, self._tree, self.loops, balance,
+            self.partials,
+        )  # fmt: skip
+
+
+_kept = threading.local()
+"""Of each thread its own: what is found is there until the next look."""
+
+
+def differentiated(model: Model, numbers: tuple[str, ...] = ()) -> Differentiated:
+    """Return the equations of a robot, which are those that were returned before."""
+    if not hasattr(_kept, "equations"):
+        _kept.equations = WeakKeyDictionary()
+    known = _kept.equations.setdefault(model, {})
+    if numbers not in known:
+        known[numbers] = Differentiated(model, numbers)
+    found: Differentiated = known[numbers]
+    return found
+
+
+def chosen_numbers(names: Sequence[str]) -> tuple[tuple[str, ...], bool]:
+    """Tell numbers of the robot from the ground's friction, among names of both.
+
+    Raises
+    ------
+    SimulationError
+        If there is no such number, or one is named twice.
+    """
+    known = (*DYNAMIC, FRICTION)
+    wrong = [name for name in names if name not in known]
+    if wrong or len(set(names)) < len(names):
+        raise SimulationError(
+            f"derivatives are known by {', '.join(known)}, each once; got {', '.join(names)}"
+        )
+    return tuple(name for name in names if name != FRICTION), FRICTION in names
+
+
+def columns_of(model: Model, names: Sequence[str]) -> dict[str, slice]:
+    """Return which columns are derivatives by which numbers: those of friction are last."""
+    dynamic, rubs = chosen_numbers(names)
+    sizes = [getattr(model, name).size for name in dynamic] + [1] * rubs
+    ends = np.cumsum(sizes, dtype=int).tolist()
+    named = [*dynamic, *([FRICTION] * rubs)]
+    return {
+        name: slice(end - size, end) for name, size, end in zip(named, sizes, ends, strict=True)
+    }

@@ -1,0 +1,424 @@
+"""Derivatives of what a simulation does, from one instant to another, through contact."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from heelstrike.arguments import takes
+from heelstrike.contact.linearized.partials import FRICTION
+from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
+from heelstrike.sim.closed_sets import RunStatus
+from heelstrike.sim.event_driven.method import EventDriven
+from heelstrike.sim.frame import is_due
+from heelstrike.sim.linearized.flow import Variation
+from heelstrike.sim.linearized.inputs import LAW, TORQUE, Inputs, inputs_of
+from heelstrike.sim.linearized.law import AskedAlong, parameter_sizes
+from heelstrike.sim.linearized.mode_changes import ModeChange, other_modes
+from heelstrike.sim.linearized.refusals import refuse_inputs, refuse_step
+from heelstrike.sim.linearized.step import linearized
+from heelstrike.sim.linearized.time_step import allocate_slopes, differentiate_step
+from heelstrike.sim.simulation import Simulation
+from heelstrike.sim.snapshot import Snapshot
+from heelstrike.sim.time_stepping.method import TimeStepping
+from heelstrike.sim.whole_run import whole
+
+Floats = NDArray[np.float64]
+
+NOTHING: Mapping[str, ArrayLike] = MappingProxyType({})
+
+SAME_TORQUE = 1e-9
+"""Torques that differ by less, of themselves and of 1 N m, are one, asked for twice."""
+
+AT_ONCE = 1e-6
+"""Part of a step within which a time is its end."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StepDerivatives:
+    """Derivatives of the state (q, v) after some time by what it hangs on, to first order."""
+
+    begin: float
+    end: float
+    """begin, end: From when to when (s)."""
+    state: Floats
+    """(nq + nv, nq + nv) By the state at the beginning."""
+    torque: Floats
+    """(nq + nv, nu) By torques that are added, the same all the time, to those that act anyway."""
+    numbers: Mapping[str, Floats]
+    """(nq + nv, k) each. By numbers of the robot and the ground, by name."""
+    gains: Mapping[str, Floats]
+    """(nq + nv, k) each. By parameters of the law, by name."""
+    changes: tuple[ModeChange, ...] = ()
+    """Contact points at a change of mode, where the derivatives are those of one side; of one time
+    step."""
+
+    def forward(
+        self, state: ArrayLike = 0.0, torque: ArrayLike = 0.0, *,
+        numbers: Mapping[str, ArrayLike] = NOTHING, gains: Mapping[str, ArrayLike] = NOTHING,
+    ) -> Floats:  # fmt: skip
+        """Return the change of the state at the end, (nq + nv,).
+
+        Parameters
+        ----------
+        state, torque : (nq + nv,) and (nu,) array
+            Changes of the state at the beginning and of the torques.
+        numbers, gains : mapping of str to (k,) array
+            Changes of those that were asked for.
+
+        Returns
+        -------
+        (nq + nv,) float
+            The change.
+        """
+        change = self.state @ np.broadcast_to(state, len(self.state))
+        change = change + self.torque @ np.broadcast_to(torque, self.torque.shape[1])
+        for own, given in ((self.numbers, numbers), (self.gains, gains)):
+            for name, value in given.items():
+                change = change + own[name] @ np.broadcast_to(value, own[name].shape[1])
+        return np.asarray(change)
+
+    def adjoint(self, gradient: ArrayLike) -> Gradient:
+        """Return the gradient of a function of the state at the end by all that it hangs on.
+
+        Parameters
+        ----------
+        gradient : (nq + nv,) array
+            Its gradient by that state.
+
+        Returns
+        -------
+        Gradient
+            By the state at the beginning, the torques and the numbers.
+        """
+        back = np.asarray(gradient, np.float64)
+        return Gradient(
+            state=back @ self.state,
+            torque=back @ self.torque,
+            numbers={name: back @ each for name, each in self.numbers.items()},
+            gains={name: back @ each for name, each in self.gains.items()},
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Gradient:
+    """The gradient of a number that a run leads to."""
+
+    state: Floats
+    """(nq + nv,) By the state at the beginning."""
+    torque: Floats
+    """(nu,) By torques that are added; over a run (steps, nu), those of each step."""
+    numbers: Mapping[str, Floats]
+    gains: Mapping[str, Floats]
+    """numbers, gains: (k,) each. By numbers of robot and ground, and by parameters of the law, by
+    name."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunDerivatives:
+    """Derivatives along a run, step by step."""
+
+    steps: tuple[StepDerivatives, ...]
+    """Of each step: of the method, or from one call of a sampled controller to the next."""
+
+    def forward(
+        self, state: ArrayLike = 0.0, torque: ArrayLike = 0.0, *,
+        numbers: Mapping[str, ArrayLike] = NOTHING, gains: Mapping[str, ArrayLike] = NOTHING,
+    ) -> Floats:  # fmt: skip
+        """Return changes of the state at the beginning and after every step.
+
+        Parameters
+        ----------
+        state : (nq + nv,) array
+            Change at the beginning.
+        torque : (steps, nu) array
+            Changes of the torques in every step.
+        numbers, gains : mapping of str to (k,) array
+            Changes of those that were asked for.
+
+        Returns
+        -------
+        (steps + 1, nq + nv) float
+            The changes.
+        """
+        first = self.steps[0]
+        changes = [np.array(np.broadcast_to(state, len(first.state)), dtype=np.float64)]
+        added = np.broadcast_to(torque, (len(self.steps), first.torque.shape[1]))
+        for step, each in zip(self.steps, added, strict=True):
+            changes.append(step.forward(changes[-1], each, numbers=numbers, gains=gains))
+        return np.array(changes)
+
+    def adjoint(self, gradient: ArrayLike) -> Gradient:
+        """Return the gradient of a function of the run's states by all that they hang on.
+
+        Parameters
+        ----------
+        gradient : (nq + nv,) or (steps + 1, nq + nv) array
+            Its gradient by the last state, or by that at the beginning and those after every step.
+
+        Returns
+        -------
+        Gradient
+            By the state at the beginning, the torques of every step and the numbers.
+        """
+        given, size = np.asarray(gradient, np.float64), len(self.steps[0].state)
+        by_states = np.zeros((len(self.steps) + 1, size))
+        by_states[-1 if given.ndim == 1 else slice(None)] = given
+        back, found = by_states[-1], []
+        for step, own in zip(reversed(self.steps), by_states[-2::-1], strict=True):
+            found.append(step.adjoint(back))
+            back = found[-1].state + own
+        return Gradient(
+            state=back,
+            torque=np.array([each.torque for each in found[::-1]]),
+            numbers=_sums([each.numbers for each in found]),
+            gains=_sums([each.gains for each in found]),
+        )
+
+
+def _sums(several: Sequence[Mapping[str, Floats]]) -> dict[str, Floats]:
+    """Add what has the same name."""
+    return {name: np.sum([each[name] for each in several], axis=0) for name in several[0]}
+
+
+@takes(SimulationError)
+def step_derivatives(
+    simulation: Simulation,
+    *,
+    until: float | None = None,
+    numbers: Sequence[str] = (),
+    gains: Sequence[str] = (),
+    answers: bool = True,
+    modes: Mapping[str, str] | None = None,
+) -> StepDerivatives:
+    """Take a step, or go on until a time, and differentiate what that does.
+
+    Contact modes are those that the certified solution has. While they last, equations hold that
+    are differentiated implicitly: exact to rounding, but for the law's own derivative, which is a
+    difference. Events of an event-driven motion, touchdowns, slips and stops, are gone through with
+    their saltations (:func:`~heelstrike.saltation_matrix`).
+
+    Parameters
+    ----------
+    simulation : Simulation
+        By time stepping or event-driven; it goes on to the end.
+    until : float, optional
+        End in s; one step of the method by default.
+    numbers : sequence of str
+        ``"friction"`` of the ground; ``"mass"``, ``"inertia"``, ``"center_of_mass"``,
+        ``"armature"``, ``"damping"``, ``"stiffness"``, ``"rest"`` or ``"gravity"`` of the robot,
+        all numbers of that name, as in its :class:`~heelstrike.robot.model.Model`.
+    gains : sequence of str
+        Parameters of a compiled law, by their names.
+    answers : bool
+        Whether the controller answers to a changed state. If not, its torques are those that they
+        are. It must be compiled, and act on the state, but not on forces.
+    modes : mapping of str to str, optional
+        For contact points at a change of mode the other side: ``"open"``, ``"stick"``,
+        ``"slip_forward"`` or ``"slip_backward"`` by name, as `changes` tells; of one time step.
+
+    Returns
+    -------
+    StepDerivatives
+
+    Raises
+    ------
+    SimulationError
+        If what happens has no derivative that is known here; the message says what.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> robot, ground = hs.load_robot("bravo7"), hs.Ground(friction=0.6)
+    >>> simulation = hs.Simulation(robot, state=robot.reference_state(), ground=ground)
+    >>> found = hs.step_derivatives(simulation, numbers=["mass"])
+    >>> found.state.shape, found.torque.shape, found.numbers["mass"].shape
+    ((18, 18), (18, 6), (18, 9))
+    """
+    stepper = _stepper(simulation, numbers, gains, answers)
+    if modes is not None and not (until is None and isinstance(stepper, _TimeSteps)):
+        raise SimulationError("the other side of a change of mode is that of one time step")
+    return stepper.until(until, modes)
+
+
+@takes(SimulationError)
+def run_derivatives(
+    simulation: Simulation,
+    until: float,
+    *,
+    every: float | None = None,
+    numbers: Sequence[str] = (),
+    gains: Sequence[str] = (),
+    answers: bool = True,
+) -> RunDerivatives:
+    """Go on until a time, and differentiate every step, for sums forward and back along the run.
+
+    Parameters
+    ----------
+    simulation, numbers, gains, answers
+        As of :func:`step_derivatives`.
+    until : float
+        End in s.
+    every : float, optional
+        Seconds from one state to the next; by default one step of time stepping, or the period of a
+        sampled controller, of which it must be a multiple; and the whole time of an event-driven
+        motion.
+
+    Returns
+    -------
+    RunDerivatives
+
+    Raises
+    ------
+    SimulationError
+        As of :func:`step_derivatives`.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> robot = hs.load_robot("compass_gait")
+    >>> simulation = hs.Simulation(robot, state=robot.reference_state(), stop_when_fallen=False)
+    >>> run = hs.run_derivatives(simulation, 0.01)
+    >>> run.adjoint([1.0] + [0.0] * 7).state.shape
+    (8,)
+    """
+    own = max(simulation.method.step_length or 0.0, simulation.control_period)
+    span = every or own or until - simulation.time
+    begin, stepper = simulation.time, _stepper(simulation, numbers, gains, answers)
+    ends = begin + span * np.arange(1, max(1, round((until - begin) / span)) + 1)
+    return RunDerivatives(tuple(stepper.until(min(end, until)) for end in ends.tolist()))
+
+
+def _stepper(
+    simulation: Simulation, numbers: Sequence[str], gains: Sequence[str], answers: bool
+) -> _TimeSteps | _Flows:
+    """Choose how a simulation is differentiated.
+
+    Raises
+    ------
+    SimulationError
+        If its method is neither time stepping nor event-driven, or there are no such numbers.
+    """
+    sizes = parameter_sizes(simulation.controller, gains)
+    inputs = inputs_of(simulation.robot, numbers, sizes)
+    if isinstance(simulation.method, TimeStepping):
+        refuse_inputs(simulation.method.scheme, inputs)
+        return _TimeSteps(simulation, inputs, answers)
+    if isinstance(simulation.method, EventDriven):
+        return _Flows(simulation, inputs, answers)
+    raise SimulationError(
+        f"{simulation.method.name} is not differentiated; use TimeStepping() or EventDriven()"
+    )
+
+
+class _TimeSteps:
+    """Time steps, whose derivatives are multiplied."""
+
+    def __init__(self, simulation: Simulation, inputs: Inputs, answers: bool) -> None:
+        self._simulation, self._inputs = simulation, inputs
+        friction = FRICTION in inputs.numbers
+        self._slopes = allocate_slopes(simulation.robot, inputs.dynamic, friction=friction)
+        controller = simulation.controller if answers else None
+        self._law = None if controller is None else AskedAlong(simulation, controller)
+
+    def until(self, end: float | None, modes: Mapping[str, str] | None = None) -> StepDerivatives:
+        """Go on until a time, or take one step, and say what that does."""
+        simulation, slopes, inputs = self._simulation, self._slopes, self._inputs
+        robot, begin, step = simulation.robot, simulation.time, simulation.method.step_length or 0.0
+        size, single = robot.nq + robot.nv, end is None
+        end = begin + step if end is None else end
+        change = np.eye(size + inputs.size)
+        added = change[[size + column for column in inputs.of(TORQUE)]]
+        held, asked = np.zeros_like(added), np.zeros(robot.nu)
+        found: tuple[ModeChange, ...] = ()
+        while simulation.time < end - AT_ONCE * step:
+            if self._law is not None and is_due(simulation._clock):
+                instant = self._law.now()
+                self._law.check_call(instant)
+                asked = instant.torque()
+                held = instant.gains() @ change[:size]
+                own = [size + column for column in inputs.of_parameters()]
+                held[:, own] += instant.by_parameters(inputs.parameters)
+            slopes.q[:], slopes.v[:] = simulation.state.q, simulation.state.v
+            _one_step(simulation)
+            if self._law is not None:
+                held[_at_limits(simulation, asked)] = 0.0
+            refuse_step(simulation)
+            found = other_modes(simulation, modes or {}) if single else ()
+            differentiate_step(robot.model, simulation._work, simulation._memory, slopes)
+            moved = slopes.state[:, :size] @ change[:size]
+            moved += slopes.state[:, size : size + robot.nu] @ (added + held)
+            by_number = slopes.state[:, size + robot.nu :]
+            moved += by_number @ change[[size + column for column in inputs.of_numbers()]]
+            change[:size] = moved
+        return _told(simulation, begin, change, inputs, found)
+
+
+def _one_step(simulation: Simulation) -> None:
+    """Take a step that is one."""
+    status = simulation.step()
+    if status is not RunStatus.COMPLETED:
+        raise SimulationError(f"there is no derivative of what ends a run: {simulation.message}")
+
+
+def _at_limits(simulation: Simulation, asked: Floats) -> NDArray[np.bool_]:
+    """Tell which torques are what limits let through, (nu,), and do not answer."""
+    off = np.abs(simulation._memory.torque - asked)
+    return np.asarray(off > SAME_TORQUE * (1.0 + np.abs(asked)))
+
+
+class _Flows:
+    """Event-driven motions, gone through event by event."""
+
+    def __init__(self, simulation: Simulation, inputs: Inputs, answers: bool) -> None:
+        self._simulation, self._inputs, self._answers = simulation, inputs, answers
+
+    def until(self, end: float | None, modes: Mapping[str, str] | None = None) -> StepDerivatives:
+        """Go on until a time, or take one step, and say what that does."""
+        del modes
+        simulation, begin = self._simulation, self._simulation.time
+        now = simulation.snapshot()
+        if end is None:
+            beside = self._again(now)
+            _one_step(beside)
+            end = beside.time
+        beside = self._again(now)
+        beside.advance(end)
+        if beside.status is not RunStatus.COMPLETED:
+            raise SimulationError(f"there is no derivative of what ends a run: {beside.message}")
+        run = whole(beside.record)
+        controller = simulation.controller
+        variation = Variation(self._again(now), controller, self._inputs, answers=self._answers)
+        motion = linearized(run, end, variation, section=False, begin=begin)
+        simulation.advance(end)
+        return _told(simulation, begin, motion.matrix, self._inputs, ())
+
+    def _again(self, now: Snapshot) -> Simulation:
+        """Return another simulation at the same instant."""
+        its = self._simulation
+        return Simulation(
+            its.robot, its.controller, state=now, method=its.method, ground=its.ground,
+            control_period=its._given_period, stop_when_fallen=False,
+        )  # fmt: skip
+
+
+def _told(
+    simulation: Simulation, begin: float, change: Floats, inputs: Inputs,
+    changes: tuple[ModeChange, ...],
+) -> StepDerivatives:  # fmt: skip
+    """Tell columns apart."""
+    size = simulation.robot.nq + simulation.robot.nv
+    by_input = change[:size, size:]
+    return StepDerivatives(
+        begin=begin,
+        end=simulation.time,
+        state=change[:size, :size],
+        torque=by_input[:, inputs.columns[TORQUE]],
+        numbers={name: by_input[:, inputs.of(name)] for name in inputs.numbers},
+        gains={name: by_input[:, inputs.of(LAW + name)] for name in inputs.parameters},
+        changes=changes,
+    )

@@ -1,0 +1,214 @@
+"""What the torques of a law do if the state that it sees, or its own numbers, are a little other.
+
+A law is somebody's function: its derivatives are central differences, the only ones of this
+package's linearised motions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.compiler.bundle import Bundle
+from heelstrike.contact.linearized.slopes import ContactSlopes, contact_slopes
+from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
+from heelstrike.errors import SimulationError
+from heelstrike.robot.state import State
+from heelstrike.sim.controller.in_python import AskedLaw
+from heelstrike.sim.controller.interface import Contacts, Controller
+from heelstrike.sim.controller.law import law_of
+from heelstrike.sim.simulation import Simulation
+
+Floats = NDArray[np.float64]
+
+DISTURBANCE = 3e-6
+"""Disturbance (m, rad, m/s, rad/s) of the law's derivative, and of its parameters as a part of
+them: small, as laws have kinks."""
+
+PRESSED = 1e-3
+"""Change of a number that a law remembers, by which is seen whether torques hang on it."""
+
+
+def numbers_in(bundle: Bundle) -> Iterator[tuple[str, Floats, tuple[int, ...]]]:
+    """Yield the real numbers of a bundle: name, array and place."""
+    for name, member, values in bundle.views():
+        if member.kind is float:
+            for place in np.ndindex(values.shape):
+                yield f"{name}{list(place) if place else ''}", values, place
+
+
+@dataclass(frozen=True)
+class Instant:
+    """A law at an instant: what it remembers, and what it sees."""
+
+    asked: AskedLaw
+    numbers: Any
+    time: float
+    state: State
+    at: ContactKinematics
+    slopes: ContactSlopes
+    force: Floats
+
+    def torque(self, change: Floats | None = None) -> Floats:
+        """What it asks for in a state changed by so little; it forgets the call."""
+        nq = len(self.state.q)
+        change = np.zeros(nq + len(self.state.v)) if change is None else change
+        normal, gap, place = self.at.normal, self.slopes.gap @ change, self.slopes.place @ change
+        along = np.column_stack((normal[:, 1], -normal[:, 0]))
+        seen = Contacts(
+            position=self.at.position + gap[:, None] * normal + place[:, None] * along,
+            normal=normal, gap=self.at.gap + gap, force=self.force,
+        )  # fmt: skip
+        self.asked.restore(self.numbers)
+        there = State(self.state.q + change[:nq], self.state.v + change[nq:])
+        return self.asked.torque(self.time, there, seen)
+
+    def gains(self) -> Floats:
+        """Derivative of the torques by the state, (nu, nq + nv)."""
+        changes = DISTURBANCE * np.eye(len(self.state.q) + len(self.state.v))
+        columns = [self.torque(each) - self.torque(-each) for each in changes]
+        return np.array(columns).T / (2.0 * DISTURBANCE)
+
+    def by_parameters(self, names: Sequence[str]) -> Floats:
+        """Derivative of the torques by parameters of the law, (nu, k)."""
+        columns = []
+        for values, place in self.parameters(names):
+            change = DISTURBANCE * max(1.0, abs(float(values[place])))
+            sides = []
+            for side in (change, -change):
+                self.asked.restore(self.numbers)
+                values[place] += side
+                sides.append(replace(self, numbers=self.asked.snapshot()).torque())
+            columns.append((sides[0] - sides[1]) / (2.0 * change))
+        return np.array(columns).T if columns else np.zeros((self.asked.numbers.robot.nu, 0))
+
+    def parameters(self, names: Sequence[str]) -> list[tuple[Floats, tuple[int, ...]]]:
+        """Where the parameters of some names are."""
+        known = list(numbers_in(self.asked.numbers.parameters))
+        return [
+            (values, place)
+            for name in names
+            for label, values, place in known
+            if label.partition("[")[0] == name
+        ]
+
+
+class AskedAlong:
+    """The law of a simulation, asked at its instants and in states near by.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        The simulation.
+    controller : object with ``torque(t, state, contacts)``
+        Its controller.
+
+    Raises
+    ------
+    SimulationError
+        If its controller is no compiled law, or commands voltages.
+    """
+
+    def __init__(self, simulation: Simulation, controller: Controller) -> None:
+        law = law_of(controller)
+        if law is None or not law.function.compiles or law.commands_voltage:
+            compiled = law is not None and law.function.compiles
+            wrong = "commands voltages" if compiled else "is sampled, in Python"
+            raise SimulationError(
+                f"only a compiled controller that asks for torques can be linearised; this one "
+                f"{wrong}. hs.find_limit_cycle takes differences of whole steps instead"
+            )
+        self._simulation = simulation
+        self._asked = AskedLaw(simulation.robot, law, compiled=True)
+        self._constant: dict[str, float] = {}
+        self._first: Instant | None = None
+        self._first = replace(self.now(), numbers=self._asked.snapshot())
+
+    def now(self) -> Instant:
+        """Return the law at the instant where the simulation is."""
+        simulation, state = self._simulation, self._simulation.state
+        kept = simulation.snapshot().part("control")
+        numbers = np.concatenate((kept["parameters"], kept["kept"]))
+        at = contact_kinematics(simulation.robot, state.q, state.v, simulation.ground)
+        slopes = contact_slopes(simulation.robot, state.q, state.v, simulation.ground)
+        force = simulation.contacts.force
+        return Instant(self._asked, numbers, simulation.time, state, at, slopes, force)
+
+    def check_beginning(self) -> None:
+        """Refuse a law that acts on what it made of the state in which the step began."""
+        if self._first is not None:
+            first, self._first = self._first, None
+            self.check_call(first)
+
+    def check_call(self, instant: Instant) -> None:
+        """Refuse a law that acts on what it keeps of the state in a call."""
+        instant.torque()
+        usual = self._remembered()
+        then = replace(instant, numbers=self._asked.snapshot())
+        seen = []
+        for change in DISTURBANCE * np.eye(len(instant.state.vector)):
+            instant.torque(change)
+            seen.append(self._remembered())
+        for label, held in usual.items():
+            if any(each[label] != held for each in seen) and self._acts_on(label, then):
+                raise SimulationError(
+                    f"the controller's memory.{label} keeps something of the state in which the "
+                    "step begins and its torques hang on it, which is not linearised here. "
+                    "hs.find_limit_cycle takes differences instead"
+                )
+
+    def check_memory(self) -> None:
+        """Refuse a law that acts on something that changes within the step: a state of its own."""
+        instant = self.now()
+        self._asked.restore(instant.numbers)
+        for label, held in self._remembered().items():
+            if self._constant.setdefault(label, held) == held:
+                continue
+            if self._acts_on(label, instant):
+                raise SimulationError(
+                    f"the controller's memory.{label} changes within a step and its torques "
+                    "hang on it: it is a state of its own, which is not linearised here. "
+                    "hs.floquet_multipliers takes differences of whole steps instead"
+                )
+
+    def _remembered(self) -> dict[str, float]:
+        """The numbers of the law's memory now, by name."""
+        memory = self._asked.numbers.memory
+        return {label: float(values[place]) for label, values, place in numbers_in(memory)}
+
+    def _acts_on(self, wanted: str, instant: Instant) -> bool:
+        """Whether torques hang on a number of the memory at an instant."""
+        usual = instant.torque()
+        instant.asked.restore(instant.numbers)
+        for label, values, place in numbers_in(self._asked.numbers.memory):
+            if label == wanted:
+                values[place] += PRESSED
+        pressed = replace(instant, numbers=instant.asked.snapshot())
+        return not np.array_equal(pressed.torque(), usual)
+
+
+def parameter_sizes(controller: Controller | None, names: Sequence[str]) -> dict[str, int]:
+    """Return how many real numbers the named parameters of a law are.
+
+    Raises
+    ------
+    SimulationError
+        If there is no law, or it has no such parameter.
+    """
+    if not names:
+        return {}
+    law = None if controller is None else law_of(controller)
+    sizes: dict[str, int] = {}
+    for label, _, _ in () if law is None else numbers_in(law.parameters):
+        name = label.partition("[")[0]
+        sizes[name] = sizes.get(name, 0) + 1
+    missing = [name for name in names if name not in sizes]
+    if missing:
+        raise SimulationError(
+            f"the controller has no parameter {missing[0]!r}; it has {', '.join(sizes) or 'none'}"
+        )
+    return {name: sizes[name] for name in names}
