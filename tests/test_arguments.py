@@ -63,6 +63,8 @@ def usual() -> dict[str, dict[str, Any]]:
         "TimeStepping": {},
         "Trial": {**walked, "controller": law, "step_length": 0.3, "step_duration": 0.7},
         "WholeBody": on_a_gait,
+        "Batch": walked,
+        "HeldTorque": {"robot": robot},
         "compare": {**walked, "methods": [hs.TimeStepping()], "duration": 0.1},
         "contact_forward_dynamics": {**there, "torque": np.zeros(robot.nu)},
         "contact_inverse_dynamics": {**there, "acceleration": np.zeros(robot.nv)},
@@ -96,7 +98,7 @@ def usual() -> dict[str, dict[str, Any]]:
     }
 
 
-RESULTS = """ActiveContacts Batch DisturbanceResponse Floquet Gait Largest LimitCycle Monodromy
+RESULTS = """ActiveContacts BatchResult DisturbanceResponse Floquet Gait Largest LimitCycle Monodromy
 PhasedGait Robot Run Snapshot StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
 TOLD_APART = """Bundle EndOfRun GaitLQR SteppingConstraints VirtualConstraints

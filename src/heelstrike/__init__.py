@@ -115,10 +115,12 @@ if TYPE_CHECKING:
     from heelstrike.robot import load_robot as load_robot
     from heelstrike.robot.human import human as human
     from heelstrike.sim import Batch as Batch
+    from heelstrike.sim import BatchResult as BatchResult
     from heelstrike.sim import Compliant as Compliant
     from heelstrike.sim import ControllerWarning as ControllerWarning
     from heelstrike.sim import EndOfRun as EndOfRun
     from heelstrike.sim import EventDriven as EventDriven
+    from heelstrike.sim import HeldTorque as HeldTorque
     from heelstrike.sim import HuntCrossley as HuntCrossley
     from heelstrike.sim import KelvinVoigt as KelvinVoigt
     from heelstrike.sim import Push as Push
@@ -144,6 +146,7 @@ _HOME = {
     "ActiveContacts": "heelstrike.contact",
     "Actuated": "heelstrike.control",
     "Batch": "heelstrike.sim",
+    "BatchResult": "heelstrike.sim",
     "Bundle": "heelstrike.compiler.bundle",
     "Compliant": "heelstrike.sim",
     "ComputedTorque": "heelstrike.control",
@@ -167,6 +170,7 @@ _HOME = {
     "GaitError": "heelstrike.errors",
     "Ground": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
+    "HeldTorque": "heelstrike.sim",
     "HuntCrossley": "heelstrike.sim",
     "InertialUnit": "heelstrike.control",
     "InfeasibleGaitError": "heelstrike.errors",

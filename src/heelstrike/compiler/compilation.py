@@ -161,6 +161,29 @@ def loop_for(signature: Any, function: Function) -> Function:
     return loop
 
 
+class AddressedLoop:
+    """A loop like those of :func:`loop_for`, which other compiled code can call, too.
+
+    Parameters
+    ----------
+    signature : numba signature
+        Types of the result, an integer, and of the arguments.
+    function : callable
+        The kernel.
+    """
+
+    def __init__(self, signature: Any, function: Callable[..., int]) -> None:
+        self.call, self._find = numba_in_use().loop(signature, function)
+
+    @cached_property
+    def address(self) -> int:
+        """Where its machine code is, for :func:`~heelstrike.compiler.separate_kernel.call_at`.
+
+        What is raised in it is not seen by those who call it so.
+        """
+        return self._find()
+
+
 def uncompiled(
     function: Function, replace: Mapping[Any, Any] | None = None, *,
     ours: Callable[[Any], Any] | None = None,

@@ -114,6 +114,18 @@ class DocumentedNumba:
         _alive.append(made)
         return self.kept(function, boundscheck=boundscheck), int(made.address)
 
+    def loop(
+        self, signature: Any, function: Callable[..., Any]
+    ) -> tuple[Callable[..., Any], Callable[[], int]]:
+        """Compile a function for Python and for the C calling convention.
+
+        Returns what :meth:`entry` does, and what returns its address.
+        """
+        compiled = self.kept(function)
+        self.compile(lambda: compiled.compile(signature))
+        compiled.disable_compile()
+        return self.entry(compiled, signature), lambda: self.separate(signature, function)[1]
+
     def is_kept(self, signature: Any, function: Callable[..., Any]) -> bool:  # noqa: ARG002
         """Whether :meth:`separate` would find machine code, or has no disk to look on."""
         place = self._place(function, "cfunc", False)

@@ -104,6 +104,13 @@ class PrivateNumba(DocumentedNumba):
             result.fndesc.llvm_cfunc_wrapper_name
         )
 
+    def loop(
+        self, signature: Any, function: Callable[..., Any]
+    ) -> tuple[Callable[..., Any], Callable[[], int]]:
+        """Compile a function once, for Python and for the C calling convention."""
+        compiled, address = self.separate(signature, function)
+        return self.entry(compiled, signature), lambda: address
+
     def is_kept(self, signature: Any, function: Callable[..., Any]) -> bool:
         """Whether :meth:`separate` would find machine code, or has no disk to look on."""
         cache: _Cache = self.kept(function, separate=True)._cache

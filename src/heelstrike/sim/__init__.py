@@ -9,7 +9,8 @@ from heelstrike.contact.modes import SOLVED as SOLVED
 from heelstrike.contact.problem import solve_contact_kernel as solve_contact_kernel
 from heelstrike.dynamics.kernels import integrate as integrate
 from heelstrike.dynamics.kernels import passive_force as passive_force
-from heelstrike.sim.batch import Batch, simulate_batch
+from heelstrike.sim.batch.batch import Batch
+from heelstrike.sim.batch.runs import BatchResult, simulate_batch
 from heelstrike.sim.clock import Clock as Clock
 from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus, Scheme
 from heelstrike.sim.compliant import Compliant
@@ -50,6 +51,7 @@ from heelstrike.sim.contacts.rows import LOOP as LOOP
 from heelstrike.sim.contacts.rows import POINT as POINT
 from heelstrike.sim.contacts.rows import SECOND_FACE as SECOND_FACE
 from heelstrike.sim.contacts.rows import STOP as STOP
+from heelstrike.sim.controller.held_torque import HeldTorque
 from heelstrike.sim.controller.interface import Contacts, Controller
 from heelstrike.sim.controller.raised import ControllerWarning, EndOfRun
 from heelstrike.sim.event_driven import EventDriven
@@ -77,6 +79,7 @@ from heelstrike.sim.time_stepping import SimulationWarning, TimeStepping
 
 __all__ = [
     "Batch",
+    "BatchResult",
     "BristleFriction",
     "Certificates",
     "Compliant",
@@ -87,6 +90,7 @@ __all__ = [
     "Event",
     "EventDriven",
     "EventKind",
+    "HeldTorque",
     "HuntCrossley",
     "KelvinVoigt",
     "Kernels",
