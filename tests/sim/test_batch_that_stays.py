@@ -220,8 +220,8 @@ def test_refusals() -> None:
         batch.reset(None, hs.State(np.zeros(8), np.zeros(9)))
     with pytest.raises(hs.SimulationError, match="finite"):
         batch.advance(np.inf)
-    with pytest.raises(hs.SimulationError, match="friction"):
-        batch.lay(0, friction=0.5)
+    with pytest.raises(hs.SimulationError, match="run 1: ground must be"):
+        batch.lay(1, ground=0.5)  # type: ignore[arg-type]
     with pytest.raises(hs.SimulationError, match="as many snapshots"):
         batch.restore(batch.snapshot()[:1])
     with pytest.raises(hs.SimulationError, match="lanes is 3"):

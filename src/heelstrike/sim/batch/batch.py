@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.arguments import are_numbers, refusal, takes
-from heelstrike.compiler.bundle import address_of_array
+from heelstrike.compiler.bundle import Bundle, address_of_array
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers
@@ -118,10 +118,9 @@ class Batch:
     Examples
     --------
     >>> import heelstrike as hs
-    >>> robot = hs.load_robot("compass_gait")
+    >>> robot = hs.load_robot("bravo7")
     >>> batch = hs.Batch(
-    ...     robot, hs.HeldTorque(robot), state=robot.reference_state(), lanes=3,
-    ...     stop_when_fallen=False,
+    ...     robot, hs.HeldTorque(robot), state=robot.reference_state(), lanes=3
     ... )
     >>> batch.command[:, 0] = [-1.0, 0.0, 1.0]
     >>> batch.step(10)
@@ -200,8 +199,14 @@ class Batch:
         self.torque: Floats = column(memory.torque)
         self.gap: Floats = column(memory.contacts.gap)
         self.contact_force: Floats = column(memory.contacts.force)
-        for name in TALLIED:
-            setattr(self, name, column(found[f"tally.{name}"]))
+        tallied = {name: column(found[f"tally.{name}"]) for name in TALLIED}
+        self.steps: Integers = tallied["steps"]
+        self.saturations: Integers = tallied["saturations"]
+        self.penetration: Floats = tallied["penetration"]
+        self.complementarity: Floats = tallied["complementarity"]
+        self.cone: Floats = tallied["cone"]
+        self.non_penetration: Floats = tallied["non_penetration"]
+        self.energy_gain: Floats = tallied["energy_gain"]
 
     def __len__(self) -> int:
         return len(self._plans)
@@ -363,42 +368,69 @@ class Batch:
             self._outcome[chosen] = WENT_ON
             self._share_out()
 
-    def lay(self, index: int, **about: Any) -> None:
-        """Let a lane be another: other robot, ground, pushes, parameters or state; it begins anew.
+    def lay(
+        self,
+        index: int,
+        *,
+        robot: Robot | None = None,
+        controller: Controller | None = None,
+        state: State | None = None,
+        parameters: Bundle | None = None,
+        pushes: Sequence[Push] | None = None,
+        ground: Ground | None = None,
+        latched: Sequence[str | int] | None = None,
+        braked: Sequence[str | int] | None = None,
+    ) -> None:
+        """Let a lane be another, which begins anew; what is left out stays as it was laid before.
 
         Parameters
         ----------
         index : int
             Which.
-        **about
-            `robot`, `controller`, `state`, `parameters`, `pushes`, `ground`, `latched`, `braked`,
-            as for one lane of a new batch; what is left out stays.
+        robot : Robot, optional
+            Built as those of the other lanes.
+        controller : controller, optional
+            Compiled.
+        state : State, optional
+            Where it begins.
+        parameters : Bundle, optional
+            Numbers of the controller, in the place of its own.
+        pushes : sequence of Push, optional
+            Forces from outside.
+        ground : Ground, optional
+            The ground.
+        latched, braked : sequence of str or int, optional
+            Joints that latches and brakes hold as it begins.
 
         Raises
         ------
         SimulationError, ControllerError
             If they are not usable; nothing has changed then.
+        IndexError
+            If there is no such lane.
         """
-        before = self._plans[range(len(self))[index]]
-        setting, law = before.setting, before.law
+        index = range(len(self))[index]
+        before = self._plans[index]
+        setting = before.setting
         known = {
-            "robot": setting.robot, "controller": law, "state": setting.state, "parameters": None,
-            "pushes": (setting.pushes,), "ground": setting.ground, "latched": before.latched,
+            "robot": setting.robot, "controller": before.law, "state": setting.state,
+            "parameters": None, "pushes": (setting.pushes,), "ground": setting.ground,
+            "latched": before.latched,
             "braked": [setting.robot.brake_names[i] for i, on in enumerate(setting.braked) if on],
         }  # fmt: skip
-        strange = about.keys() - known.keys()
-        if strange:
-            raise SimulationError(
-                f"a lane is laid with {', '.join(known)}; got {', '.join(sorted(strange))}"
-            )
+        given = {
+            "robot": robot, "controller": controller, "state": state, "parameters": parameters,
+            "pushes": None if pushes is None else (tuple(pushes),), "ground": ground,
+            "latched": latched, "braked": braked,
+        }  # fmt: skip
+        about: Any = known | {name: each for name, each in given.items() if each is not None}
         with naming(index, 2):
-            plans, _ = planned(self.method, self._setup, **known | about)
+            plans, _ = planned(self.method, self._setup, **about)
             if len(plans) != 1:
                 raise SimulationError(f"one lane is laid at once, got arguments for {len(plans)}")
             self._lanes.refuse_others(plans)
             compile_all(self.method, plans)
-            self._lanes.lay(range(len(self))[index], plans[0])
-        index = range(len(self))[index]
+            self._lanes.lay(index, plans[0])
         self._plans[index] = plans[0]
         commanded = self._lanes.lanes[index].commanded
         self.command[index] = 0.0 if commanded is None else commanded

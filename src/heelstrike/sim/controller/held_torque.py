@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array
+from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.law import Law, controller, per_actuator
@@ -44,15 +46,14 @@ class HeldTorque(Law):
     Examples
     --------
     >>> import heelstrike as hs
-    >>> robot = hs.load_robot("compass_gait")
-    >>> simulation = hs.Simulation(
-    ...     robot, hs.HeldTorque(robot), state=robot.reference_state(), stop_when_fallen=False
-    ... )
+    >>> robot = hs.load_robot("bravo7")
+    >>> simulation = hs.Simulation(robot, hs.HeldTorque(robot), state=robot.reference_state())
     >>> simulation.parameters.torque[:] = 0.5
     >>> simulation.advance(0.01).value
     'completed'
     """
 
+    @takes(ControllerError)
     def __init__(self, robot: Robot, torque: ArrayLike = 0.0) -> None:
         held = per_actuator("torque", torque, robot)
         super().__init__(held_torque, Command(torque=held))
