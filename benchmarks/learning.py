@@ -1,9 +1,10 @@
 """Environment steps a second, beside those of Gymnasium and MuJoCo in the same run.
 
-``python benchmarks/learning.py speed`` moves Walker2d with random actions, resets included: the native
-vector and a single environment in a Python loop, the physics alone (the same lanes without
-observations, rewards and resets), Gymnasium's own environments one by one (sync) and in processes
-(async), and MuJoCo's ``rollout``. ``... identical`` compares lanes with single simulations, bit by bit.
+``python benchmarks/learning.py speed`` moves Walker2d with random actions, resets included: the
+native vector and a single environment in a Python loop, the physics alone (the same lanes, which
+begin anew in the same states, without observations, rewards and noise), Gymnasium's own
+environments one by one (sync) and in processes (async), and MuJoCo's ``rollout``. ``... identical``
+compares lanes with single simulations, bit by bit.
 
 Times are processor times of this process but for async, whose work is done by others (clock); of
 each the best of several repetitions is printed, which are interleaved.
@@ -35,8 +36,14 @@ from heelstrike.experiments.learning.tasks import RUNNING
 Timed = Callable[[], tuple[int, float]]
 
 
-def timed(steps: Callable[[], int], clock: Callable[[], float] = time.process_time) -> Timed:
+def timed(
+    steps: Callable[[], int], begin_anew: Callable[[], Any],
+    clock: Callable[[], float] = time.process_time,
+) -> Timed:  # fmt: skip
+    """Return what times some steps, but for what comes before the first."""
+
     def once() -> tuple[int, float]:
+        begin_anew()
         begin = clock()
         count = steps()
         return count, clock() - begin
@@ -45,6 +52,7 @@ def timed(steps: Callable[[], int], clock: Callable[[], float] = time.process_ti
 
 
 def speed(task: str, lanes: int, decisions: int, repetitions: int, *, peers: bool) -> None:
+    """Print steps a second."""
     actions = np.random.default_rng(0).uniform(
         -1, 1, (decisions, lanes, Course(RUNNING[task]).robot.nu)
     )
@@ -53,9 +61,9 @@ def speed(task: str, lanes: int, decisions: int, repetitions: int, *, peers: boo
     single = environments.RunningEnv(task)
     course = Course(RUNNING[task], lanes)
     kept: list[Any] = []
+    first: list[Any] = []
 
     def run_vector() -> int:
-        vector.reset(seed=0)
         for action in actions:
             vector.step(action)
         return decisions * lanes
@@ -63,24 +71,27 @@ def speed(task: str, lanes: int, decisions: int, repetitions: int, *, peers: boo
     def keep_episodes() -> None:
         """Note the very episodes that the vector goes through, to move them without it."""
         vector.reset(seed=0)
+        batch = vector._lanes.batch
+        first.extend((batch.position.copy(), batch.velocity.copy()))
         for action in actions:
             over = np.flatnonzero(vector._over)
             vector.step(action)
-            batch = vector._lanes.batch
             kept.append((over, batch.position[over].copy(), batch.velocity[over].copy()))
 
     def run_physics() -> int:
         batch = course.batch
-        batch.reset()
         for action, (over, q, v) in zip(actions, kept, strict=True):
             np.multiply(action, course.gear, out=batch.command)
-            batch.step(RUNNING[task].frame_skip)
-            if over.size:
+            if over.size:  # these begin anew, and do not move
                 batch._begin_anew(over, q, v)
+                moves = np.ones(lanes, dtype=bool)
+                moves[over] = False
+                batch.step(RUNNING[task].frame_skip, moves)
+            else:
+                batch.step(RUNNING[task].frame_skip)
         return decisions * lanes
 
     def run_single() -> int:
-        single.reset(seed=0)
         for action in actions[:, 0]:
             if single.step(action)[2]:
                 single.reset()
@@ -88,9 +99,9 @@ def speed(task: str, lanes: int, decisions: int, repetitions: int, *, peers: boo
 
     keep_episodes()
     tried: dict[str, Timed] = {
-        f"native vector, {lanes} lanes": timed(run_vector),
-        "physics alone": timed(run_physics),
-        "single environment, Python loop": timed(run_single),
+        f"native vector, {lanes} lanes": timed(run_vector, lambda: vector.reset(seed=0)),
+        "physics alone": timed(run_physics, lambda: course.batch.reset(None, hs.State(*first))),
+        "single environment, Python loop": timed(run_single, lambda: single.reset(seed=0)),
     }
     if peers:
         few = max(decisions // 10, 1)
@@ -99,16 +110,19 @@ def speed(task: str, lanes: int, decisions: int, repetitions: int, *, peers: boo
 
         def run(env: Any) -> Callable[[], int]:
             def steps() -> int:
-                env.reset(seed=0)
                 for action in actions[:few]:
                     env.step(action)
                 return few * lanes
 
             return steps
 
-        tried["Gymnasium, sync"] = timed(run(theirs))
-        tried["Gymnasium, async (clock)"] = timed(run(others), time.perf_counter)
-        tried["mujoco.rollout, one thread"] = timed(rollout(task, lanes, few, actions))
+        tried["Gymnasium, sync"] = timed(run(theirs), lambda: theirs.reset(seed=0))
+        tried["Gymnasium, async (clock)"] = timed(
+            run(others), lambda: others.reset(seed=0), time.perf_counter
+        )
+        tried["mujoco.rollout, one thread"] = timed(
+            rollout(task, lanes, few, actions), lambda: None
+        )
     best = dict.fromkeys(tried, 0.0)
     for _ in range(repetitions):
         for name, once in tried.items():
@@ -122,6 +136,7 @@ def speed(task: str, lanes: int, decisions: int, repetitions: int, *, peers: boo
 
 
 def rollout(task: str, lanes: int, decisions: int, actions: Any) -> Callable[[], int]:
+    """Return what moves MuJoCo's lanes by its own loop."""
     import mujoco
     from mujoco import rollout as rolling
 
@@ -181,6 +196,7 @@ def identical(lanes: int, steps: int, seed: int) -> None:
 
 
 def main() -> None:
+    """Do what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("what", choices=["speed", "identical"])
     parser.add_argument("--task", default="Walker2d", choices=list(RUNNING))

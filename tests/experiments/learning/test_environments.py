@@ -154,7 +154,7 @@ def test_what_is_wrong_is_said() -> None:
     lanes.reset(seed=[1, None, 3])
     single.reset(seed=0)
     for wrong, words in (
-        (np.zeros((3, 5)), "shape"), (np.full((3, 6), np.nan), "lane 0 is not finite"),
+        (np.zeros((3, 5)), "shape"), (np.full((3, 6), np.nan), "lane 2 is not finite"),
         (np.full((3, 6), "a"), "numbers"), (None, "numbers"),
     ):  # fmt: skip
         with pytest.raises(ValueError, match=words):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -21,6 +20,9 @@ from heelstrike.sim import Batch, HeldTorque, TimeStepping
 TERMS = ("x_position", "z_distance_from_origin", "x_velocity", "reward_forward", "reward_ctrl",
          "reward_survive")  # fmt: skip
 """What is told of a step beside its reward."""
+
+AT_ONCE = 16
+"""Episodes for which noise is drawn at once."""
 
 
 class Course:
@@ -65,6 +67,10 @@ class Course:
         self.reward = np.zeros(lanes)
         self.terminated = np.zeros(lanes, dtype=np.bool_)
         self.terms = np.zeros((lanes, len(TERMS)))
+        self._start = self.initial.vector
+        self._randoms = [np.random.default_rng() for _ in range(lanes)]
+        self._noise = np.zeros((lanes, AT_ONCE, robot.nq + robot.nv))
+        self._drawn = np.full(lanes, AT_ONCE, dtype=np.int64)
         self._before = np.zeros(lanes)
         self._action = np.zeros((lanes, robot.nu))
         self._numbers = np.array([
@@ -73,29 +79,46 @@ class Course:
             *task.healthy_state_range, task.velocity_limit, self.initial.q[1],
             float(task.terminate_when_unhealthy),
         ])  # fmt: skip
-        self._judge = _judge()
+        self._command, self._judge = _command(), _judge()
         self._assess(self._every)
 
     @property
     def _every(self) -> Integers:
         return np.arange(len(self.batch))
 
-    def begin(self, chosen: Integers, randoms: Sequence[np.random.Generator]) -> None:
+    def seed(self, lane: int, random: np.random.Generator) -> None:
+        """Have the noise of a lane drawn from other random numbers from now on.
+
+        Parameters
+        ----------
+        lane : int
+            Which.
+        random : Generator
+            What it is drawn from, positions first. It is drawn for several episodes at once.
+        """
+        self._randoms[lane] = random
+        self._drawn[lane] = AT_ONCE
+
+    def begin(self, chosen: Integers) -> None:
         """Let lanes begin anew, each with noise of its own.
 
         Parameters
         ----------
         chosen : (k,) int
             Which lanes.
-        randoms : sequence of k Generator
-            What the noise of each is drawn from, positions first.
         """
-        q, v = self._noise(randoms)
-        batch = self.batch
-        batch._begin_anew(chosen, self.initial.q + q, self.initial.v + v)
+        drawn = self._drawn[chosen]
+        for lane in chosen[drawn == AT_ONCE].tolist():
+            self._draw(lane)
+        drawn %= AT_ONCE
+        noise = self._noise[chosen, drawn]
+        self._drawn[chosen] = drawn + 1
+        noise += self._start
+        nq = self.robot.nq
+        self.batch._begin_anew(chosen, noise[:, :nq], noise[:, nq:])
         self._assess(chosen)
 
-    def step(self, action: ArrayLike) -> None:
+    def step(self, action: ArrayLike, mask: NDArray[np.bool_] | None = None) -> None:
         """Make a decision in all lanes.
 
         Parameters
@@ -103,31 +126,27 @@ class Course:
         action : (n, nu) float
             Parts of the greatest torques, from -1 to 1; what is beyond is cut, and costs all the
             same.
+        mask : (n,) bool, optional
+            Which lanes move; all by default.
 
         Raises
         ------
         SimulationError
             If it is of another shape, or not finite.
         """
-        self._action[:] = self.checked(action)
-        np.clip(self._action, -1.0, 1.0, out=self.batch.command)
-        self.batch.command *= self.gear
-        self._before[:] = self.batch.position[:, 0]
-        self.batch.step(self.task.frame_skip)
-        self._assess(None)
-
-    def checked(self, action: ArrayLike) -> NDArray[Any]:
-        """Return an action as an array of numbers, or refuse it."""
         given = np.asarray(action)
         if given.shape != self._action.shape or given.dtype.kind not in "fiu":
             raise SimulationError(
                 f"an action has shape {self._action.shape} and numbers in it, got shape "
                 f"{given.shape} of {given.dtype}"
             )
-        if not np.isfinite(given).all():
-            lane = int(np.flatnonzero(~np.isfinite(given).all(axis=1))[0])
-            raise SimulationError(f"the action of lane {lane} is not finite: {given[lane]}")
-        return given
+        self._action[:] = given
+        batch = self.batch
+        wrong = self._command(self._action, self.gear, batch._q, self._before, batch.command)
+        if wrong >= 0:
+            raise SimulationError(f"the action of lane {wrong} is not finite: {given[wrong]}")
+        batch.step(self.task.frame_skip, mask)
+        self._assess(None)
 
     def state_of(self, lane: int) -> State:
         """Return where a robot is."""
@@ -147,33 +166,29 @@ class Course:
             In a person's words.
         """
         batch, task = self.batch, self.task
-        if not batch.going[lane]:
+        if batch.outcome[lane] > 1:
             return batch.message(lane)
-        q, v = batch.position[lane], batch.velocity[lane]
-        ranges = (
-            ("the height of the trunk", "m", q[1:2], task.healthy_z_range),
-            ("its pitch", "rad", q[2:3], task.healthy_angle_range),
-            ("a position or velocity", "", np.append(q[2:], v), task.healthy_state_range),
-        )
-        for name, unit, values, (low, high) in ranges:
-            out = values[~((low < values) & (values < high))]
-            if out.size:
-                return f"{name} is {out[0]:.3g} {unit}, out of {low:g} to {high:g}".replace(
-                    "  ", " "
-                )
+        q, v = batch.position[lane].tolist(), batch.velocity[lane].tolist()
+        for name, unit, values, (low, high) in (
+            ("the height of the trunk", " m", q[1:2], task.healthy_z_range),
+            ("its pitch", " rad", q[2:3], task.healthy_angle_range),
+            ("a position or velocity", "", q[2:] + v, task.healthy_state_range),
+        ):
+            for value in values:
+                if not low < value < high:
+                    return f"{name} is {value:.3g}{unit}, out of {low:g} to {high:g}"
         return "it is healthy"
 
-    def _noise(self, randoms: Sequence[np.random.Generator]) -> tuple[Floats, Floats]:
-        task, robot = self.task, self.robot
-        scale = task.reset_noise_scale
-        q, v = np.empty((len(randoms), robot.nq)), np.empty((len(randoms), robot.nv))
-        for place, random in enumerate(randoms):
-            q[place] = random.uniform(-scale, scale, robot.nq)
-            if task.normal_noise:
-                v[place] = scale * random.standard_normal(robot.nv)
-            else:
-                v[place] = random.uniform(-scale, scale, robot.nv)
-        return q, v
+    def _draw(self, lane: int) -> None:
+        """Draw the noise of the next episodes of a lane."""
+        task, robot, random = self.task, self.robot, self._randoms[lane]
+        scale, noise = task.reset_noise_scale, self._noise[lane]
+        if not task.normal_noise:
+            noise[:] = random.uniform(-scale, scale, noise.shape)
+            return
+        for row in noise:
+            row[: robot.nq] = random.uniform(-scale, scale, robot.nq)
+            row[robot.nq :] = scale * random.standard_normal(robot.nv)
 
     def _assess(self, begun: Integers | None) -> None:
         """Observe and judge all lanes, or those that have just begun."""
@@ -184,6 +199,29 @@ class Course:
             self._skipped, self._numbers, batch._q, batch._v, batch._outcome, self._before,
             self._action, self.terms, self.observation, self.reward, self.terminated,
         )  # fmt: skip
+
+
+@cache
+def _command() -> Any:
+    """Return what makes torques of actions; see `command` within."""
+
+    def command(
+        action: Floats, gear: Floats, q: Floats, before: Floats, torque: Floats
+    ) -> int:  # fmt: skip
+        """Write torques, and where robots are; return a lane whose action is no numbers, or -1."""
+        wrong = -1
+        for lane in range(action.shape[0]):
+            before[lane] = q[lane, 0]
+            for i in range(action.shape[1]):
+                value = action[lane, i]
+                if not abs(value) < np.inf:
+                    wrong = lane
+                torque[lane, i] = gear[i] * min(max(value, -1.0), 1.0)
+        return wrong
+
+    table, vector = types.float64[:, ::1], types.float64[::1]
+    signature = types.int64(table, vector, types.float64[:, :], vector, table)
+    return loop_for(signature, command)
 
 
 @cache

@@ -38,9 +38,6 @@ except ImportError as missing:
 Array = NDArray[Any]
 Info = dict[str, Any]
 
-CERTIFICATES = ("complementarity", "cone", "non_penetration")
-"""Worst residuals of the contact problems of an episode, as `info` has them."""
-
 FRAMES = 50
 """Frames a second that are told to those who make films: that of a decision, if it is less."""
 
@@ -106,7 +103,9 @@ class RunningEnv(gymnasium.Env[Floats, Array]):
         """
         _check_open(self._state)
         super().reset(seed=seed)
-        self._lanes.begin(self._first, [self.np_random])
+        if seed is not None or self._state == "new":
+            self._lanes.seed(0, self.np_random)
+        self._lanes.begin(self._first)
         self._state = "begun"
         x, z = self._lanes.terms[0, :2].tolist()
         return self._lanes.observation[0].copy(), {"x_position": x, "z_distance_from_origin": z}
@@ -138,7 +137,9 @@ class RunningEnv(gymnasium.Env[Floats, Array]):
             raise _refused(wrong) from None
         batch = lanes.batch
         info: Info = dict(zip(TERMS, lanes.terms[0].tolist(), strict=True))
-        info["certificate"] = max(float(getattr(batch, name)[0]) for name in CERTIFICATES)
+        info["certificate"] = max(
+            batch.complementarity.item(), batch.cone.item(), batch.non_penetration.item()
+        )
         terminated = bool(lanes.terminated[0])
         if terminated:
             info["cause"] = lanes.cause(0)
@@ -201,7 +202,6 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
             "autoreset_mode": self.autoreset_mode, "threads": threads, "render_mode": render_mode,
             **changes,
         }  # fmt: skip
-        self._randoms: list[np.random.Generator] = []
         self._decisions = np.zeros(num_envs, dtype=np.int64)
         self._over = np.zeros(num_envs, dtype=np.bool_)
         self._all = np.ones(num_envs, dtype=np.bool_)
@@ -268,19 +268,18 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
             _check_begun(self._state)
         lanes, over = self._lanes, self._over
         waits = bool(over.any())
+        went = ~over if waits else self._all
         if waits and self.autoreset_mode is AutoresetMode.DISABLED:
             raise error.ResetNeeded(
                 f"episodes of lanes {np.flatnonzero(over).tolist()} are over: call "
                 "reset(options={'reset_mask': terminated | truncated})"
             )
         try:
-            lanes.step(actions)
+            lanes.step(actions, went if waits else None)
         except SimulationError as wrong:
             raise _refused(wrong) from None
         self._decisions += 1
-        went = self._all
         if waits:  # what was over begins anew with this step, whatever its action
-            went = ~over
             self._begin(np.flatnonzero(over))
             lanes.reward[~went] = 0.0
         terminated = lanes.terminated & went
@@ -312,9 +311,7 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
         self._lanes.batch.close()
 
     def _begin(self, chosen: Integers) -> None:
-        if not self._randoms:
-            self._seed([None] * self.num_envs)
-        self._lanes.begin(chosen, [self._randoms[lane] for lane in chosen.tolist()])
+        self._lanes.begin(chosen)
         self._decisions[chosen] = 0
         self._over[chosen] = False
 
@@ -327,11 +324,9 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
             seeds = list(seed)
         if len(seeds) != self.num_envs:
             raise error.Error(f"there are {self.num_envs} lanes, and {len(seeds)} seeds")
-        if not self._randoms:
-            self._randoms = [seeding.np_random()[0] for _ in seeds]
         for lane, each in enumerate(seeds):
             if each is not None:
-                self._randoms[lane] = seeding.np_random(each)[0]
+                self._lanes.seed(lane, seeding.np_random(each)[0])
 
     def _mask(self, options: Info | None) -> Array:
         mask = None if options is None else options.get("reset_mask")

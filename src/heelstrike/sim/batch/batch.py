@@ -274,28 +274,36 @@ class Batch:
         self._lent.add(index)
         return self._lanes.lanes[index]
 
-    def step(self, steps: int = 1) -> None:
+    def step(self, steps: int = 1, mask: ArrayLike | None = None) -> None:
         """Take steps of the method in all lanes that have not ended.
 
         Parameters
         ----------
         steps : int
             How many.
+        mask : (n,) bool, optional
+            Which lanes move; all by default.
 
         Raises
         ------
         SimulationError
-            If that is no whole number ≥ 1.
+            If that is no whole number ≥ 1, or the mask none.
         """
         given: object = steps
         if not (isinstance(given, int | np.integer) and given >= 1):
             raise SimulationError(f"steps must be a whole number ≥ 1, got {given!r}")
+        if self._lent:
+            self._look_at_lent()
+        shares = self._shares
+        if mask is not None:
+            chosen = self._checked(mask)
+            shares = [share[chosen[share]] for share in shares]
         left = int(steps)
         self._until.fill(FAR)
-        while left > 0:
-            some = min(left, self._steps_at_once)
-            self._move(self._shares, some)
-            left -= some
+        while left > self._steps_at_once:
+            self._move(shares, self._steps_at_once)
+            left -= self._steps_at_once
+        self._move(shares, left)
 
     def advance(self, until: ArrayLike) -> None:
         """Simulate all lanes that have not ended until a time of each.
@@ -322,7 +330,7 @@ class Batch:
             self.method.instant(lane._clock, time)
             for lane, time in zip(lanes, times.tolist(), strict=True)
         ]
-        early = self.time < self._until
+        early = (self.time < self._until) & self.going
         while True:
             shares = [share[early[share]] for share in self._shares]
             if not any(share.size for share in shares):
@@ -358,15 +366,13 @@ class Batch:
     def _begin_anew(self, chosen: Integers, q: Floats, v: Floats) -> None:
         """Let lanes begin anew in states that are good."""
         lanes = self._lanes
-        lanes.put_back(chosen)
-        self._q[chosen], self._v[chosen] = q, v
-        ended = self._outcome[chosen] > WENT_ON
-        if self._lent or self._any_special or ended.any():
+        lanes.put_back(chosen, (q, v), (self._q, self._v))
+        if self._lent or self._any_special or self._has_ended:
             for index in chosen.tolist():
                 lanes.lanes[index].begin_anew()
                 self._hold(index)
             self._outcome[chosen] = WENT_ON
-            self._share_out()
+            self._has_ended = bool((self._outcome > WENT_ON).any())
 
     def lay(
         self,
@@ -486,13 +492,17 @@ class Batch:
         """Return the lanes of a mask."""
         if mask is None:
             return np.arange(len(self))
+        return np.flatnonzero(self._checked(mask))
+
+    def _checked(self, mask: ArrayLike) -> NDArray[np.bool_]:
+        """Return a mask, or refuse what is none."""
         array = np.asarray(mask)
         if array.dtype != np.bool_ or array.shape != (len(self),):
             raise SimulationError(
                 f"mask must have one truth value a lane, ({len(self)},) bool, got shape "
                 f"{array.shape} of {array.dtype}"
             )
-        return np.flatnonzero(array)
+        return array
 
     def _states(self, chosen: Integers, state: State | None) -> tuple[Floats, Floats]:
         """Return positions and velocities of the lanes that are reset."""
@@ -563,15 +573,11 @@ class Batch:
         self._any_special = bool(model.latches or model.brakes) or any(
             np.isfinite(plan.setting.fallen_height) or plan.setting.pushes for plan in self._plans
         )
-        self._share_out()
-
-    def _share_out(self) -> None:
-        """Find the lanes that each thread is to move."""
-        going, threads = self.going, range(self._crew.threads)
-        mine = [going & (self._lanes.thread == thread) for thread in threads]
-        self._shares = [np.flatnonzero(each) for each in mine]
+        thread = self._lanes.thread
+        self._shares = [np.flatnonzero(thread == each) for each in range(self._crew.threads)]
         longest = max(share.size for share in self._shares)
-        self._steps_at_once = max(LOOK_EVERY // max(longest, 1), 1)
+        self._steps_at_once = max(LOOK_EVERY // longest, 1)
+        self._has_ended = bool((self._outcome > WENT_ON).any())
 
     def _look_at_lent(self) -> None:
         """See what has become of lanes that somebody has in hand."""
@@ -587,47 +593,49 @@ class Batch:
         self._tell_apart()
 
     def _move(self, shares: list[Integers], steps: int) -> None:
-        """Move lanes on by so many steps, or until the times that are set."""
-        if self._lent:
-            self._look_at_lent()
-            shares = [share[self._outcome[share] <= WENT_ON] for share in shares]
+        """Move lanes that have not ended by so many steps, or until the times that are set."""
+        lanes, outcome = self._lanes, self._outcome
+        if self._has_ended:
+            shares = [share[outcome[share] <= WENT_ON] for share in shares]
         together = shares
         if self._any_alone:
             together = [share[~self._alone[share]] for share in shares]
-        lanes, move = self._lanes, move_lanes()
+        move, ended = move_lanes(), 0
+        if len(together) == 1:
+            share = together[0]
+            ended = move(
+                lanes.places, share, self._until, steps, self._command, outcome, lanes.events
+            )
+        else:
+            counts = [0] * len(together)
 
-        def work(thread: int) -> None:
-            share = together[thread]
-            if share.size:
-                move(
-                    lanes.places, share, self._until, steps, self._command, self._outcome,
+            def work(thread: int) -> None:
+                counts[thread] = move(
+                    lanes.places, together[thread], self._until, steps, self._command, outcome,
                     lanes.events,
                 )  # fmt: skip
 
-        self._crew.work(work)
-        ended = False
-        for share in together:
-            if share.size and self._outcome[share].max() > WENT_ON:
-                ended = True
-                for index in share[self._outcome[share] > WENT_ON].tolist():
-                    lanes.lanes[index].came_to(int(self._outcome[index]))
-        if self._any_alone:
-            alone = (index for share in shares for index in share[self._alone[share]].tolist())
-            for index in alone:
-                ended |= self._move_alone(index, steps)
+            self._crew.work(work)
+            ended = sum(counts)
         if ended:
-            self._share_out()
+            self._has_ended = True
+            for index in np.concatenate(together).tolist():
+                if outcome[index] > WENT_ON:
+                    lanes.lanes[index].came_to(int(outcome[index]))
+        if self._any_alone:
+            for index in np.concatenate([share[self._alone[share]] for share in shares]).tolist():
+                self._move_alone(index, steps)
 
-    def _move_alone(self, index: int, steps: int) -> bool:
-        """Move a lane whose controller has to be looked at; return whether it has ended."""
+    def _move_alone(self, index: int, steps: int) -> None:
+        """Move a lane whose controller has to be looked at."""
         lane = self._lanes.lanes[index]
         lane.move(float(self._until[index]), steps)
         lane.count_events()
         if lane.status is RunStatus.INTERRUPTED:
             raise KeyboardInterrupt
-        going = lane.status in CAN_GO_ON
-        self._outcome[index] = WENT_ON if going else _OUTCOME_OF[lane.status]
-        return not going
+        if lane.status not in CAN_GO_ON:
+            self._outcome[index] = _OUTCOME_OF[lane.status]
+            self._has_ended = True
 
 
 TALLIED = (

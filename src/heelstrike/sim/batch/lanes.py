@@ -13,7 +13,7 @@ from heelstrike.compiler.bundle import address_of_array
 from heelstrike.compiler.mold import Mold
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Integers
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.batch.lane import Lane
 from heelstrike.sim.batch.moving import PLACES, put_back_lanes
@@ -98,10 +98,12 @@ class Lanes:
         """Find what a lane is moved with, which may be elsewhere now."""
         self.places[index] = self.lanes[index].places
 
-    def put_back(self, lanes: Integers) -> None:
-        """Let lanes be as they began; where they are and what is pushed is for others to say."""
-        put_back_lanes()(lanes, self._spots, self._image_at)
-        self.events[lanes] = 0
+    def put_back(self, lanes: Integers, new: tuple[Floats, Floats], state: Any) -> None:
+        """Let lanes be as they began, but for ground, pushes and parameters, in new states.
+
+        ``new`` are positions and velocities, a row for each of them; ``state`` are those of all.
+        """
+        put_back_lanes()(lanes, self._spots, self._image_at, *new, *state, self.events)
 
     def make_ready(self) -> None:
         """Find what the lanes are moved with, and keep how they begin, to be put back."""

@@ -13,7 +13,7 @@ from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.compiler.words import copy_between
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.frame import FORK, RECORD_FULL
+from heelstrike.sim.frame import FORK, PAUSED, RECORD_FULL
 from heelstrike.sim.record.record import Record
 
 # The columns of places: where the loop of a lane is and the bundles that it is called with, and
@@ -34,8 +34,10 @@ def move_lanes() -> Any:
         """Move lanes on until a time of each, or by so many steps.
 
         ``command`` is (where the commanded torques are, how many a lane has). Writes why the loop
-        of each came back to ``outcome`` and adds what happened in it to ``events``.
+        of each came back to ``outcome`` and adds what happened in it to ``events``. Returns how
+        many have ended.
         """
+        ended = 0
         for place in range(lanes.shape[0]):
             lane = lanes[place]
             clock, record = clock_at(places[lane, CLOCK]), record_at(places[lane, RECORD])
@@ -61,7 +63,8 @@ def move_lanes() -> Any:
                         events[lane, record.event_kind[event]] += 1
                     record.rows = record.events = record.logged = 0
             outcome[lane] = code
-        return 0
+            ended += code > PAUSED
+        return ended
 
     integers, table = types.int64[::1], types.int64[:, ::1]
     return loop_for(
@@ -76,8 +79,15 @@ def move_lanes() -> Any:
 def put_back_lanes() -> Any:
     """Return what lets lanes be as they were: see `put_back` within."""
 
-    def put_back(lanes: Integers, spots: Integers, images: Integers) -> int:
-        """Copy what is at the image of each lane to its spots: (lanes, arrays, place and words)."""
+    def put_back(
+        lanes: Integers, spots: Integers, images: Integers, new_q: Floats, new_v: Floats,
+        q: Floats, v: Floats, events: Integers,
+    ) -> int:  # fmt: skip
+        """Copy what is at the image of each lane to its spots, and a state into it.
+
+        ``spots`` are (lanes, arrays, place and words); ``new_q`` and ``new_v`` have a row for each
+        lane that is put back. No event has happened in it then.
+        """
         for place in range(lanes.shape[0]):
             lane = lanes[place]
             source = images[lane]
@@ -85,7 +95,17 @@ def put_back_lanes() -> Any:
                 words = spots[lane, array, 1]
                 copy_between(source, spots[lane, array, 0], words)
                 source += WORD_BYTES * words
+            for i in range(q.shape[1]):
+                q[lane, i] = new_q[place, i]
+            for i in range(v.shape[1]):
+                v[lane, i] = new_v[place, i]
+            for kind in range(events.shape[1]):
+                events[lane, kind] = 0
         return 0
 
-    integers = types.int64[::1]
-    return loop_for(types.int64(integers, types.int64[:, :, ::1], integers), put_back)
+    integers, columns = types.int64[::1], types.float64[:, :]
+    given = columns, columns, columns, columns
+    return loop_for(
+        types.int64(integers, types.int64[:, :, ::1], integers, *given, types.int64[:, ::1]),
+        put_back,
+    )
