@@ -79,6 +79,7 @@ if TYPE_CHECKING:
     from heelstrike.control import GaitLQR as GaitLQR
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
+    from heelstrike.control import Policy as Policy
     from heelstrike.control import Sensed as Sensed
     from heelstrike.control import StandingLQR as StandingLQR
     from heelstrike.control import SteppingConstraints as SteppingConstraints
@@ -181,6 +182,7 @@ _HOME = {
     "LimitCycleError": "heelstrike.errors",
     "Monodromy": "heelstrike.analysis.stability.monodromy",
     "PhasedGait": "heelstrike.gait",
+    "Policy": "heelstrike.control",
     "Push": "heelstrike.sim",
     "Robot": "heelstrike.robot",
     "RobotBuilder": "heelstrike.robot",
