@@ -240,7 +240,9 @@ def _weights(network: Network) -> Weights:
     rows = max(each.shape[1] for each in words)
     return Weights(
         layers=np.array(table, dtype=np.int64),
-        weights=np.concatenate([np.pad(each, ((0, 0), (0, rows - each.shape[1]))) for each in words]),
+        weights=np.concatenate(
+            [np.pad(each, ((0, 0), (0, rows - each.shape[1]))) for each in words]
+        ),
         mean=network.mean, scale=1.0 / network.deviation,
         observation_limit=network.observation_limit, skipped=network.skipped,
         velocity_limit=network.velocity_limit, gear=network.gear,

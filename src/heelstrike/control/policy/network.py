@@ -83,7 +83,7 @@ class Layer:
                 f"the activation of a layer is one of {', '.join(ACTIVATIONS)}; got "
                 f"{self.activation!r}"
             )
-        names = ("weight", "bias")
+        names: tuple[str, ...] = ("weight", "bias")
         if self.kind != "dense":
             names += ("recurrent", "recurrent_bias")
         for name in names:
@@ -271,7 +271,7 @@ _DAMAGED = (
 
 
 def _network(arrays: Mapping[str, Any]) -> Network:
-    layers = []
+    layers: list[Layer] = []
     while f"kind.{len(layers)}" in arrays:
         i = len(layers)
         kind = str(arrays[f"kind.{i}"])

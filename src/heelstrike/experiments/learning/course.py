@@ -60,7 +60,7 @@ class Course:
             method=TimeStepping(step=task.step), ground=Ground(friction=task.friction),
             stop_when_fallen=False,
         )  # fmt: skip
-        self.gear = robot.model.torque_upper.copy()
+        self.gear = task.gear(robot)
         self._skipped = int(task.exclude_current_positions_from_observation)
         size = robot.nq + robot.nv - self._skipped
         self.observation = np.zeros((lanes, size))

@@ -173,6 +173,7 @@ class Batch:
         self._lanes.make_ready()
         self._crew = Crew(threads)
         self._lent: set[int] = set()
+        self._has_ended = False
         count = len(plans)
         self._until = np.full(count, FAR)
         self._outcome = np.full(count, WENT_ON, dtype=np.int64)
