@@ -98,8 +98,8 @@ def usual() -> dict[str, dict[str, Any]]:
     }
 
 
-RESULTS = """ActiveContacts BatchResult DisturbanceResponse Floquet Gait Largest LimitCycle Monodromy
-PhasedGait Robot Run Snapshot StepFamily ZeroDynamics"""
+RESULTS = """ActiveContacts BatchResult DisturbanceResponse Floquet Gait Largest LimitCycle
+Monodromy PhasedGait Robot Run Snapshot StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
 TOLD_APART = """Bundle EndOfRun GaitLQR SteppingConstraints VirtualConstraints
 ZeroMomentPointRegulation array builtin_robots cell controller number part watch"""

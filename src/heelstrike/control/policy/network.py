@@ -175,7 +175,7 @@ class Network:
         Parameters
         ----------
         observation : (no,) float
-            What is observed.
+            What is observed; (n, no) of several robots, if all layers are dense.
         memory : list of array
             What :meth:`begin` returned; it is written to.
 
@@ -292,7 +292,7 @@ def _network(arrays: Mapping[str, Any]) -> Network:
 
 
 def _dense(layer: Layer, x: Floats, kept: Floats) -> Floats:  # noqa: ARG001
-    y: Floats = layer.weight @ x + layer.bias
+    y: Floats = x @ layer.weight.T + layer.bias
     if layer.activation == "tanh":
         return np.tanh(y)
     if layer.activation == "elu":

@@ -15,7 +15,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.experiments.learning.tasks import RunningTask
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.state import State
-from heelstrike.sim import Batch, HeldTorque, TimeStepping
+from heelstrike.sim import Batch, HeldTorque, Method, TimeStepping
 
 TERMS = ("x_position", "z_distance_from_origin", "x_velocity", "reward_forward", "reward_ctrl",
          "reward_survive")  # fmt: skip
@@ -36,6 +36,8 @@ class Course:
         How many.
     threads : int
         Threads that move them.
+    method : Method, optional
+        Way through time; time stepping at the step of the task by default.
 
     Attributes
     ----------
@@ -51,15 +53,20 @@ class Course:
         What :data:`TERMS` names.
     """
 
-    def __init__(self, task: RunningTask, lanes: int = 1, *, threads: int = 1) -> None:
+    def __init__(
+        self, task: RunningTask, lanes: int = 1, *, threads: int = 1, method: Method | None = None
+    ) -> None:
         robot = task.robot()
         self.task, self.robot = task, robot
         self.initial = robot.reference_state()
         self.batch = Batch(
             robot, HeldTorque(robot), state=self.initial, lanes=lanes, threads=threads,
-            method=TimeStepping(step=task.step), ground=Ground(friction=task.friction),
+            method=TimeStepping(step=task.step) if method is None else method,
+            ground=Ground(friction=task.friction),
             stop_when_fallen=False,
         )  # fmt: skip
+        step = self.batch.method.step_length
+        self._steps = 0 if step is None else max(round(task.decision_period / step), 1)
         self.gear = task.gear(robot)
         self._skipped = int(task.exclude_current_positions_from_observation)
         size = robot.nq + robot.nv - self._skipped
@@ -145,7 +152,11 @@ class Course:
         wrong = self._command(self._action, self.gear, batch._q, self._before, batch.command)
         if wrong >= 0:
             raise SimulationError(f"the action of lane {wrong} is not finite: {given[wrong]}")
-        batch.step(self.task.frame_skip, mask)
+        if self._steps:
+            batch.step(self._steps, mask)
+        else:
+            moves = np.ones(len(batch)) if mask is None else mask
+            batch.advance(batch.time + moves * self.task.decision_period)
         self._assess(None)
 
     def state_of(self, lane: int) -> State:

@@ -380,37 +380,3 @@ class Trainer:
 
 
 _DAMAGED = (zipfile.BadZipFile, zlib.error, struct.error, AssertionError)
-
-
-def returns_of(network: Network, task: RunningTask, episodes: int, *, seed: int = 0) -> Floats:
-    """Return what a policy gains in episodes of a task, without noise in its actions.
-
-    Parameters
-    ----------
-    network : Network
-        The policy.
-    task : RunningTask
-        The task.
-    episodes : int
-        How many.
-    seed : int
-        Of the noise that they begin with.
-
-    Returns
-    -------
-    (episodes,) float
-        Their returns.
-    """
-    course = Course(task, episodes)
-    for lane in range(episodes):
-        course.seed(lane, np.random.default_rng([seed, lane]))
-    course.begin(np.arange(episodes))
-    gained, goes = np.zeros(episodes), np.ones(episodes, dtype=bool)
-    for _ in range(task.max_episode_steps):
-        actions = [network.act(each, network.begin()) for each in course.observation]
-        course.step(np.array(actions), goes)
-        gained[goes] += course.reward[goes]
-        goes &= ~course.terminated
-        if not goes.any():
-            break
-    return gained
