@@ -8,12 +8,13 @@ from typing import Annotated
 
 import typer
 
-from heelstrike.cli.options import AsJson, Debug
+from heelstrike.cli.options import AsJson
 from heelstrike.cli.terminal import many, output, spoken, stage, tell, wrote
 
 
 @spoken
 def train(
+    *,
     robot: Annotated[
         str,
         typer.Argument(
@@ -39,7 +40,6 @@ def train(
         bool, typer.Option("--afresh", help="Begin anew whatever is in --out.")
     ] = False,
     as_json: AsJson = False,
-    debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:  # fmt: skip
     """Learn to run, by proximal policy optimisation.
 

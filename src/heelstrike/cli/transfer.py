@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from heelstrike.cli.options import AsJson, Debug
+from heelstrike.cli.options import AsJson
 from heelstrike.cli.terminal import output, spoken, stage
 
 COLUMNS = {
@@ -21,6 +21,7 @@ COLUMNS = {
 
 @spoken
 def transfer(
+    *,
     policy: Annotated[
         Path,
         typer.Argument(dir_okay=False, help="File of a policy, as heelstrike train writes it."),
@@ -28,7 +29,6 @@ def transfer(
     episodes: Annotated[int, typer.Option(min=2, help="Episodes in each world.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Of the noise that they begin with.")] = 0,
     as_json: AsJson = False,
-    debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Try one policy under several ways through time, and in MuJoCo.
 

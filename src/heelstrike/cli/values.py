@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from heelstrike.errors import HeelstrikeError, RobotError, SimulationError
+from heelstrike.wording import meant
 
 if TYPE_CHECKING:
     from heelstrike.contact.ground import Ground
@@ -53,7 +53,7 @@ def ground_called(words: str, *, friction: float = 0.75, restitution: float = 0.
     """
     from heelstrike.contact.ground import Ground
 
-    given = {"friction": friction, "restitution": restitution}
+    given: dict[str, Any] = {"friction": friction, "restitution": restitution}
     flat = Ground(**given)
     where = f"--ground {words}"
 
@@ -175,8 +175,7 @@ def _corners(name: str) -> list[tuple[float, float]]:
     path = Path(name)
     if not path.is_file():
         there = "is no file" if path.exists() else "there is no such file"
-        near = difflib.get_close_matches(name.partition(":")[0].lower(), GROUNDS, n=1)
-        guess = f" Did you mean {GROUNDS[near[0]]}?" if near else ""
+        guess = meant(name.partition(":")[0].lower(), GROUNDS)
         raise SimulationError(
             f"--ground {name}: {there}.{guess} A ground is {'; '.join(GROUNDS.values())}; or a "
             "text file with a corner x z a line, in m."

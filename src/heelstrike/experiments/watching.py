@@ -193,9 +193,7 @@ class WalkStage(Stage):
         """Make the ground of a slope, a roughness and a friction."""
         friction = values["friction"]
         if self._first.ground is not None:
-            numbers = self._first.ground.numbers()
-            same = np.full_like(numbers["friction"], friction)
-            return Ground.of_numbers(numbers | {"friction": same})
+            return replace(self._first.ground, friction=friction)
         slope = float(np.deg2rad(values["slope"]))
         if not values["roughness"]:
             return Ground(friction=friction, slope=slope)

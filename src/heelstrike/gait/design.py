@@ -7,7 +7,6 @@ from collections.abc import Callable
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
@@ -18,10 +17,9 @@ from heelstrike.gait.program import Program, Solution, first_instants
 from heelstrike.gait.refinement import checked_instants, held_between_nodes
 from heelstrike.gait.starts import starts
 from heelstrike.gait.transcription import Group, Transcription
+from heelstrike.robot.model import Floats
 from heelstrike.robot.motors import torque_range
 from heelstrike.robot.state import State
-
-Floats = NDArray[np.float64]
 
 
 def designed(

@@ -9,7 +9,6 @@ from typing import Any
 import casadi
 import numpy as np
 import scipy.sparse.linalg
-from numpy.typing import NDArray
 
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.clearance import ClearanceProfile
@@ -18,8 +17,7 @@ from heelstrike.gait.request import Request
 from heelstrike.gait.starts import Start
 from heelstrike.gait.transcription import Group, Row, Transcription
 from heelstrike.interruption import deferred_interrupts
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 CONVERGED = 1e-8
 """Tolerance of IPOPT on scaled constraints and optimality."""

@@ -13,7 +13,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import link_poses
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.view.drawing import body, extent, ground_outline
+from heelstrike.view.drawing import body, extent
 from heelstrike.view.style import styled
 
 DPI = 100
@@ -63,7 +63,7 @@ class Camera:
             axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
             axes.set_axis_off()
             axes.set(xlim=(x - half, x + half), ylim=(floor, floor + self._height))
-            outline = ground_outline(self._ground, x - half, x + half)
+            outline = self._ground.outline(x - half, x + half)
             axes.fill_between(outline[:, 0], outline[:, 1], floor, color="0.85")
             drawn = self._body.drawn(np.zeros((0, 2, 2)), height / 540.0)
             axes.add_collection(drawn, autolim=False)

@@ -20,7 +20,7 @@ from heelstrike.sim.contacts.latches import is_one, several
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.controller.law import Law, law_of
 from heelstrike.sim.frame import compiled_loop, fixed_for
-from heelstrike.sim.method import Method, work_of
+from heelstrike.sim.method import Method, check_constraints, work_of
 from heelstrike.sim.push import Push
 from heelstrike.sim.setting import Setting, checked_setting
 from heelstrike.sim.simulation import has_warned
@@ -106,6 +106,7 @@ def _plan(
     parameters: Any, **about: Any,
 ) -> Plan:  # fmt: skip
     setting = checked_setting(robot, state, **setup, **about)
+    check_constraints(method, setting)
     method.check(setting)
     has_warned(method, setting)
     method.set_clock(setting, Clock())
@@ -125,9 +126,8 @@ def compile_all(method: Method, plans: Sequence[Plan]) -> float:
     settings = {(id(plan.setting.robot), id(plan.setting.ground)): plan.setting for plan in plans}
     found = set()
     for setting in settings.values():
-        model, ground = setting.robot.model, setting.ground.model()
         work = work_of(method, setting.robot)
-        found.add(fixed_for(model, ground, work, method.usual_numbers))
+        found.add(fixed_for(setting.robot, setting.ground.model(), work, method.usual_numbers))
     for fixed in found:
         seconds += compiled_loop(method.kernels, method.work, fixed)[1]
     for function in {plan.law.function for plan in plans}:
