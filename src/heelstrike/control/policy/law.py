@@ -28,6 +28,11 @@ AT_ONCE = 4
 SATURATED = 20.0
 """From here on tanh is 1 to the last bit."""
 
+LEADING = 135135.0
+OVER_1, OVER_2 = 17325.0, 378.0
+UNDER_1, UNDER_2 = 62370.0, 3150.0
+"""Coefficients of the continued fraction of tanh, cut after seven terms (Lambert 1768)."""
+
 # Columns of the table of layers, and what a layer remembers in numbers an output.
 KIND, ACTIVATION, INPUTS, OUTPUTS, WEIGHTS, KEPT = range(6)
 REMEMBERS = {"dense": 0, "gru": 1, "lstm": 2}
@@ -97,8 +102,8 @@ def hyperbolic_tangent(value: float) -> float:
     """
     x = min(max(value, -SATURATED), SATURATED) / 32.0
     u = x * x
-    t = x * (135135.0 + u * (17325.0 + u * (378.0 + u)))
-    t /= 135135.0 + u * (62370.0 + u * (3150.0 + u * 28.0))
+    t = x * (LEADING + u * (OVER_1 + u * (OVER_2 + u)))
+    t /= LEADING + u * (UNDER_1 + u * (UNDER_2 + u * 28.0))
     for _ in range(5):
         t = 2.0 * t / (1.0 + t * t)
     return t
