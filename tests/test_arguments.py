@@ -63,6 +63,8 @@ def usual() -> dict[str, dict[str, Any]]:
         "TimeStepping": {},
         "Trial": {**walked, "controller": law, "step_length": 0.3, "step_duration": 0.7},
         "WholeBody": on_a_gait,
+        "Batch": walked,
+        "HeldTorque": {"robot": robot},
         "compare": {**walked, "methods": [hs.TimeStepping()], "duration": 0.1},
         "constrained": {"robot": robot},
         "contact_forward_dynamics": {**there, "torque": np.zeros(robot.nu)},
@@ -99,9 +101,9 @@ def usual() -> dict[str, dict[str, Any]]:
     }
 
 
-RESULTS = """ActiveContacts Batch DisturbanceResponse Floquet Gait Gradient Largest LimitCycle
-ModeChange Monodromy PhasedGait Robot Run RunDerivatives Snapshot StepDerivatives StepFamily
-ZeroDynamics"""
+RESULTS = """ActiveContacts BatchResult DisturbanceResponse Floquet Gait GaitFamily Gradient Largest
+LimitCycle ModeChange Monodromy PhasedGait Robot Run RunDerivatives Snapshot StepDerivatives
+StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
 TOLD_APART = """Bundle Constraint EndOfRun GaitLQR GroundShape SteppingConstraints
 VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell controller number part

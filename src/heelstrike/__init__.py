@@ -80,6 +80,7 @@ if TYPE_CHECKING:
     from heelstrike.control import GaitLQR as GaitLQR
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
+    from heelstrike.control import Policy as Policy
     from heelstrike.control import Sensed as Sensed
     from heelstrike.control import StandingLQR as StandingLQR
     from heelstrike.control import SteppingConstraints as SteppingConstraints
@@ -116,11 +117,13 @@ if TYPE_CHECKING:
     from heelstrike.robot import load_robot as load_robot
     from heelstrike.robot.human import human as human
     from heelstrike.sim import Batch as Batch
+    from heelstrike.sim import BatchResult as BatchResult
     from heelstrike.sim import Compliant as Compliant
     from heelstrike.sim import Constraint as Constraint
     from heelstrike.sim import ControllerWarning as ControllerWarning
     from heelstrike.sim import EndOfRun as EndOfRun
     from heelstrike.sim import EventDriven as EventDriven
+    from heelstrike.sim import HeldTorque as HeldTorque
     from heelstrike.sim import HuntCrossley as HuntCrossley
     from heelstrike.sim import ImpulseSet as ImpulseSet
     from heelstrike.sim import KelvinVoigt as KelvinVoigt
@@ -154,6 +157,7 @@ _HOME = {
     "ActiveContacts": "heelstrike.contact",
     "Actuated": "heelstrike.control",
     "Batch": "heelstrike.sim",
+    "BatchResult": "heelstrike.sim",
     "Bundle": "heelstrike.compiler.bundle",
     "Compliant": "heelstrike.sim",
     "ComputedTorque": "heelstrike.control",
@@ -180,6 +184,7 @@ _HOME = {
     "Ground": "heelstrike.contact",
     "GroundShape": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
+    "HeldTorque": "heelstrike.sim",
     "HuntCrossley": "heelstrike.sim",
     "ImpulseSet": "heelstrike.sim",
     "InertialUnit": "heelstrike.control",
@@ -192,6 +197,7 @@ _HOME = {
     "ModeChange": "heelstrike.sim.linearized.mode_changes",
     "Monodromy": "heelstrike.analysis.stability.monodromy",
     "PhasedGait": "heelstrike.gait",
+    "Policy": "heelstrike.control",
     "Push": "heelstrike.sim",
     "Robot": "heelstrike.robot",
     "RobotBuilder": "heelstrike.robot",

@@ -14,8 +14,7 @@ import walking
 import heelstrike as hs
 from heelstrike.control import ControlState
 from heelstrike.robot.model import Floats, Model
-from heelstrike.sim import Contacts, RunStatus
-from heelstrike.sim.batch import Batch
+from heelstrike.sim import BatchResult, Contacts, RunStatus
 from heelstrike.sim.closed_sets import EventKind, Scheme
 from heelstrike.sim.method import Method
 from heelstrike.sim.setting import Setting
@@ -425,9 +424,9 @@ def test_runs_are_let_go_when_they_are_finished(monkeypatch: pytest.MonkeyPatch)
 
 def test_a_run_that_never_began_is_no_run() -> None:
     """What an interrupted batch has of it; see the test of the interruption for the rest."""
-    nothing: dict[str, Any] = {field.name: np.zeros(2) for field in dataclasses.fields(Batch)}
+    nothing: dict[str, Any] = {field.name: np.zeros(2) for field in dataclasses.fields(BatchResult)}
     status = (RunStatus.INTERRUPTED, RunStatus.INTERRUPTED)
-    batch = Batch(**nothing | {"status": status, "_runs": (None, None)})
+    batch = BatchResult(**nothing | {"status": status, "_runs": (None, None)})
     assert not batch.completed.any()
     with pytest.raises(hs.SimulationError, match="interrupted before run 1 began"):
         batch.run(1)

@@ -15,7 +15,7 @@ from heelstrike.analysis import energy_balance
 from heelstrike.errors import RobotError, SimulationError
 from heelstrike.gait.gait import fingerprint
 from heelstrike.robot import Robot, RobotBuilder
-from heelstrike.sim.batch import _joints as runs_of
+from heelstrike.sim.batch.planning import _joints as runs_of
 from heelstrike.sim.closed_sets import EventKind, RunStatus
 from heelstrike.sim.files.robot_dataset import robot_to_dataset, stored_robot
 from heelstrike.sim.memory import allocate_memory

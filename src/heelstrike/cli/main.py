@@ -12,6 +12,8 @@ from heelstrike.cli.inspect import inspect
 from heelstrike.cli.paper import paper
 from heelstrike.cli.report import report
 from heelstrike.cli.robots import robots
+from heelstrike.cli.train import train
+from heelstrike.cli.transfer import transfer
 from heelstrike.cli.walk import walk
 from heelstrike.cli.watch import watch
 from heelstrike.cli.zoo import zoo
@@ -24,7 +26,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
 )
-for command in (walk, watch, report, zoo, paper, compare, robots, inspect):
+for command in (walk, watch, report, train, transfer, zoo, paper, compare, robots, inspect):
     app.command()(command)
 
 

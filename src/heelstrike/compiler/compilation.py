@@ -169,9 +169,37 @@ def loop_for(signature: Any, function: Function, fixed: Fixed = ()) -> Function:
         Extents and whole numbers that are these in all bundles that it will be called with. They
         are put in last: loops that differ in them alone are but one until they are optimised.
     """
-    entry: Any = numba_in_use().loop(signature, function, fixed)
+    entry: Any
+    entry, _ = numba_in_use().loop(signature, function, fixed, addressed=False)
     loop: Function = entry
     return loop
+
+
+class AddressedLoop:
+    """A loop like those of :func:`loop_for`, which other compiled code can call, too.
+
+    Parameters
+    ----------
+    signature : numba signature
+        Types of the result, an integer, and of the arguments.
+    function : callable
+        The kernel.
+    fixed : tuple of str and int
+        As those of :func:`loop_for`.
+    """
+
+    def __init__(
+        self, signature: Any, function: Callable[..., int], fixed: Fixed = ()
+    ) -> None:
+        self.call, self._find = numba_in_use().loop(signature, function, fixed, addressed=True)
+
+    @cached_property
+    def address(self) -> int:
+        """Where its machine code is, for :func:`~heelstrike.compiler.separate_kernel.call_at`.
+
+        What is raised in it is not seen by those who call it so.
+        """
+        return self._find()
 
 
 def uncompiled(

@@ -103,16 +103,18 @@ class DocumentedNumba:
         signature: Any,
         function: Callable[..., Any],
         fixed: Any,  # noqa: ARG002
-    ) -> Callable[..., Any]:
-        """Return what may be called with arguments of exactly the right types.
+        *,
+        addressed: bool,  # noqa: ARG002
+    ) -> tuple[Callable[..., Any], Callable[[], int]]:
+        """Return what may be called with arguments of exactly the right types, and its address.
 
-        By documented names nothing can be put in that is `fixed`; without it code is larger.
+        By documented names nothing can be put in that is `fixed`; without it code is larger. Its
+        address is that of another compilation, when it is asked for.
         """
         compiled = self.kept(function)
         self.compile(lambda: compiled.compile(signature))
         compiled.disable_compile()
-        entry: Callable[..., Any] = compiled
-        return entry
+        return compiled, lambda: self.separate(signature, function)[1]
 
     def separate(
         self, signature: Any, function: Callable[..., Any], *, boundscheck: bool = False

@@ -69,9 +69,28 @@ class Mold(Generic[_Some]):
         places[:, 0] -= address_of_array(self._block)
         self._stored = layout, places
 
-    def cast(self) -> _Some:
-        """Return another bundle, as the one laid out was when the mold was made of it."""
-        block = self._block.copy()
+    @property
+    def size(self) -> int:
+        """Words that a cast takes up."""
+        return self._block.size
+
+    def cast(self, block: NDArray[np.int64] | None = None) -> _Some:
+        """Return another bundle, as the one laid out was when the mold was made of it.
+
+        Parameters
+        ----------
+        block : (size,) int64, optional
+            Words that it is to lie in; by default memory of its own.
+
+        Returns
+        -------
+        Bundle
+            The cast.
+        """
+        if block is None:
+            block = self._block.copy()
+        else:
+            block[:] = self._block
         begin = address_of_array(block)
         block[self._pointers] += begin
         made: _Some = _cast(self._shape, block, begin)

@@ -86,16 +86,20 @@ class PrivateNumba(DocumentedNumba):
             return call()
 
     def loop(
-        self, signature: Any, function: Callable[..., Any], fixed: Fixed
-    ) -> Callable[..., Any]:
+        self, signature: Any, function: Callable[..., Any], fixed: Fixed, *, addressed: bool
+    ) -> tuple[Callable[..., Any], Callable[[], int]]:
         """Return what may be called with arguments of exactly the right types.
 
-        Numba compares the types of all arguments with those it compiled for, at every call.
+        Numba compares the types of all arguments with those it compiled for, at every call. What is
+        `addressed` can be called by the C calling convention, too; returned is what finds it.
         """
-        compiled = _unfinished(function, no_cpython_wrapper=False)
+        compiled = _unfinished(
+            function, no_cpython_wrapper=False, no_cfunc_wrapper=not addressed
+        )
         cache = _Cache(compiled, self.made_of(function), self.settings())
-        entry: Callable[..., Any] = self.compile(lambda: _loop(compiled, cache, signature, fixed))
-        return entry
+        result = self.compile(lambda: _loop(compiled, cache, signature, fixed))
+        name = result.fndesc.llvm_cfunc_wrapper_name
+        return result.entry_point, lambda: int(result.library.get_pointer_to_function(name))
 
     def separate(
         self, signature: Any, function: Callable[..., Any], *, boundscheck: bool = False
@@ -132,7 +136,7 @@ class PrivateNumba(DocumentedNumba):
             compiled.targetctx, dumps(_parts(compiled.get_compile_result(signature)))
         )
         raw = _unfinished(outer, no_cpython_wrapper=False)
-        loop = self.compile(lambda: _loop(raw, compiled._cache, signature, ()))
+        loop = self.compile(lambda: _loop(raw, compiled._cache, signature, ()).entry_point)
         expected = np.ones(3)
         wanted = _outer(_inner)(expected, 3)
         for call in (compiled, loaded.entry_point, loop):
@@ -234,7 +238,7 @@ def _unfinished(function: Callable[..., Any], **more: bool) -> Any:
 
 
 def _loop(compiled: Any, cache: _Cache, signature: Any, fixed: Fixed) -> Any:
-    """Load a loop, or finish what there is of it with its constants; return what is called."""
+    """Load a loop, or finish what there is of it with its constants; return its result."""
     asked, context = (signature, fixed), compiled.targetctx
     code = cache.read(asked)
     if code is None:
@@ -245,25 +249,27 @@ def _loop(compiled: Any, cache: _Cache, signature: Any, fixed: Fixed) -> Any:
             cache.write(signature, raw)
         code = dumps(_finished(context.codegen(), pickle.loads(raw), fixed))
         cache.write(asked, code)
-    return cache.rebuilt(context, code).entry_point
+    return cache.rebuilt(context, code)
 
 
 def _finished(codegen: Any, parts: tuple[Any, ...], fixed: Fixed) -> tuple[Any, ...]:
     """Put constants into an unfinished module and optimise it; return the parts of its result.
 
-    All its functions are its own but the one that Python calls, whose name is that of no other:
-    those of loops with other constants compute something else.
+    All its functions are its own but those that Python and others call, whose names are those of no
+    other: those of loops with other constants compute something else.
     """
     (name, _, bitcode), about, *more = parts
     module = parse_bitcode(zlib.decompress(bitcode))
     constants = parse_assembly(definitions(fixed))
     constants.triple, constants.data_layout = module.triple, module.data_layout
     module.link_in(constants)
-    entry = about.llvm_cpython_wrapper_name
+    doors = (about.llvm_cpython_wrapper_name, about.llvm_cfunc_wrapper_name)
+    names = []
     own = hashlib.sha256(repr(fixed).encode()).hexdigest()[:12]
     for function in module.functions:
-        if function.name == entry:
-            function.name = f"{entry}_{own}"
+        if function.name in doors and not function.is_declaration:
+            function.name = f"{function.name}_{own}"
+            names.append(function.name)
         elif not function.is_declaration:
             function.linkage = "internal"
     about.mangled_name = f"{about.mangled_name}_{own}"
@@ -271,7 +277,7 @@ def _finished(codegen: Any, parts: tuple[Any, ...], fixed: Fixed) -> tuple[Any, 
     library._final_module = module
     library._optimize_final_module()
     library._final_module.verify()
-    code = codegen._tm.emit_object(library._final_module), _names_alone([f"{entry}_{own}"])
+    code = codegen._tm.emit_object(library._final_module), _names_alone(names)
     return (library.name, "object", code), about, *more
 
 

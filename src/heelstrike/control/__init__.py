@@ -8,6 +8,8 @@ from heelstrike.control.gait_lqr.flat_law import FlatGaitLQR
 from heelstrike.control.gait_lqr.law import GaitLQR
 from heelstrike.control.joint_pd import Feedforward, JointPD
 from heelstrike.control.noise import RandomNumbers
+from heelstrike.control.policy.law import Policy
+from heelstrike.control.policy.network import Layer, Network, load_network
 from heelstrike.control.preview import PreviewControl, preview_control
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import Program
@@ -38,7 +40,10 @@ __all__ = [
     "InertialUnit",
     "JointPD",
     "Law",
+    "Layer",
     "LinearEquations",
+    "Network",
+    "Policy",
     "PreviewControl",
     "Program",
     "QuadraticSolution",
@@ -51,6 +56,7 @@ __all__ = [
     "ZeroMomentPointRegulation",
     "controlled_robot",
     "controller",
+    "load_network",
     "preview_control",
     "solve_or_relax",
     "solve_quadratic_program",

@@ -15,7 +15,8 @@ from heelstrike.dynamics.places import point_at as point_at
 from heelstrike.dynamics.places import point_bias as point_bias
 from heelstrike.dynamics.places import point_velocity as point_velocity
 from heelstrike.dynamics.queries.evaluation import link_index as link_index
-from heelstrike.sim.batch import Batch, simulate_batch
+from heelstrike.sim.batch.batch import Batch
+from heelstrike.sim.batch.runs import BatchResult, simulate_batch
 from heelstrike.sim.clock import Clock as Clock
 from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus, Scheme
 from heelstrike.sim.compliant import Compliant
@@ -59,6 +60,7 @@ from heelstrike.sim.contacts.rows import LOOP as LOOP
 from heelstrike.sim.contacts.rows import POINT as POINT
 from heelstrike.sim.contacts.rows import SECOND_FACE as SECOND_FACE
 from heelstrike.sim.contacts.rows import STOP as STOP
+from heelstrike.sim.controller.held_torque import HeldTorque
 from heelstrike.sim.controller.interface import Contacts, Controller
 from heelstrike.sim.controller.raised import ControllerWarning, EndOfRun
 from heelstrike.sim.event_driven import EventDriven
@@ -86,6 +88,7 @@ from heelstrike.sim.time_stepping import SimulationWarning, TimeStepping
 
 __all__ = [
     "Batch",
+    "BatchResult",
     "BristleFriction",
     "Certificates",
     "Compliant",
@@ -97,6 +100,7 @@ __all__ = [
     "Event",
     "EventDriven",
     "EventKind",
+    "HeldTorque",
     "HuntCrossley",
     "ImpulseSet",
     "KelvinVoigt",

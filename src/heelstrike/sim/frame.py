@@ -25,7 +25,7 @@ import numpy as np
 from numba import types
 
 from heelstrike.compiler.bundle_type import Fixed
-from heelstrike.compiler.compilation import dissolved_kernel, loop_for
+from heelstrike.compiler.compilation import AddressedLoop, dissolved_kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.solvers.certified_solve import try_solvers
 from heelstrike.field_texts import dataclass
@@ -226,12 +226,12 @@ def fixed_for(robot: Robot, ground: GroundModel, work: Any, usual: Mapping[str, 
 
 
 @lru_cache
-def compiled_loop(kernels: Kernels, work: Any, fixed: Fixed = ()) -> tuple[Any, float]:
+def compiled_loop(kernels: Kernels, work: Any, fixed: Fixed = ()) -> tuple[AddressedLoop, float]:
     """Compile the loop of a method, or load it; return it with the seconds that took."""
     begin = perf_counter()
     kinds = (Model, GroundModel, Control, Memory, work, Record, Clock)
     signature = types.int64(*(kind.compiled_type() for kind in kinds))
     try_solvers.begin()
-    compiled = loop_for(signature, frame(kernels), fixed)
+    compiled = AddressedLoop(signature, frame(kernels), fixed)
     try_solvers.finish()
     return compiled, perf_counter() - begin

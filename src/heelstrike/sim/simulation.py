@@ -19,9 +19,8 @@ from heelstrike.compiler.mold import Mold
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import ControllerError, SimulationError
-from heelstrike.field_texts import dataclass
 from heelstrike.interruption import acknowledge
-from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.robot.warning import warn
@@ -44,7 +43,7 @@ from heelstrike.sim.memory import Memory, allocate_memory
 from heelstrike.sim.method import Method, UnknownMethod, check_constraints, work_of
 from heelstrike.sim.push import Push, numbers_of_pushes, pushes_of_numbers, pushes_on
 from heelstrike.sim.record.record import Record, allocate_record
-from heelstrike.sim.run import Run, Timing, counted, joined, tallied
+from heelstrike.sim.run import Run, Timing, joined, tallied
 from heelstrike.sim.setting import (
     Setting,
     Setup,
@@ -201,8 +200,9 @@ class Simulation:
         )
 
     def _begin(
-        self, setting: Setting, method: Method, memory: Memory | None = None, keep_rows: bool = True
-    ) -> None:
+        self, setting: Setting, method: Method, memory: Memory | None = None,
+        clock: Clock | None = None, keep_rows: bool = True,
+    ) -> None:  # fmt: skip
         """Allocate everything, compile, and check what only the method can.
 
         Parameters
@@ -212,6 +212,8 @@ class Simulation:
         memory : Memory, optional
             Memory to use, as `allocate_memory` makes it for this robot and these pushes. A batch
             gives it, which has checked everything before any of it begins.
+        clock : Clock, optional
+            Clock to use.
         keep_rows : bool
             Whether rows and events are kept; otherwise they are counted and forgotten.
         """
@@ -228,7 +230,7 @@ class Simulation:
         put_on(self.robot, setting.braked, setting.state, HOLDS, self._memory)
         self._work = work_of(method, self.robot)
         rows, events = method.room(self.robot)
-        self._clock = clock = _CLOCK.cast()
+        self._clock = clock = _CLOCK.cast() if clock is None else clock
         clock.record_every, clock.fallen_height = setting.record_every, setting.fallen_height
         clock.row_margin, clock.event_margin = rows, events
         method.set_clock(setting, self._clock)
@@ -540,7 +542,7 @@ class Simulation:
         while True:
             try:
                 outcome = _OUTCOMES[
-                    self._loop(
+                    self._loop.call(
                         self.robot.model, self._ground.model(), self._control, self._memory,
                         self._work, self._records[-1], self._clock,
                     )
@@ -1012,56 +1014,6 @@ def simulate(
     if status is not going:  # the last call of the controller is one more
         simulation._tell_error(status, message)
     return simulation._run(status, message, final=final)
-
-
-@dataclass(frozen=True)
-class Ending:
-    """How one simulation of a batch came to its end."""
-
-    status: RunStatus
-    message: str
-    """status, message: How, and the same in a person's words."""
-    error: BaseException | None
-    """What the controller raised, if that ended it."""
-    state: State
-    time: float
-    """state, time: Where the robot was, and when."""
-    events: Integers
-    """(kinds,) Events of each kind."""
-    counts: dict[str, Any]
-    """What was counted, and the worst values, by name."""
-    run: Run | None
-    """The record, if rows were kept."""
-
-
-def simulation_to_the_end(
-    setting: Setting,
-    method: Method,
-    law: Law,
-    duration: float,
-    *,
-    memory: Memory,
-    keep_rows: bool,
-    stopped: Callable[[], bool],
-) -> Ending:
-    """Simulate as :func:`simulate` does, in memory that is given, until `stopped` says so."""
-    simulation = Simulation.__new__(Simulation)
-    simulation._begin(setting, method, memory, keep_rows)
-    simulation._control_with(law)
-    simulation._advance(method.instant(simulation._clock, duration), NEVER, stopped=stopped)
-    final = simulation._final() if keep_rows else None
-    status, message = simulation._decide_last()
-    last = simulation._records[-1]
-    state, row = simulation.state, last.rows - 1
-    if row >= 0 and last.time[row] == simulation.time:  # event-driven rows lie on the constraints
-        state = State(last.position[row], last.velocity[row])
-    run = simulation._run(status, message, final) if keep_rows else None
-    for each in simulation._records:
-        simulation._count_events(each)
-    return Ending(
-        status, message, simulation.error, state, simulation.time, simulation._event_counts,
-        counted(memory), run,
-    )  # fmt: skip
 
 
 def has_warned(method: Method, setting: Setting) -> bool:

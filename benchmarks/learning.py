@@ -1,0 +1,219 @@
+"""Environment steps a second, beside those of Gymnasium and MuJoCo in the same run.
+
+``python benchmarks/learning.py speed`` moves Walker2d with random actions, resets included: the
+native vector and a single environment in a Python loop, the physics alone (the same lanes, which
+begin anew in the same states, without observations, rewards and noise), Gymnasium's own
+environments one by one (sync) and in processes (async), and MuJoCo's ``rollout``. ``... identical``
+compares lanes with single simulations, bit by bit.
+
+Times are processor times of this process but for async, whose work is done by others (clock); of
+each the best of several repetitions is printed, which are interleaved.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+import heelstrike as hs
+
+if find_spec("imageio") is None:  # Gymnasium imports it for films, which nobody takes here
+    sys.modules["imageio"] = ModuleType("imageio")
+
+import gymnasium
+
+from heelstrike.experiments.learning import environments
+from heelstrike.experiments.learning.course import Course
+from heelstrike.experiments.learning.tasks import RUNNING
+
+Timed = Callable[[], tuple[int, float]]
+
+
+def timed(
+    steps: Callable[[], int], begin_anew: Callable[[], Any],
+    clock: Callable[[], float] = time.process_time,
+) -> Timed:  # fmt: skip
+    """Return what times some steps, but for what comes before the first."""
+
+    def once() -> tuple[int, float]:
+        begin_anew()
+        begin = clock()
+        count = steps()
+        return count, clock() - begin
+
+    return once
+
+
+def speed(task: str, lanes: int, decisions: int, repetitions: int, *, peers: bool) -> None:
+    """Print steps a second."""
+    actions = np.random.default_rng(0).uniform(
+        -1, 1, (decisions, lanes, Course(RUNNING[task]).robot.nu)
+    )
+    actions = actions.astype(np.float32)
+    vector = environments.RunningVectorEnv(task, lanes)
+    single = environments.RunningEnv(task)
+    course = Course(RUNNING[task], lanes)
+    kept: list[Any] = []
+    first: list[Any] = []
+
+    def run_vector() -> int:
+        for action in actions:
+            vector.step(action)
+        return decisions * lanes
+
+    def keep_episodes() -> None:
+        """Note the very episodes that the vector goes through, to move them without it."""
+        vector.reset(seed=0)
+        batch = vector._lanes.batch
+        first.extend((batch.position.copy(), batch.velocity.copy()))
+        for action in actions:
+            over = np.flatnonzero(vector._over)
+            vector.step(action)
+            kept.append((over, batch.position[over].copy(), batch.velocity[over].copy()))
+
+    def run_physics() -> int:
+        batch = course.batch
+        for action, (over, q, v) in zip(actions, kept, strict=True):
+            np.multiply(action, course.gear, out=batch.command)
+            if over.size:  # these begin anew, and do not move
+                batch._begin_anew(over, q, v)
+                moves = np.ones(lanes, dtype=bool)
+                moves[over] = False
+                batch.step(RUNNING[task].frame_skip, moves)
+            else:
+                batch.step(RUNNING[task].frame_skip)
+        return decisions * lanes
+
+    def run_single() -> int:
+        for action in actions[:, 0]:
+            if single.step(action)[2]:
+                single.reset()
+        return decisions
+
+    keep_episodes()
+    tried: dict[str, Timed] = {
+        f"native vector, {lanes} lanes": timed(run_vector, lambda: vector.reset(seed=0)),
+        "physics alone": timed(run_physics, lambda: course.batch.reset(None, hs.State(*first))),
+        "single environment, Python loop": timed(run_single, lambda: single.reset(seed=0)),
+    }
+    if peers:
+        few = max(decisions // 10, 1)
+        theirs = gymnasium.make_vec(f"{task}-v5", lanes, "sync")
+        others = gymnasium.make_vec(f"{task}-v5", lanes, "async")
+
+        def run(env: Any) -> Callable[[], int]:
+            def steps() -> int:
+                for action in actions[:few]:
+                    env.step(action)
+                return few * lanes
+
+            return steps
+
+        tried["Gymnasium, sync"] = timed(run(theirs), lambda: theirs.reset(seed=0))
+        tried["Gymnasium, async (clock)"] = timed(
+            run(others), lambda: others.reset(seed=0), time.perf_counter
+        )
+        tried["mujoco.rollout, one thread"] = timed(
+            rollout(task, lanes, few, actions), lambda: None
+        )
+    best = dict.fromkeys(tried, 0.0)
+    for _ in range(repetitions):
+        for name, once in tried.items():
+            count, seconds = once()
+            best[name] = max(best[name], count / seconds)
+    print(f"{task}, random actions, environment steps a second:")
+    for name, rate in best.items():
+        print(f"  {name:34s} {rate:10.0f}")
+    share = best[f"native vector, {lanes} lanes"] / best["physics alone"]
+    print(f"  the vector has {share:.2f} of the speed of the physics alone")
+
+
+def rollout(task: str, lanes: int, decisions: int, actions: Any) -> Callable[[], int]:
+    """Return what moves MuJoCo's lanes by its own loop."""
+    import mujoco
+    from mujoco import rollout as rolling
+
+    env: Any = gymnasium.make(f"{task}-v5").unwrapped
+    model, data = env.model, mujoco.MjData(env.model)
+    mujoco.mj_forward(model, data)
+    state = np.zeros(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+    mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    control = np.repeat(actions[:decisions].swapaxes(0, 1), env.frame_skip, axis=1)
+
+    def steps() -> int:
+        rolling.rollout(model, data, np.tile(state, (lanes, 1)), control.astype(np.float64))
+        return decisions * lanes
+
+    return steps
+
+
+def identical(lanes: int, steps: int, seed: int) -> None:
+    """Compare random lanes of Walker2d with single simulations."""
+    random = np.random.default_rng(seed)
+    task = RUNNING["Walker2d"]
+    robot = task.robot()
+    start = robot.reference_state()
+    states = [
+        hs.State(start.q + random.normal(0, 0.05, robot.nq), random.normal(0, 0.5, robot.nv))
+        for _ in range(lanes)
+    ]
+    grounds = [hs.Ground(friction=mu) for mu in random.uniform(0.2, 2.0, lanes)]
+    torques = random.uniform(-100, 100, (steps // task.frame_skip, lanes, robot.nu))
+    options: Any = {"method": hs.TimeStepping(step=task.step), "stop_when_fallen": False}
+    ends = []
+    for threads in (1, 2, 5):
+        batch = hs.Batch(
+            robot, hs.HeldTorque(robot), state=states, ground=grounds, threads=threads, **options
+        )
+        for torque in torques:
+            batch.command[:] = torque
+            batch.step(task.frame_skip)
+        ends.append(batch)
+    different = 0
+    for lane in range(lanes):
+        single = hs.Simulation(
+            robot, hs.HeldTorque(robot), state=states[lane], ground=grounds[lane],
+            record_every=2**40, **options,
+        )  # fmt: skip
+        for torque in torques:
+            single.parameters.torque[:] = torque[lane]  # type: ignore[attr-defined]
+            for _ in range(task.frame_skip):
+                if single.status is hs.RunStatus.COMPLETED:
+                    single.step()
+        different += not all(
+            np.array_equal(batch.position[lane], single.state.q)
+            and np.array_equal(batch.velocity[lane], single.state.v)
+            for batch in ends
+        )
+    print(f"{lanes} lanes x {steps} steps, 1, 2 and 5 threads: {different} differ")
+
+
+def main() -> None:
+    """Do what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("what", choices=["speed", "identical"])
+    parser.add_argument("--task", default="Walker2d", choices=list(RUNNING))
+    parser.add_argument("--lanes", type=int, default=0)
+    parser.add_argument("--decisions", type=int, default=500)
+    parser.add_argument("--repetitions", type=int, default=5)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--no-peers", action="store_true")
+    given = parser.parse_args()
+    if given.what == "speed":
+        speed(
+            given.task, given.lanes or 64, given.decisions, given.repetitions,
+            peers=not given.no_peers,
+        )  # fmt: skip
+    else:
+        identical(given.lanes or 1000, 200, given.seed)
+
+
+if __name__ == "__main__":
+    main()

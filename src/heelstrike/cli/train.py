@@ -1,0 +1,88 @@
+"""``heelstrike train``: learns to run on exact contact."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from heelstrike.cli.options import AsJson
+from heelstrike.cli.terminal import many, output, spoken, stage, tell, wrote
+
+
+@spoken
+def train(
+    *,
+    robot: Annotated[
+        str,
+        typer.Argument(
+            help="walker2d, hopper or halfcheetah, as Gymnasium has them; or a built-in robot or "
+            "a file whose trunk moves freely."
+        ),
+    ],
+    decisions: Annotated[int, typer.Option(min=1, help="Decisions to learn from.")] = 1_000_000,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything that is random.")] = 0,
+    lanes: Annotated[int, typer.Option(min=1, help="Robots that learn at once.")] = 64,
+    threads: Annotated[int, typer.Option(min=1, help="Threads that move them.")] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            file_okay=False, help="Folder of what is learned; gone on with from there.",
+            show_default="train-ROBOT",
+        ),
+    ] = None,
+    film: Annotated[
+        bool, typer.Option("--film/--no-film", help="Write film and page of a run, too.")
+    ] = True,
+    afresh: Annotated[
+        bool, typer.Option("--afresh", help="Begin anew whatever is in --out.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:  # fmt: skip
+    """Learn to run, by proximal policy optimisation.
+
+    Everything is kept in training.npz from time to time: after Ctrl-C, or worse, the same command
+    goes on, and what it comes to is the same. Writes policy.npz, for hs.Policy; curve.csv and
+    curve.svg; and run.mp4 and run.html of a run.
+    """
+    with stage("loading"):
+        from heelstrike.experiments.learning.tasks import task_of
+        from heelstrike.experiments.learning.training import Recipe, Trainer
+        from heelstrike.experiments.learning.writing import KEPT, write_all
+
+        task = task_of(robot)
+        folder = out or Path(f"train-{Path(robot).stem}")
+        folder.mkdir(parents=True, exist_ok=True)
+        trainer = Trainer(task, decisions, Recipe(seed=seed, lanes=lanes), threads=threads)
+        kept = folder / KEPT
+        if kept.exists() and not afresh:
+            trainer.restore(kept)
+    with many("learning") as show:
+
+        def reached(trainer: Trainer) -> None:
+            curve = trainer.curve
+            told = f"return {curve.mean_return[-1]:.0f}, {curve.mean_length[-1]:.0f} decisions"
+            show(trainer.round, trainer.rounds, {f"{told} an episode": 1.0})
+
+        trainer.learn(kept, reached)
+    with stage("writing") as doing:
+        files, run = write_all(trainer, folder, film=film, doing=lambda what: doing.doing(what, 0))
+    wrote(*files)
+    curve = trainer.curve
+    found = {
+        "robot": run.robot.name, "decisions": curve.decisions[-1],
+        "mean_return": curve.mean_return[-1], "mean_length": curve.mean_length[-1],
+        "run": {"status": run.status.value, "time": float(run.time[-1]),
+                "distance": float(run.position[-1, 0] - run.position[0, 0])},
+    }  # fmt: skip
+    if as_json:
+        typer.echo(json.dumps(found, indent=2))
+    else:
+        output().print(
+            f"{run.robot.name}: return {curve.mean_return[-1]:.0f} over the last 100 episodes of "
+            f"{curve.mean_length[-1]:.0f} decisions; the run of the policy: {run.message}, "
+            f"{run.position[-1, 0] - run.position[0, 0]:.2f} m"
+        )
+    tell(f"in {folder}: {', '.join(each.name for each in files)}")

@@ -1,0 +1,1 @@
+"""Policies that were learned: networks in files, as controllers."""

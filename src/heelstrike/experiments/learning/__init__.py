@@ -1,0 +1,1 @@
+"""Learning: tasks on exact contact, environments of Gymnasium for them, and a trainer."""

@@ -1,0 +1,115 @@
+"""What is left of a training: the policy, its curve, and a run of it as film and page."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from heelstrike.contact.ground import Ground
+from heelstrike.control.policy.law import Policy
+from heelstrike.control.policy.network import Network
+from heelstrike.experiments.learning.tasks import RunningTask
+from heelstrike.experiments.learning.training import Curve, Trainer
+from heelstrike.sim import Run, TimeStepping, simulate
+from heelstrike.view.style import styled
+from heelstrike.whole_file import whole_file, write_whole
+
+KEPT = "training.npz"
+"""What is gone on from."""
+
+SHOWN = 10.0
+"""Seconds of the run that is shown."""
+
+
+def run_of(network: Network, task: RunningTask, *, duration: float = SHOWN) -> Run:
+    """Simulate a policy from the initial state of its task, without noise.
+
+    Parameters
+    ----------
+    network : Network
+        The policy.
+    task : RunningTask
+        Its task.
+    duration : float
+        How long at most (s).
+
+    Returns
+    -------
+    Run
+        The run, up to a fall.
+    """
+    robot = task.robot()
+    return simulate(
+        robot, Policy(network, robot), state=robot.reference_state(), duration=duration,
+        method=TimeStepping(step=task.step), ground=Ground(friction=task.friction),
+    )  # fmt: skip
+
+
+def write_curve(curve: Curve, folder: Path) -> list[Path]:
+    """Write how learning went, as table and figure.
+
+    Parameters
+    ----------
+    curve : Curve
+        How it went.
+    folder : Path
+        Where to.
+
+    Returns
+    -------
+    list of Path
+        The files, ``curve.csv`` and ``curve.svg``.
+    """
+    columns = asdict(curve)
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    table = write_whole(folder / "curve.csv", text.getvalue().encode())
+    with styled(), whole_file(folder / "curve.svg") as beside:
+        figure = Figure(figsize=(6.0, 3.2), layout="constrained")
+        axes = figure.subplots()
+        axes.plot([each / 1e6 for each in curve.decisions], curve.mean_return)
+        axes.set_xlabel("decisions in millions")
+        axes.set_ylabel("return, mean of 100 episodes")
+        figure.savefig(beside)
+    return [table, folder / "curve.svg"]
+
+
+def write_all(
+    trainer: Trainer, folder: Path, *, film: bool = True,
+    doing: Callable[[str], None] = lambda _: None,
+) -> tuple[list[Path], Run]:  # fmt: skip
+    """Write everything that is left of a training.
+
+    Parameters
+    ----------
+    trainer : Trainer
+        It, finished or not.
+    folder : Path
+        Where to.
+    film : bool
+        Whether film and page are written, too.
+    doing : callable
+        Told what is being done.
+
+    Returns
+    -------
+    files : list of Path
+        ``policy.npz``, ``curve.csv``, ``curve.svg``, ``run.mp4`` and ``run.html``.
+    run : Run
+        A run of the policy.
+    """
+    network = trainer.network()
+    files = [network.save(folder / "policy.npz"), *write_curve(trainer.curve, folder)]
+    doing("simulating")
+    run = run_of(network, trainer.task)
+    if film:
+        doing("filming")
+        files += [run.animate(folder / "run.mp4"), run.save_html(folder / "run.html")]
+    return files, run

@@ -1,0 +1,195 @@
+"""Environments of Gymnasium: the interface, and the same task as its own v5 environments."""
+
+from __future__ import annotations
+
+import pickle
+import sys
+import warnings
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+gymnasium = pytest.importorskip("gymnasium", minversion="1.1")
+
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+from gymnasium.vector import AutoresetMode  # noqa: E402
+
+import heelstrike as hs  # noqa: E402
+from heelstrike.experiments.learning import environments  # noqa: E402
+from heelstrike.experiments.learning.environments import RunningEnv, RunningVectorEnv  # noqa: E402
+
+TASKS = ("Walker2d", "Hopper", "HalfCheetah")
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+
+
+def vector(task: str = "Walker2d", lanes: int = 3, **options: Any) -> Any:
+    return gymnasium.make_vec(
+        f"heelstrike/{task}-v0", num_envs=lanes, vectorization_mode="vector_entry_point", **options
+    )
+
+
+def actions(lanes: int, count: int, size: int = 6) -> Any:
+    return np.random.default_rng(0).uniform(-1, 1, (count, lanes, size)).astype(np.float32)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_the_interface_is_kept(task: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", category=UserWarning)
+        warnings.filterwarnings("ignore", message=".*(maximum|minimum|infinity|Box).*")
+        check_env(gymnasium.make(f"heelstrike/{task}-v0", render_mode="rgb_array").unwrapped)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_reset_observation_and_reward_are_those_of_gymnasium(
+    task: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same seed begins in the same state; from the same states the same reward follows."""
+    if find_spec("imageio") is None:  # Gymnasium asks for it, to take pictures
+        monkeypatch.setitem(sys.modules, "imageio", ModuleType("imageio"))
+    theirs = gymnasium.make(f"{task}-v5").unwrapped
+    ours = RunningEnv(task)
+    assert ours.observation_space == theirs.observation_space
+    assert ours.action_space == theirs.action_space
+    assert ours.metadata["render_fps"] == theirs.metadata["render_fps"]
+    for seed in (7, 8):
+        np.testing.assert_array_equal(ours.reset(seed=seed)[0], theirs.reset(seed=seed)[0])
+        np.testing.assert_array_equal(ours.reset()[0], theirs.reset()[0])
+    action = np.linspace(-1.5, 0.5, ours.action_space.shape[0])
+    x = ours.unwrapped._lanes.batch.position[0, 0]
+    observation, reward, terminated, _, info = ours.step(action)
+    batch = ours._lanes.batch
+    np.testing.assert_allclose(batch.torque[0], ours._lanes.gear * np.clip(action, -1, 1))
+    speed = (batch.position[0, 0] - x) / theirs.dt
+    theirs.set_state(batch.position[0].copy(), batch.velocity[0].copy())
+    np.testing.assert_array_equal(observation, theirs._get_obs())
+    wanted, terms = theirs._get_rew(speed, action)
+    assert reward == pytest.approx(wanted, abs=1e-12)
+    for name, value in terms.items():
+        assert info[name] == pytest.approx(value, abs=1e-12)
+    assert terminated == (not getattr(theirs, "is_healthy", True))
+
+
+@pytest.mark.parametrize(
+    ("q", "healthy"),
+    [((0.0, 0.81, 0.99), True), ((0.0, 0.79, 0.0), False), ((0, 1.0, 1.01), False)],
+)
+def test_an_episode_ends_where_gymnasium_ends_it(q: tuple[float, ...], healthy: bool) -> None:
+    environment = RunningEnv("Walker2d")
+    environment.reset(seed=0)
+    lanes = environment._lanes
+    start = lanes.initial.q.copy()
+    start[:3] = q
+    lanes.batch.reset(None, hs.State(start, np.zeros(9)))
+    lanes._assess(np.arange(1))
+    assert bool(lanes.terminated[0]) != healthy
+    assert (lanes.cause(0) == "it is healthy") == healthy
+
+
+def test_lanes_of_a_vector_are_single_environments() -> None:
+    lanes, seed = vector(), 11
+    singles = [gymnasium.make("heelstrike/Walker2d-v0") for _ in range(3)]
+    observed = lanes.reset(seed=seed)[0]
+    for i, single in enumerate(singles):
+        np.testing.assert_array_equal(observed[i], single.reset(seed=seed + i)[0])
+    over = np.zeros(3, dtype=bool)
+    for action in actions(3, 60):
+        observed, reward, terminated, truncated, info = lanes.step(action)
+        for i, single in enumerate(singles):
+            if over[i]:
+                expected = (single.reset()[0], 0.0, False, False, {})
+            else:
+                expected = single.step(action[i])
+            np.testing.assert_array_equal(observed[i], expected[0])
+            assert (reward[i], terminated[i], truncated[i]) == expected[1:4]
+            if expected[2]:
+                assert info["cause"][i] == expected[4]["cause"]
+        over = terminated | truncated
+    assert lanes.unwrapped._lanes.batch.time.max() < 60 * 0.008
+
+
+def test_three_ways_to_begin_anew() -> None:
+    given = actions(3, 80)
+    modes = {mode: vector(autoreset_mode=mode, max_episode_steps=9) for mode in AutoresetMode}
+    for lanes in modes.values():
+        lanes.reset(seed=3)
+    same, disabled = modes[AutoresetMode.SAME_STEP], modes[AutoresetMode.DISABLED]
+    seen = 0
+    for action in given[:30]:
+        observed, reward, terminated, truncated, info = same.step(action)
+        other, its_reward, its_end, its_cut, _ = disabled.step(action)
+        ended = terminated | truncated
+        np.testing.assert_array_equal(ended, its_end | its_cut)
+        np.testing.assert_array_equal(reward, its_reward)
+        np.testing.assert_array_equal(observed[~ended], other[~ended])
+        for lane in np.flatnonzero(ended):
+            seen += 1
+            np.testing.assert_array_equal(info["final_obs"][lane], other[lane])
+            assert info["_final_obs"][lane]
+        if ended.any():
+            with pytest.raises(gymnasium.error.ResetNeeded, match="reset_mask"):
+                disabled.step(action)
+            again = disabled.reset(options={"reset_mask": ended})[0]
+            np.testing.assert_array_equal(again, observed)
+    assert seen >= 9
+    following = modes[AutoresetMode.NEXT_STEP]
+    for action in given[:9]:
+        *_, terminated, truncated, _ = following.step(action)
+    assert truncated.any()
+    assert not (terminated & truncated).any()
+    _, reward, *_ = following.step(given[10])
+    assert (reward[truncated] == 0.0).all()
+
+
+def test_what_is_wrong_is_said() -> None:
+    lanes, single = vector(), RunningEnv("Walker2d")
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        lanes.step(actions(3, 1)[0])
+    with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
+        single.step(np.zeros(6))
+    lanes.reset(seed=np.int64(1))
+    lanes.reset(seed=[1, None, 3])
+    single.reset(seed=0)
+    for wrong, words in (
+        (np.zeros((3, 5)), "shape"), (np.full((3, 6), np.nan), "lane 2 is not finite"),
+        (np.full((3, 6), "a"), "numbers"), (None, "numbers"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=words):
+            lanes.step(wrong)
+    with pytest.raises(ValueError, match="not finite"):
+        single.step(np.full(6, np.inf))
+    for seed in (-1, "a", 1.5, [1, 2]):
+        with pytest.raises((gymnasium.error.Error, TypeError)):
+            lanes.reset(seed=seed)
+    with pytest.raises(gymnasium.error.Error, match="truth value"):
+        lanes.reset(options={"reset_mask": [0, 1, 1]})
+    for make in (lambda: RunningEnv("Ant"), lambda: RunningVectorEnv("Walker2d", 0)):
+        with pytest.raises(ValueError, match=r"task|num_envs"):
+            make()
+    with pytest.raises(ValueError, match="render_mode"):
+        RunningEnv("Walker2d", render_mode="human")
+    copy = pickle.loads(pickle.dumps(single))
+    np.testing.assert_array_equal(copy.reset(seed=0)[0], single.reset(seed=0)[0])
+    for each in (lanes, single):
+        each.close()
+        with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="closed"):
+            each.reset()
+
+
+def test_fields_of_the_task_can_be_others_and_pictures_are_taken() -> None:
+    single = gymnasium.make("heelstrike/Hopper-v0", render_mode="rgb_array", healthy_reward=5.0)
+    single.reset(seed=0)
+    info = single.step(np.zeros(3, dtype=np.float32))[4]
+    assert info["reward_survive"] == 5.0
+    assert 0.0 <= info["certificate"] < 1e-9
+    picture = single.render()
+    assert picture.shape == (480, 480, 3)
+    assert len(np.unique(picture)) > 2
+
+
+def test_names_are_registered_once() -> None:
+    environments.register()
+    assert gymnasium.spec("heelstrike/Walker2d-v0").max_episode_steps == 1000
