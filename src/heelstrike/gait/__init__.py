@@ -1,6 +1,7 @@
 """Gaits: how they are represented, saved, and found by optimisation."""
 
 from heelstrike.gait.clearance import ClearanceProfile
+from heelstrike.gait.cost import Cost, Instant
 from heelstrike.gait.file import load_gait
 from heelstrike.gait.gait import Footing, Gait, Phase
 from heelstrike.gait.margins import Margins
@@ -11,8 +12,10 @@ from heelstrike.gait.phased.surface import Touchdown, make_invariant
 
 __all__ = [
     "ClearanceProfile",
+    "Cost",
     "Footing",
     "Gait",
+    "Instant",
     "Margins",
     "Phase",
     "PhasedGait",

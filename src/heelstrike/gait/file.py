@@ -39,6 +39,8 @@ _NUMBERS: dict[str, tuple[str, tuple[int, ...]]] = {
     "mirror_joint": ("mirror_joint", (0,)),
     "touchdown_impulse_Ns": ("touchdown_impulse", (3,)),
 }
+_LATER = {"slope_rad": "slope", "rise_m": "rise", "spent": "spent"}
+"""Numbers that older files lack, of gaits that have their defaults."""
 """Entries of a file: the attribute of the gait, and the shape of its numbers; 0 is one a joint."""
 
 _MARGINS = {"_".join([each.name, *each.metadata.values()]): each.name for each in fields(Margins)}
@@ -50,6 +52,12 @@ def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
     entries: dict[str, Any] = {
         **{key: getattr(gait, name) for key, name in _TEXTS.items()},
         **{key: np.asarray(getattr(gait, name)).tolist() for key, (name, _) in _NUMBERS.items()},
+        **{
+            key: value
+            for key, name in _LATER.items()
+            if (value := getattr(gait, name)) not in (0.0, None)
+        },
+        **({} if gait.optimal else {"optimal": False}),
         "clearance_profile": gait.clearance_profile.value,
         "joints": list(gait.joint_names),
         "initial_position": gait.initial_state.q.tolist(),
@@ -121,9 +129,11 @@ def _gait(entries: Entries) -> Gait:
         phases = [_only_phase(entries, nu)]
     else:
         phases = [_phase(each, nu) for each in entries.objects("phases")]
+    values |= {name: entries.number(key) for key, name in _LATER.items() if key in entries.data}
     margins = entries.object("margins")
     return Gait(
         **values,
+        optimal=entries.data.get("optimal", True) is True,
         clearance_profile=entries.member("clearance_profile", ClearanceProfile),
         joint_names=joints,
         initial_state=State(
