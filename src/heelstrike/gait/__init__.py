@@ -2,6 +2,7 @@
 
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.cost import Cost, Instant
+from heelstrike.gait.family import GaitFamily, gait_family, load_gait_family
 from heelstrike.gait.file import load_gait
 from heelstrike.gait.gait import Footing, Gait, Phase
 from heelstrike.gait.margins import Margins
@@ -15,13 +16,16 @@ __all__ = [
     "Cost",
     "Footing",
     "Gait",
+    "GaitFamily",
     "Instant",
     "Margins",
     "Phase",
     "PhasedGait",
     "StepFamily",
     "Touchdown",
+    "gait_family",
     "load_gait",
+    "load_gait_family",
     "make_invariant",
     "optimize_gait",
 ]

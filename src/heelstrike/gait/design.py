@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import islice
 
@@ -33,6 +33,15 @@ def designed(request: Request, profile: ClearanceProfile, report: Callable[[floa
     unknowns, optimal = held_between_nodes(program, best)
     report(1.0)
     return designed_gait(program, unknowns, optimal)
+
+
+def between(request: Request, corners: Sequence[tuple[Gait, float]]) -> Gait:
+    """Gait between others, whose motions count by weights: it satisfies all equations of a step."""
+    profiles = {gait.clearance_profile for gait, _ in corners}
+    profile = ClearanceProfile.SMOOTH if len(profiles) > 1 else profiles.pop()
+    program = Program(request, transcribed(request), profile, *first_instants(request))
+    mean = np.sum([weight * program.resampled(gait) for gait, weight in corners], axis=0)
+    return designed_gait(program, program.polished(program.in_bounds(mean)), optimal=False)
 
 
 def _best_of_starts(program: Program, report: Callable[[float], None]) -> Solution:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from typing import Any
 
 from heelstrike.arguments import takes
 from heelstrike.errors import GaitError, InfeasibleGaitError
@@ -165,3 +167,11 @@ def optimize_gait(
         with suppress(InfeasibleGaitError):  # the last profile asks least of the swing foot
             return kept.save(designed(request, profile, report))
     return kept.save(designed(request, last, report))
+
+
+def request_of(robot: Robot, **asked: Any) -> Request:
+    """Return a request in which what is not asked is as :func:`optimize_gait` has it by default."""
+    parameters = inspect.signature(optimize_gait).parameters
+    usual = {name: each.default for name, each in parameters.items() if name != "robot"}
+    del usual["progress"]
+    return Request(robot=robot, **{**usual, **asked})

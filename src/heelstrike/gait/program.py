@@ -298,7 +298,7 @@ class Program:
         low, high = np.array([self.request.duration_bounds, self.request.length_bounds]).T
         lower = np.concatenate([np.full(size - 2, -np.inf), low, np.zeros(more)])
         upper = np.concatenate([np.full(size - 2, np.inf), high, np.full(more, np.inf)])
-        start = np.clip(guess, lower[:size], upper[:size])
+        start = self.in_bounds(guess)
         if self.elastic:
             missing = self.violations(start)
             start = np.concatenate([start, np.maximum(missing, 0.0), np.maximum(-missing, 0.0)])
@@ -315,6 +315,11 @@ class Program:
             ended=str(statistics["return_status"]).replace("_", " ").lower(),
             multipliers=np.array(found["lam_g"]).ravel(),
         )
+
+    def in_bounds(self, unknowns: Floats) -> Floats:
+        """Bring duration and length of the step within their bounds."""
+        low, high = np.array([self.request.duration_bounds, self.request.length_bounds]).T
+        return np.append(unknowns[:-2], np.clip(unknowns[-2:], low, high))
 
     def at(self, unknowns: Floats) -> Solution:
         """Return a point that is no optimum, as if IPOPT had stopped there."""
@@ -339,9 +344,9 @@ class Program:
         n, pieces, duration = self.transcription.size, self.instants.pieces, gait.step_duration
         piece = duration / pieces
         nodes, _ = gauss(self.degree - 1)
-        beginnings = np.arange(pieces) * piece
+        grid = np.linspace(0.0, duration, pieces + 1)
+        beginnings, ends = grid[:-1], grid[1:]
         inner: Floats = (beginnings[:, None] + piece * nodes).ravel()
-        ends: Floats = beginnings + piece
         q, v = self._of_gait(gait, ends, 0), piece * self._of_gait(gait, beginnings, 1)
         a = piece**2 * self._of_gait(gait, inner, 2).reshape(n, pieces, nodes.size)
         basis = legvander(2.0 * nodes - 1.0, nodes.size - 1)
