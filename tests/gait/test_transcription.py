@@ -72,11 +72,9 @@ def a_step(seed: int) -> tuple[np.ndarray, SimpleNamespace]:
     gait = SimpleNamespace(
         stance_foot=0, position=motion(0), velocity=motion(1), acceleration=motion(2)
     )
-    # The acceleration 2 a2 + 6 a3 t in parts that are 1 and that go from -1 to 1; all of them in
-    # the time of the step that goes from 0 to 1.
+    # The acceleration 2 a2 + 6 a3 t in parts that are 1 and that go from -1 to 1.
     mean, rise = 2.0 * cubic[2] + 3.0 * duration * cubic[3], 3.0 * duration * cubic[3]
-    rates = [duration * start_velocity, duration**2 * mean, duration**2 * rise]
-    return np.concatenate([end, *rates, [duration, 0.25]]), gait
+    return np.concatenate([end, start_velocity, mean, rise, [duration, 0.25]]), gait
 
 
 def path_values(

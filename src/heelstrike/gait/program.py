@@ -18,7 +18,7 @@ from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.polynomials import Instants, coefficients, gauss, lobatto
 from heelstrike.gait.request import Request
-from heelstrike.gait.starts import Start
+from heelstrike.gait.starts import Start, typical_step
 from heelstrike.gait.transcription import Group, Row, Transcription
 from heelstrike.interruption import deferred_interrupts
 
@@ -108,8 +108,9 @@ class Program:
     """The program on a mesh of equal pieces.
 
     Unknowns are, of all free coordinates, the positions at the end and the velocities at the
-    beginning of every piece, and the parts of its acceleration, in the time of a piece that goes
-    from 0 to 1; then the step's duration and length. So the motion is affine in them, and the
+    beginning of every piece, and the parts of its acceleration, as they are if the step has its
+    usual duration, or the one that was asked for; then the step's duration and length. Over the
+    share of a piece that has gone by, the motion is affine in them whatever the duration, and the
     program made of blocks. The positions at its beginning are the mirror image of those at its end.
     Where a piece ends, the next one begins: those equations always hold, also in an elastic
     program.
@@ -134,6 +135,9 @@ class Program:
 
     def __post_init__(self) -> None:
         n, pieces = self.transcription.size, self.instants.pieces
+        _, usual = typical_step(self.request)
+        self._usual = usual / pieces
+        """Duration of a piece (s) with which velocities and accelerations are told."""
         self._ends = Instants(pieces, np.arange(pieces), np.ones(pieces), np.zeros(pieces))
         sizes = [n * pieces, n * pieces, n * pieces * (self.degree - 1), 1, 1]
         self._places = [0, *np.cumsum(sizes).tolist()]
@@ -184,17 +188,18 @@ class Program:
         )
 
     def _parts(self, unknowns: Any) -> tuple[Any, Any, Any, Any, Any]:
-        """Positions, and derivatives in the time of a piece, (n, ...); duration and length."""
+        """Positions, and derivatives by the share of a piece, (n, ...); duration and length."""
         if isinstance(unknowns, np.ndarray):
             unknowns = casadi.DM(unknowns)
         n = self.transcription.size
         q, v, a, duration, length = (unknowns[k:end] for k, end in pairwise(self._places))
         q, v, a = (casadi.reshape(part, n, -1) for part in (q, v, a))
         start = self.transcription.mirror.position(q[:, -1])
-        return casadi.horzcat(start, q), v, a, duration, length
+        rate = self._usual
+        return casadi.horzcat(start, q), rate * v, rate**2 * a, duration, length
 
     def _along(self, unknowns: Any, instants: Instants) -> tuple[Any, Any, Any]:
-        """Positions and their derivatives in the time of a piece at instants, (n, N) each."""
+        """Positions and their derivatives by the share of a piece at instants, (n, N) each."""
         q, v, a, _, _ = self._parts(unknowns)
         values = casadi.horzcat(q[:, :-1], v, a)
         position, velocity, acceleration = (
@@ -333,10 +338,10 @@ class Program:
     def sampled(self, start: Start) -> Floats:
         """Unknowns of a motion to start from."""
         q, v, a = start.motion(np.linspace(0.0, 1.0, self.instants.pieces + 1))
-        piece = start.duration / self.instants.pieces
+        rate = start.duration / self.instants.pieces / self._usual
         rest = np.zeros(self._places[3] - self._places[2])
-        rest[: v[:, 1:].size] = piece**2 * a[:, 1:].ravel(order="F")
-        parts = [q[:, 1:].ravel(order="F"), piece * v[:, :-1].ravel(order="F"), rest]
+        rest[: v[:, 1:].size] = rate**2 * a[:, 1:].ravel(order="F")
+        parts = [q[:, 1:].ravel(order="F"), rate * v[:, :-1].ravel(order="F"), rest]
         return np.concatenate([*parts, [start.duration, start.length]])
 
     def resampled(self, gait: Gait) -> Floats:
@@ -347,8 +352,9 @@ class Program:
         grid = np.linspace(0.0, duration, pieces + 1)
         beginnings, ends = grid[:-1], grid[1:]
         inner: Floats = (beginnings[:, None] + piece * nodes).ravel()
-        q, v = self._of_gait(gait, ends, 0), piece * self._of_gait(gait, beginnings, 1)
-        a = piece**2 * self._of_gait(gait, inner, 2).reshape(n, pieces, nodes.size)
+        rate = piece / self._usual
+        q, v = self._of_gait(gait, ends, 0), rate * self._of_gait(gait, beginnings, 1)
+        a = rate**2 * self._of_gait(gait, inner, 2).reshape(n, pieces, nodes.size)
         basis = legvander(2.0 * nodes - 1.0, nodes.size - 1)
         parts = np.linalg.solve(basis, np.moveaxis(a, 2, 0).reshape(nodes.size, -1))
         # All pieces of the first part come first.
@@ -414,7 +420,7 @@ class Ipopt:
         self._watch = _Watch(unknowns.numel(), constraints.numel())
         given, (price, prices, bend) = [unknowns, casadi.MX.sym("none", 0, 0)], hessian
         derivatives = {
-            "grad_f": casadi.Function("grad_f", given, [objective, gradient]),
+            "grad_f": casadi.Function("grad_f", given, [objective, casadi.densify(gradient)]),
             "jac_g": casadi.Function("jac_g", given, [constraints, jacobian]),
             "hess_lag": casadi.Function("hess_lag", [*given, price, prices], [casadi.triu(bend)]),
         }
