@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import platform
 import signal
 import tempfile
+from importlib.metadata import version
+from pathlib import Path
 
 # Matplotlib reads this when it is imported; processes that tests start inherit it.
 os.environ["MPLBACKEND"] = "Agg"
@@ -42,9 +46,26 @@ def pytest_configure(config: pytest.Config) -> None:
 
         perturb_gaits(size)
     if not hasattr(config, "workerinput"):  # processes that are started from here share the folder
-        kept = tempfile.TemporaryDirectory(prefix="gaits-", ignore_cleanup_errors=True)
-        config.add_cleanup(kept.cleanup)
-        os.environ["HEELSTRIKE_KEEP_GAITS"] = "0" if size else kept.name
+        os.environ["HEELSTRIKE_KEEP_GAITS"] = "0" if size else str(_gaits(config))
         robots = tempfile.TemporaryDirectory(prefix="robots-", ignore_cleanup_errors=True)
         config.add_cleanup(robots.cleanup)
         os.environ["HEELSTRIKE_KEEP_ROBOTS"] = robots.name
+
+
+def _gaits(config: pytest.Config) -> Path:
+    """Where gaits are kept from one run of the tests to the next (`make clean` forgets them).
+
+    A gait is found there by all that it follows from, the text of the program that designs it
+    among it. What rounds otherwise is not part of that, and has a folder of its own.
+    """
+    rounding = [platform.machine(), platform.python_version()]
+    rounding += [version(package) for package in ("numpy", "scipy", "casadi", "numba")]
+    rounding += [
+        os.environ.get(name, "") for name in ("HEELSTRIKE_PLAIN_CODE", "OPENBLAS_CORETYPE")
+    ]
+    name = "gaits-" + hashlib.sha256(" ".join(rounding).encode()).hexdigest()[:8]
+    if config.pluginmanager.has_plugin("cacheprovider"):
+        return Path(config.cache.mkdir(name))
+    folder = tempfile.TemporaryDirectory(prefix=name, ignore_cleanup_errors=True)
+    config.add_cleanup(folder.cleanup)
+    return Path(folder.name)

@@ -60,7 +60,7 @@ def list_closed(kind: int, count: int, memory: Any) -> int:
     first = count
     for entry in range(memory.rows.first[kind], memory.rows.end[kind]):
         if memory.rows.gap[entry] <= 0.0:
-            sim.list_candidate(kind, entry, count, memory)
+            sim.list_candidate(entry, count, memory)
             count += 1
     sim.note_group(kind, first, count, memory.assembly)
     return count

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import pkgutil
 import re
+import runpy
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from public_names import public_names
@@ -42,8 +44,10 @@ def test_the_reference_is_that_of_the_public_names() -> None:
 def test_links_to_names_lead_to_what_is_described() -> None:
     """The strict build asks the same of every link, and of names that are described in place."""
     docs = ROOT / "docs"
+    with_places = runpy.run_path(str(docs / "places.py"))["on_page_markdown"]
     for page in docs.glob("*.md"):
-        text = page.read_text(encoding="utf-8")
+        built = SimpleNamespace(file=SimpleNamespace(src_uri=page.name))
+        text = with_places(page.read_text(encoding="utf-8"), built)
         here = set(re.findall(r"^::: (\S+)$", text, re.MULTILINE))
         for name in here:
             pkgutil.resolve_name(name)

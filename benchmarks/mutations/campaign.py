@@ -4,7 +4,8 @@ A line of heelstrike is changed, and the tests that reach it run until one fails
 plain Python (`plain_kernels`), so that nothing is compiled and a tracer sees which tests reach
 which lines (`reach`). Mutants are drawn from a seed: in each package first an operator
 (`operators`), then a place, each with equal chance; those that once passed unseen (`known`) are
-always among them. Words, types and looks are left alone.
+always among them. Words, types and looks are left alone. ``--room`` draws from parts of packages
+instead, as many from each, and from them alone.
 
 All tests are collected once, and every mutant is a fork of that process with another function in
 it (`substitution`). What cannot be exchanged so, such as constants of a module, is written into a
@@ -17,6 +18,7 @@ Run, from the top folder, on a system that forks::
 
     python benchmarks/mutations/campaign.py reach           # which tests reach what
     python benchmarks/mutations/campaign.py run --seed 1    # about half an hour on one core
+    python benchmarks/mutations/campaign.py run --seed 3 --number 60 --room sim/contacts ...
     python benchmarks/mutations/campaign.py again           # survivors, after tests were added
     python benchmarks/mutations/campaign.py table           # as Markdown
 
@@ -34,13 +36,14 @@ import importlib
 import json
 import os
 import random
+import resource
 import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -74,8 +77,10 @@ REACH_DEADLINE = 3
 """Tests that take longer than this (s of processor time, traced) are left out."""
 DEADLINE = 12
 """What a test may take with a mutant (s of processor time) before it counts as caught."""
+LONGEST = 120
+"""What all tests together may take (s of processor time) before a mutant counts as endless."""
 LONGEST_WAIT = 900.0
-"""What all tests together may take (s) before a mutant counts as endless."""
+"""The same of a process that starts afresh, and of its children (s that pass)."""
 QUICK = 20
 """Tests that run first in a new process, the quickest; the others only if these pass."""
 SLOW = 0.5
@@ -94,11 +99,12 @@ def copy_sources() -> None:
 
     atexit.register(clear)
     COPY.mkdir(parents=True)
-    for name in ("src", "tests"):
+    for name in ("src", "tests", "benchmarks", "docs"):  # tests import benchmarks and read pages
         shutil.copytree(HOME / name, COPY / name, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "README.md"):
+    for name in ("pyproject.toml", "README.md", "mkdocs.yml"):
         shutil.copy(HOME / name, COPY / name)
-    compileall.compile_dir(COPY, quiet=2)
+    for name in ("src", "tests", "benchmarks"):
+        compileall.compile_dir(COPY / name, quiet=2)
 
 
 def environment(**setting: str) -> dict[str, str]:
@@ -107,8 +113,10 @@ def environment(**setting: str) -> dict[str, str]:
     return {"CI": "1", "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **setting}
 
 
-OPTIONS = ("-p", "plain_kernels", "-p", "reach", "-p", "no:cacheprovider", "-q", "--tb=line")
-OPTIONS += ("--assert=plain",)
+OPTIONS = ("-p", "plain_kernels", "-p", "reach", "-q", "--tb=line", "--assert=plain")
+UNCHANGED = ("-o", f"cache_dir={STATE / 'pytest'}")
+"""Gaits are kept from one call to the next, where it is sure that no mutant designed them."""
+CHANGED = ("-p", "no:cacheprovider")
 
 
 def pytest_afresh(arguments: Iterable[str], **setting: str) -> int | None:
@@ -145,7 +153,7 @@ def reach(paths: list[str]) -> None:
     """Find out which tests reach what, for some paths or all."""
     copy_sources()
     for path in paths or TESTS:
-        status = pytest_afresh([path], REACH=str(REACH), DEADLINE=str(REACH_DEADLINE))
+        status = pytest_afresh([*UNCHANGED, path], REACH=str(REACH), DEADLINE=str(REACH_DEADLINE))
         print(f"{path}: pytest ended with {status}", flush=True)
 
 
@@ -202,25 +210,31 @@ class Reached:
 # The campaign.
 
 
-def drawn(seed: int, number: int) -> list[Mutant]:
-    """Draw mutants from a seed, after those that are known."""
-    chosen = known_mutants(PACKAGE)
-    for package, share in SHARES.items():
-        draw = random.Random(f"{seed}/{package}")
+def drawn(seed: int, number: int, rooms: Sequence[str] = ()) -> list[Mutant]:
+    """Draw mutants from a seed, after those that are known; or from some rooms alone."""
+    if rooms:
+        shares = dict.fromkeys(rooms, 1.0 / len(rooms))
+        chosen = []
+    else:
+        shares, chosen = SHARES, known_mutants(PACKAGE)
+    begin = len(chosen)
+    for place, room in enumerate(shares):
+        draw = random.Random(f"{seed}/{room}")
         kinds: dict[str, list[Mutant]] = {}
-        for file in sorted((PACKAGE / package).glob("*.py")):
+        inside = sorted((PACKAGE / room).rglob("*.py")) or [PACKAGE / room]
+        for file in inside:
             for mutant in mutants_of(PACKAGE, file):
                 kinds.setdefault(mutant.kind, []).append(mutant)
-        wanted, names = round(share * number), sorted(kinds)
-        found = 0
-        while found < wanted:
+        names = sorted(kinds)
+        wanted = round(sum([*shares.values()][: place + 1]) * number) - (len(chosen) - begin)
+        while wanted:
             kind = draw.choice(names)
             if not kinds[kind]:
                 continue
             mutant = kinds[kind].pop(draw.randrange(len(kinds[kind])))
             if is_a_change(mutant, (PACKAGE / mutant.file).read_text()):
                 chosen.append(mutant)
-                found += 1
+                wanted -= 1
     return chosen
 
 
@@ -283,19 +297,11 @@ class Asker:
                 os._exit(self._in_fork(mutant, text, tests))
             finally:
                 os._exit(1)  # the mutant spoilt what runs the tests
-        begin = time.monotonic()
-        try:
-            while time.monotonic() - begin < LONGEST_WAIT:
-                finished, status, _ = os.wait4(process, os.WNOHANG)
-                if finished:
-                    return os.waitstatus_to_exitcode(status)
-                time.sleep(0.02)
-            return None
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(process, signal.SIGKILL)
+        status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+        return None if status == -signal.SIGXCPU else status
 
     def _in_fork(self, mutant: Mutant, text: str, tests: list[str]) -> int:
+        resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST + 5))  # a fork begins at zero
         nowhere = os.open(os.devnull, os.O_RDWR)
         for stream in range(3):
             os.dup2(nowhere, stream)
@@ -328,7 +334,7 @@ class Asker:
                 if part and status == 0:
                     order.write_text("\n".join(part) + "\n")
                     files = dict.fromkeys(test.split("::")[0] for test in part)
-                    status = pytest_afresh(["-x", *files], ORDER=str(order))
+                    status = pytest_afresh(["-x", *CHANGED, *files], ORDER=str(order))
             return status
         finally:
             target.write_text(text)
@@ -344,6 +350,8 @@ def forget(package: str) -> None:
     """Undo it where a mutant might have had a part in it."""
     if package == "gait":
         importlib.import_module("walking").gait.cache_clear()
+    if package in ("gait", "contact", "dynamics"):  # the text of the files tells nothing of it
+        os.environ["HEELSTRIKE_KEEP_GAITS"] = "0"
 
 
 def run(mutants: list[Mutant], *, anew: bool = False) -> None:
@@ -357,7 +365,8 @@ def run(mutants: list[Mutant], *, anew: bool = False) -> None:
     setting = {"DEADLINE": str(DEADLINE), "VERDICT": str(VERDICT)}
     os.environ.update(environment(**setting))
     sys.path[:0] = [str(COPY / "src"), str(HERE)]
-    pytest.main([*OPTIONS, "-s", *TESTS], plugins=[asker])
+    files = sorted({test.split("::")[0] for test in asker.reached.seconds})
+    pytest.main([*OPTIONS, *CHANGED, "-s", *files], plugins=[asker])
 
 
 def _entry_key(entry: dict[str, Any]) -> tuple[str, ...]:
@@ -424,12 +433,13 @@ def main() -> None:
         command.add_argument("--seed", type=int, default=1)
         command.add_argument("--number", type=int, default=160)
         command.add_argument("--package", action="append", choices=list(SHARES))
+        command.add_argument("--room", nargs="+", default=[], help="files or folders to draw from")
     asked = parser.parse_args()
     STATE.mkdir(parents=True, exist_ok=True)
     if asked.command == "reach":
         reach(asked.paths)
         return
-    mutants = drawn(asked.seed, asked.number)
+    mutants = drawn(asked.seed, asked.number, asked.room)
     if asked.package:
         mutants = [m for m in mutants if m.file.split("/")[0] in asked.package]
     if asked.command == "run":

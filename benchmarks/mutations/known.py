@@ -33,7 +33,7 @@ KNOWN: tuple[tuple[str, str, str], ...] = (
      '"component": ["tangent", "normal"]'),
     ("sim/files/dataset.py", '"N s"', '"N"'),
     ("sim/files/dataset.py", '"axis": ["x", "z"]', '"axis": ["z", "x"]'),
-    ("sim/time_stepping/method.py", "reaction.slip[contact] = answer.velocity[2 * place + 1]",
+    ("sim/contacts/candidates.py", "reaction.slip[contact] = answer.velocity[2 * place + 1]",
      "reaction.slip[contact] = -answer.velocity[2 * place + 1]"),
     ("sim/run.py", 'of="contacts.gap"', 'of="reaction.slip"'),
     ("sim/event_driven/rows.py", "_, record.slip_velocity[row, contact] = contact_velocity(",

@@ -111,7 +111,7 @@ def _finish(self: Any) -> Any:
 
 separate_kernel.SeparateKernel.begin = lambda _: None  # type: ignore[method-assign]
 separate_kernel.SeparateKernel.finish = _finish  # type: ignore[method-assign]
-separate_kernel.call_at = _call
+separate_kernel.call_at = separate_kernel.measure_at = _call
 
 from heelstrike.compiler import straight_line  # noqa: E402
 

@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from heelstrike.contact import ActiveContacts as ActiveContacts
     from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
+    from heelstrike.contact import GroundShape as GroundShape
     from heelstrike.contact import contact_forward_dynamics as contact_forward_dynamics
     from heelstrike.contact import contact_inverse_dynamics as contact_inverse_dynamics
     from heelstrike.contact import contact_kinematics as contact_kinematics
@@ -119,10 +120,12 @@ if TYPE_CHECKING:
     from heelstrike.robot.human import human as human
     from heelstrike.sim import Batch as Batch
     from heelstrike.sim import Compliant as Compliant
+    from heelstrike.sim import Constraint as Constraint
     from heelstrike.sim import ControllerWarning as ControllerWarning
     from heelstrike.sim import EndOfRun as EndOfRun
     from heelstrike.sim import EventDriven as EventDriven
     from heelstrike.sim import HuntCrossley as HuntCrossley
+    from heelstrike.sim import ImpulseSet as ImpulseSet
     from heelstrike.sim import KelvinVoigt as KelvinVoigt
     from heelstrike.sim import Push as Push
     from heelstrike.sim import Run as Run
@@ -132,6 +135,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import SimulationWarning as SimulationWarning
     from heelstrike.sim import Snapshot as Snapshot
     from heelstrike.sim import TimeStepping as TimeStepping
+    from heelstrike.sim import constrained as constrained
     from heelstrike.sim import load_run as load_run
     from heelstrike.sim import load_snapshot as load_snapshot
     from heelstrike.sim import simulate as simulate
@@ -150,6 +154,7 @@ _HOME = {
     "Bundle": "heelstrike.compiler.bundle",
     "Compliant": "heelstrike.sim",
     "ComputedTorque": "heelstrike.control",
+    "Constraint": "heelstrike.sim",
     "ContactProblemError": "heelstrike.errors",
     "ControllerError": "heelstrike.errors",
     "ControllerWarning": "heelstrike.sim",
@@ -160,18 +165,20 @@ _HOME = {
     "Estimated": "heelstrike.control",
     "EventDriven": "heelstrike.sim",
     "Feedforward": "heelstrike.control",
-    "Floquet": "heelstrike.analysis.stability.floquet",
     "FlatGaitLQR": "heelstrike.control",
+    "Floquet": "heelstrike.analysis.stability.floquet",
     "FootSensors": "heelstrike.control",
     "FootstepFeedback": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",
     "Gait": "heelstrike.gait",
+    "GaitError": "heelstrike.errors",
     "GaitFamily": "heelstrike.gait",
     "GaitLQR": "heelstrike.control",
-    "GaitError": "heelstrike.errors",
     "Ground": "heelstrike.contact",
+    "GroundShape": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
     "HuntCrossley": "heelstrike.sim",
+    "ImpulseSet": "heelstrike.sim",
     "InertialUnit": "heelstrike.control",
     "InfeasibleGaitError": "heelstrike.errors",
     "JointPD": "heelstrike.control",
@@ -212,6 +219,7 @@ _HOME = {
     "builtin_robots": "heelstrike.robot",
     "cell": "heelstrike.compiler.bundle",
     "compare": "heelstrike.experiments.comparison",
+    "constrained": "heelstrike.sim",
     "contact_forward_dynamics": "heelstrike.contact",
     "contact_inverse_dynamics": "heelstrike.contact",
     "contact_kinematics": "heelstrike.contact",

@@ -82,6 +82,7 @@ _KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "None": ("None", lambda value: value is None),
     "ArrayLike": ("numbers", are_numbers),
     "NDArray": ("numbers", are_numbers),
+    "Floats": ("numbers", are_numbers),
     "Path": ("a path", lambda value: isinstance(value, os.PathLike)),
     "PathLike": ("a path", lambda value: isinstance(value, os.PathLike)),
     "Mapping": ("a mapping", lambda value: isinstance(value, Mapping)),

@@ -58,12 +58,12 @@ def make_room(file: Path) -> None:
 
 @cache
 def program_digest(rooms: Sequence[str], package: str) -> bytes:
-    """Digest of a program: the text of packages of heelstrike, and what works for them.
+    """Digest of a program: the text of parts of heelstrike, and what works for them.
 
     Parameters
     ----------
     rooms : tuple of str
-        Names of the packages.
+        Names of packages, and of modules beside them.
     package : str
         Package from elsewhere, which is not imported for it: that takes longer than the rest.
     """
@@ -73,6 +73,7 @@ def program_digest(rooms: Sequence[str], package: str) -> bytes:
         other = "of unknown version"
     digest = hashlib.sha256(f"{other} {np.__version__}".encode())
     for room in rooms:
-        for file in sorted((Path(__file__).parent / room).rglob("*.py")):
+        place = Path(__file__).parent / room
+        for file in sorted(place.rglob("*.py")) or [place.with_suffix(".py")]:
             digest.update(file.read_bytes())
     return digest.digest()

@@ -15,7 +15,6 @@ from typer.testing import CliRunner
 import heelstrike
 from heelstrike.cli import run as heelstrike_command
 from heelstrike.cli.main import app
-from heelstrike.cli.options import Debug
 from heelstrike.cli.terminal import spoken, stage
 from heelstrike.errors import GaitError
 
@@ -92,7 +91,7 @@ def _app_that_raises(error: Exception) -> typer.Typer:
 
     @other.command()
     @spoken
-    def fail(debug: Debug = False) -> None:
+    def fail() -> None:
         raise error
 
     return other
@@ -128,7 +127,7 @@ def test_warnings_in_words() -> None:
 
     @other.command()
     @spoken
-    def risky(debug: Debug = False) -> None:
+    def risky() -> None:
         warnings.warn("left and right differ", stacklevel=1)
 
     result = CliRunner().invoke(other, [])

@@ -136,13 +136,22 @@ def test_a_fall_is_kept_and_told(walk: Callable[..., Any], tmp_path: Path) -> No
     assert (out / "tracking.png").exists()
 
 
-@pytest.mark.parametrize("command", ["walk", "compare"])
-def test_a_robot_that_goes_down_has_not_walked(command: str, tmp_path: Path) -> None:
-    """Moreau-Jean at 1 ms sinks into the ground, and its run ends when its time is up."""
-    gait, out = str(tmp_path / "gait.json"), str(tmp_path / "out")
-    walking.gait().save(gait)
-    options = ["--method", "moreau-jean", "--steps", "1", "--step", "1e-3", "--gait", gait]
-    result = CliRunner().invoke(app, [command, "bravo7", *options, "--out", out])
+@pytest.mark.parametrize("command", ["compare", "walk"])
+def test_a_robot_that_goes_down_has_not_walked(
+    command: str, tmp_path: Path, walk: Callable[..., Any]
+) -> None:
+    """Moreau-Jean at 1 ms sinks: its run ends when its time is up, after two steps upright again.
+
+    It looks for contact half a step ahead, where a foot that has turned by rounding touches no
+    more; the law, for which the foot stands, then asks for more than the motors have.
+    """
+    options = ["--method", "moreau-jean", "--step", "1e-3"]
+    if command == "walk":
+        result = walk("bravo7", "--steps", "2", *options)
+    else:
+        walking.gait().save(tmp_path / "gait.json")
+        options += ["--gait", str(tmp_path / "gait.json"), "--out", str(tmp_path / "out")]
+        result = CliRunner().invoke(app, ["compare", "bravo7", "--steps", "1", *options])
     assert result.exit_code == 1
     assert "the robot goes down: torque limit" in " ".join(result.stderr.split())
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fresh_python import fresh_python
 from numba import TypingError, types
 
 import heelstrike
@@ -47,19 +48,17 @@ print(force[1])
 
 def probe(home: Path) -> float:
     """Weight of bravo7 by the package in `home`, in a fresh process."""
-    answer = subprocess.run(
-        [sys.executable, "-c", PROBE],
+    answer = fresh_python(
+        "-c",
+        PROBE,
         env={**os.environ, "PYTHONPATH": str(home), "NUMBA_CACHE_DIR": str(home / "cache")},
-        capture_output=True,
-        text=True,
-        check=True,
     )
     return float(answer.stdout)
 
 
 def test_a_change_in_another_file_is_not_missed(tmp_path: Path) -> None:
     """`bias_force` calls a kernel that reads `model.py`'s neighbour: change the callee's file."""
-    shutil.copytree(SOURCE, tmp_path / "heelstrike", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(SOURCE, tmp_path / "heelstrike")
     kernels = tmp_path / "heelstrike" / "dynamics" / "kernels.py"
     callee = tmp_path / "heelstrike" / "dynamics" / "doubled.py"
     callee.write_text(
@@ -130,13 +129,10 @@ print(compiled(1.5), sum(compiled.stats.cache_hits.values()))
 @pytest.mark.skipif(BY_DOCUMENTED_NAMES, reason="Numba keeps functions of files only")
 def test_a_function_typed_at_a_prompt_is_kept_for_the_next(tmp_path: Path) -> None:
     def answer(text: str) -> str:
-        told = subprocess.run(
-            [sys.executable, "-"],
-            input=text,
+        told = fresh_python(
+            "-",
+            text=text,
             env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
-            capture_output=True,
-            text=True,
-            check=True,
         )
         return told.stdout.strip()
 
@@ -175,17 +171,14 @@ def test_a_change_in_another_file_of_a_user_is_not_missed(tmp_path: Path, docume
         (tmp_path / "helper.py").write_text(helper)
         (tmp_path / "caller.py").write_text(CALLER)
         os.utime(tmp_path / "caller.py", (0, 0))
-        told = subprocess.run(
-            [sys.executable, "-B", "caller.py"],
+        told = fresh_python(
+            "caller.py",
             cwd=tmp_path,
             env={
                 **os.environ,
                 "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
                 SWITCH: documented,
             },
-            capture_output=True,
-            text=True,
-            check=True,
         )
         value, hits = told.stdout.split()
         return float(value), int(hits)
@@ -219,8 +212,8 @@ def test_code_made_with_other_settings_is_not_taken(tmp_path: Path, documented: 
     (tmp_path / "checked.py").write_text(CHECKED)
 
     def answer(check: str) -> str:
-        told = subprocess.run(
-            [sys.executable, "-B", "checked.py"],
+        told = fresh_python(
+            "checked.py",
             cwd=tmp_path,
             env={
                 **os.environ,
@@ -228,9 +221,6 @@ def test_code_made_with_other_settings_is_not_taken(tmp_path: Path, documented: 
                 "NUMBA_BOUNDSCHECK": check,
                 SWITCH: documented,
             },
-            capture_output=True,
-            text=True,
-            check=True,
         )
         return told.stdout.strip()
 
@@ -259,17 +249,14 @@ def test_functions_of_one_name_are_kept_beside_each_other(tmp_path: Path, docume
     (tmp_path / "factory.py").write_text(FACTORY)
 
     def answer() -> str:
-        told = subprocess.run(
-            [sys.executable, "-B", "factory.py"],
+        told = fresh_python(
+            "factory.py",
             cwd=tmp_path,
             env={
                 **os.environ,
                 "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
                 SWITCH: documented,
             },
-            capture_output=True,
-            text=True,
-            check=True,
         )
         return told.stdout.strip()
 
@@ -310,13 +297,10 @@ def test_a_loop_is_found_again_with_the_kernels_that_it_encloses(
     (tmp_path / "enclosing.py").write_text(ENCLOSING)
 
     def answer() -> str:
-        told = subprocess.run(
-            [sys.executable, "-B", "enclosing.py"],
+        told = fresh_python(
+            "enclosing.py",
             cwd=tmp_path,
             env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), SWITCH: documented},
-            capture_output=True,
-            text=True,
-            check=True,
         )
         return told.stdout.strip()
 
@@ -368,13 +352,11 @@ def test_a_separate_kernel_is_compiled_by_another_process_once(
     (tmp_path / "caller.py").write_text(APART_CALLER)
 
     def answer(cache: str, *executable: str) -> list[str]:
-        told = subprocess.run(
-            [sys.executable, "-B", "caller.py", *executable],
+        told = fresh_python(
+            "caller.py",
+            *executable,
             cwd=tmp_path,
             env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / cache), SWITCH: documented},
-            capture_output=True,
-            text=True,
-            check=True,
         )
         return told.stdout.split()
 
@@ -395,13 +377,10 @@ def test_the_other_process_imports_what_this_one_does(tmp_path: Path) -> None:
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     (elsewhere / "llvmlite.py").write_text("open('imported', 'w').close()\n")
-    told = subprocess.run(
-        [sys.executable, "-B", "../caller.py"],
+    told = fresh_python(
+        "../caller.py",
         cwd=elsewhere,
         env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
-        capture_output=True,
-        text=True,
-        check=True,
     )
     assert told.stdout.split() == ["42", "10.5", "True", "1"]
     assert not (elsewhere / "imported").exists()

@@ -7,8 +7,6 @@ import inspect
 import json
 import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from enum import Enum
 from functools import lru_cache
@@ -17,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fresh_python import fresh_python
 from numba import config, float64, njit
 
 import heelstrike
@@ -148,13 +147,8 @@ EDITS: dict[str, tuple[list[tuple[str, str, str]], set[str]]] = {
 
 def fingerprints(home: Path) -> dict[str, str]:
     """Fingerprints by the package in `home`, in a fresh process."""
-    answer = subprocess.run(
-        [sys.executable, "-B", "-c", PRINT],
-        env={**os.environ, "PYTHONPATH": str(home), "NUMBA_CACHE_DIR": str(home / "cache")},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    settings = {"PYTHONPATH": str(home), "NUMBA_CACHE_DIR": str(home / "cache")}
+    answer = fresh_python("-c", PRINT, env=os.environ | settings)
     found: dict[str, str] = json.loads(answer.stdout)
     return found
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import os
 import random
-import subprocess
 import sys
 import time
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from fresh_python import fresh_python
 from numba import config
 
 from heelstrike.compiler import kept_code
@@ -150,23 +151,12 @@ def program(tmp_path: Path) -> Path:
     return file
 
 
-def begin(program: Path, cache: Path, before: str = "pass") -> subprocess.Popen[str]:
-    code = f"import sys; sys.path[0] = {str(program.parent)!r}; {before}; import program"
-    return subprocess.Popen(
-        [sys.executable, "-B", "-c", code],
-        env={**os.environ, "NUMBA_CACHE_DIR": str(cache)},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
-def told(process: subprocess.Popen[str]) -> list[str]:
+def run(program: Path, cache: Path, before: str = "pass") -> list[str]:
     """The warnings of a process, which must have come to the right answer."""
-    out, err = process.communicate(timeout=600.0)
-    assert process.returncode == 0, err
-    assert out.strip() == ANSWER
-    return [line for line in err.splitlines() if "CacheWarning" in line]
+    code = f"import sys; sys.path[0] = {str(program.parent)!r}; {before}; import program"
+    done = fresh_python("-c", code, env=os.environ | {"NUMBA_CACHE_DIR": str(cache)})
+    assert done.stdout.strip() == ANSWER
+    return [line for line in done.stderr.splitlines() if "CacheWarning" in line]
 
 
 def kept(cache: Path) -> list[Path]:
@@ -182,7 +172,7 @@ def is_whole(file: Path) -> bool:
 def test_damaged_machine_code_is_made_anew(program: Path, tmp_path: Path) -> None:
     """Unpickled or run, each of these takes the process along or fails until it is deleted."""
     cache = tmp_path / "cache"
-    assert told(begin(program, cache)) == []
+    assert run(program, cache) == []
     whole = {file: file.read_bytes() for file in kept(cache)}
     kinds = {"kernels", "straight_line", "private_numba"}
     assert {file.name.split(".")[0] for file in whole} == kinds
@@ -190,7 +180,7 @@ def test_damaged_machine_code_is_made_anew(program: Path, tmp_path: Path) -> Non
     for seed in range(3):
         for file, content in whole.items():
             file.write_bytes(random.Random(seed).choice(damages(content, seed)))
-        (said,) = told(begin(program, cache))
+        (said,) = run(program, cache)
         assert str(cache) in said
         assert kept(cache) == sorted(whole)
         assert all(is_whole(file) for file in whole)  # written again
@@ -200,7 +190,7 @@ def test_without_a_place_to_write_it_runs_and_says_so_once(program: Path, tmp_pa
     """As on a read-only disk: the directory cannot be made, whoever asks."""
     file = tmp_path / "file"
     file.write_text("no directory")
-    (said,) = told(begin(program, file / "cache"))
+    (said,) = run(program, file / "cache")
     assert "cannot be kept" in said
     assert "NUMBA_CACHE_DIR" in said
 
@@ -209,7 +199,7 @@ def test_without_a_place_to_write_it_runs_and_says_so_once(program: Path, tmp_pa
 def test_a_full_disk_costs_a_warning(program: Path, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (64, 64))"
-    (said,) = told(begin(program, cache, limit))
+    (said,) = run(program, cache, limit)
     assert "cannot be kept" in said
     assert kept(cache) == []
 
@@ -219,7 +209,7 @@ def test_processes_that_write_the_same_files_leave_whole_ones(
     program: Path, tmp_path: Path
 ) -> None:
     cache = tmp_path / "cache"
-    processes = [begin(program, cache) for _ in range(3)]
-    assert [told(process) for process in processes] == [[]] * 3
+    with ThreadPoolExecutor() as threads:
+        assert list(threads.map(lambda _: run(program, cache), range(3))) == [[]] * 3
     assert len(kept(cache)) == 5
     assert all(is_whole(file) for file in kept(cache))

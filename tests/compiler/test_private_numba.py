@@ -5,13 +5,12 @@ from __future__ import annotations
 import ast
 import os
 import re
-import subprocess
-import sys
 import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fresh_python import fresh_python
 from numba.core.types.functions import BaseFunction
 
 import heelstrike
@@ -57,13 +56,8 @@ COMPUTED = "3.0 10.0 24.0 2"
 
 def told(tmp_path: Path, before: str = "", switch: str = "") -> tuple[str, list[str]]:
     """What the program prints after some other lines, and its warnings."""
-    done = subprocess.run(
-        [sys.executable, "-c", before + PROGRAM],
-        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), SWITCH: switch},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    settings = {"NUMBA_CACHE_DIR": str(tmp_path), SWITCH: switch}
+    done = fresh_python("-c", before + PROGRAM, env=os.environ | settings)
     return done.stdout.strip(), [line for line in done.stderr.splitlines() if "Warning" in line]
 
 

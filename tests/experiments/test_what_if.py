@@ -69,7 +69,7 @@ def test_a_law_that_raises_is_not_told_of_at_every_trial() -> None:
         ),
     )  # fmt: skip
     case = falls.walk(law=law)
-    assert case.run().status is hs.sim.RunStatus.CONTROLLER_FAILED
+    assert case.run(on_error="stop").status is hs.sim.RunStatus.CONTROLLER_FAILED
     assert "not tried" in next(iter(what_if.try_disturbances(case))).outcome
 
 
@@ -119,7 +119,8 @@ def test_what_cannot_be_tried_says_why() -> None:
     (lost,) = what_if.try_disturbances(falls.KNOWN["ice"].case())
     assert lost.outcome == "not tried: undisturbed it does not walk on for 7 s"
     run = make_run(pendulum(), [0.0, 0.1])
-    (tried,) = what_if.tried_beside(None, run)
+    case = what_if.Case(robot=run.robot, gait=None)
+    (tried,) = what_if.tried_beside(case, run)
     assert tried.lasted is None
     assert tried.outcome.startswith("not tried: ")
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+
 import pytest
 import walking
 
@@ -9,9 +12,18 @@ import heelstrike as hs
 
 
 @pytest.fixture(autouse=True)
-def _nothing_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is asked of the design of gaits is asked of a design, and not of a file."""
-    monkeypatch.setenv("HEELSTRIKE_KEEP_GAITS", "0")
+def _a_changed_program_keeps_nothing(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What a test makes of the design of gaits is read by no other, nor the other way round."""
+    kept = os.environ["HEELSTRIKE_KEEP_GAITS"]
+    if {"monkeypatch", "afresh"} & set(request.fixturenames):
+        os.environ["HEELSTRIKE_KEEP_GAITS"] = "0"
+    yield
+    os.environ["HEELSTRIKE_KEEP_GAITS"] = kept
+
+
+@pytest.fixture
+def afresh() -> None:
+    """Gaits are designed in this test, whether they are kept or not."""
 
 
 @pytest.fixture(scope="session")

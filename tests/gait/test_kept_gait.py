@@ -92,6 +92,26 @@ def test_another_program_designs_anew(
     assert len(designs) == 2
 
 
+@pytest.mark.parametrize("changed", ["room/part/one.py", "module.py"])
+def test_a_program_is_known_by_the_text_of_its_packages_and_modules(
+    changed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept_files, "__file__", str(tmp_path / "kept_files.py"))
+    (tmp_path / "room" / "part").mkdir(parents=True)
+    for name in ("room/part/one.py", "module.py", "elsewhere.py"):
+        (tmp_path / name).write_text("x = 1\n")
+
+    def digest() -> bytes:
+        kept_files.program_digest.cache_clear()
+        return kept_files.program_digest(("room", "module"), "numpy")
+
+    before = digest()
+    (tmp_path / "elsewhere.py").write_text("x = 2\n")
+    assert digest() == before
+    (tmp_path / changed).write_text("x = 2\n")
+    assert digest() != before
+
+
 def test_a_damaged_file_is_designed_anew_and_replaced(folder: Path, designs: list[object]) -> None:
     hs.optimize_gait(walking.bravo7(), **ASKED)
     (file,) = folder.iterdir()

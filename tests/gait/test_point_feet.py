@@ -303,8 +303,12 @@ def test_where_no_gait_keeps_above_the_parabola_the_smooth_hump_is_tried(
         return solve(program, guess)
 
     monkeypatch.setattr(Program, "solve", only_smooth)
-    gait = hs.optimize_gait(rabbit, **STEP)
+    told: list[float] = []
+    gait = hs.optimize_gait(rabbit, **STEP, progress=told.append)
     assert gait.clearance_profile is ClearanceProfile.SMOOTH
+    assert told == sorted(told)  # though the work begins again
+    assert told[0] < 0.2
+    assert told[-1] == 1.0
 
 
 def test_a_robot_s_own_speed_limits_hold(rabbit: hs.Robot, rabbit_gait: hs.Gait) -> None:

@@ -17,13 +17,13 @@ PROFILE = hs.Ground(profile=[[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
 
 def taken_for_granted(robot: hs.Robot, ground: hs.Ground, method: hs.TimeStepping) -> bool:
     work = work_of(method, robot)
-    return bool(fixed_for(robot.model, ground.model(), work, method.usual_numbers))
+    return bool(fixed_for(robot, ground.model(), work, method.usual_numbers))
 
 
 def test_what_is_taken_for_granted_is_so() -> None:
     """In every bundle that a loop is handed, as the arrays of its members are."""
     robot, method = hs.load_robot("bravo7"), TimeStepping()
-    fixed = dict(fixed_for(robot.model, hs.Ground().model(), work_of(method, robot), {}))
+    fixed = dict(fixed_for(robot, hs.Ground().model(), work_of(method, robot), {}))
     assert fixed == dict(PLAIN)
     work = work_of(method, robot)
     for bundle in (robot.model, hs.Ground().model(), allocate_memory(robot), work):

@@ -5,12 +5,11 @@ from __future__ import annotations
 import inspect
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fresh_python import fresh_python
 from mechanisms import braked, four_bar, geared
 from stored_files import run_file
 from synthetic_runs import box, make_run
@@ -63,7 +62,7 @@ assert old.link_angle.shape == old.position.shape and not old.link_angle.any()
 
 def test_a_quantity_is_recorded_saved_and_drawn_by_its_declaration(tmp_path: Path) -> None:
     copy = tmp_path / "heelstrike"
-    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(PACKAGE, copy)
     declared = (copy / "sim" / "run.py").read_text(encoding="utf-8")
     before = "    events: tuple[Event, ...]\n"
     assert declared.count(before) == 1
@@ -72,13 +71,7 @@ def test_a_quantity_is_recorded_saved_and_drawn_by_its_declaration(tmp_path: Pat
     places = [str(tmp_path), str(ROOT / "tests"), str(ROOT / "benchmarks" / "mutations")]
     script = f"import sys; sys.path[:0] = {places!r}\n{USE}"
     old = run_file("time_stepping", tmp_path)
-    done = subprocess.run(
-        [sys.executable, "-c", script, str(tmp_path), str(tmp_path / "run.nc"), str(old)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    fresh_python("-c", script, str(tmp_path), str(tmp_path / "run.nc"), str(old))
 
 
 @pytest.mark.parametrize("name", QUANTITIES)

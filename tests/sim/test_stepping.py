@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import walking
+from fresh_python import fresh_python
 from synthetic_runs import box
 
 import heelstrike as hs
@@ -185,10 +184,7 @@ def test_a_snapshot_goes_on_in_another_process(
     places = [str(tmp_path), str(Path(__file__).parents[1])]
     script = FRESH.replace("sys.path.insert(0, sys.argv[1])", f"sys.path[:0] = {places!r}")
     script = script.format(module=__name__)
-    subprocess.run(
-        [sys.executable, "-c", script, "", str(file), method, controller, str(tmp_path / "end")],
-        check=True,
-    )
+    fresh_python("-c", script, "", str(file), method, controller, str(tmp_path / "end"))
     for _ in range(50):
         never.step()
     end = np.load(tmp_path / "end.npz")

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.sim.run import Run
-
-Floats = NDArray[np.float64]
 
 
 def torque_cost(run: Run, *, start: float = -np.inf, end: float = np.inf) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.actuation import actuator_power
 from heelstrike.analysis.intervals import (
@@ -17,9 +16,8 @@ from heelstrike.analysis.intervals import (
 from heelstrike.analysis.motion import motion, run_motion
 from heelstrike.dynamics import point_jacobian
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.sim.run import Run
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

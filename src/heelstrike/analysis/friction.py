@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.support import NOTHING, foot_sums
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.sim.run import Run
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

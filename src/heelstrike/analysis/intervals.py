@@ -10,13 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from heelstrike.robot.model import Floats
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Event, Run
 from heelstrike.tolerances import SAME_ROW
-
-Floats = NDArray[np.float64]
 
 IMPULSIVE = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.ZENO, EventKind.PAINLEVE)
 """Events whose impulses are not in the forces of an event-driven run."""

@@ -30,14 +30,13 @@ from heelstrike.contact.linearized.standing import Chart
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.method import Method
 from heelstrike.sim.snapshot import Snapshot
-
-Floats = NDArray[np.float64]
 
 # Disturbance (m, rad, m/s, rad/s) of the central differences. The derivative's error is its square
 # times a third derivative of the map, plus the error of the map itself, some 1e-13, over it.

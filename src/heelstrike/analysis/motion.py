@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
@@ -16,11 +16,9 @@ from heelstrike.dynamics.kernels import (
 )
 from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Model
+from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.run import Run
-
-Floats = NDArray[np.float64]
 
 
 class Motion(Bundle):

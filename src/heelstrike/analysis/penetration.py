@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from heelstrike.robot.model import Floats
 from heelstrike.sim.run import Run
 
 
-def penetration(run: Run) -> NDArray[np.float64]:
+def penetration(run: Run) -> Floats:
     """Depth of every contact point below the ground in each row, (nt, nc), in m; zero above.
 
     ``run.certificates.penetration`` is the worst over all steps, recorded or not.

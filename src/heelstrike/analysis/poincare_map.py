@@ -20,7 +20,7 @@ from heelstrike.contact.linearized.standing import Chart, Standing
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.model import Integers
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
@@ -32,7 +32,6 @@ from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.whole_run import whole
 from heelstrike.tolerances import CLOSED_GAP
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 # A state this deep (m) in the ground is lifted out of it: penetration of other methods.

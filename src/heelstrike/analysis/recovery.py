@@ -6,16 +6,14 @@ A run that completes is no recovery by itself: a robot that kneels, or walks bac
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.support import walking_steps
 from heelstrike.dynamics import leg_joints
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.sim.run import Run
-
-Floats = NDArray[np.float64]
 
 # Steps over which a speed is taken, and the time (s) of a robot that takes none.
 STEPS = 2

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.support import pushing
+from heelstrike.robot.model import Floats
 from heelstrike.sim.run import Run
-
-Floats = NDArray[np.float64]
 
 
 def slip_distance(run: Run) -> Floats:

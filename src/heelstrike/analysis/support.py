@@ -218,6 +218,22 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
     return tuple(taken)
 
 
+def step_times(run: Run) -> tuple[float, ...]:
+    """Return when the steps of a walk began, in s: at its first row and at every landing.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    tuple of float
+        Times (s); a step ends where the next begins, and the last may not have.
+    """
+    return float(run.time[0]), *(stance.touchdown for stance in walking_steps(run))
+
+
 def _without_chatter(found: tuple[Stance, ...]) -> list[Stance]:
     """Join stances of a foot between which it was in the air for less than `CHATTER`."""
     joined: list[Stance] = []
@@ -257,7 +273,7 @@ def phase_time(run: Run, step: int, phase: float) -> float:
     SimulationError
         If the run has no such step, or the phase is none.
     """
-    landings = [float(run.time[0]), *(stance.touchdown for stance in walking_steps(run))]
+    landings = step_times(run)
     if not 0.0 <= phase <= 1.0:
         raise SimulationError(f"the phase of a step is a number from 0 to 1, got {phase!r}")
     if not 0 <= step < len(landings) - 1:

@@ -8,21 +8,19 @@ duration and then holds still. All of it follows from the touchdowns of the run.
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.support import stances
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
 from heelstrike.tolerances import SAME_ROW
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
 
-Floats = NDArray[np.float64]
 
 EARLIEST = 0.5
 """Touchdowns before this fraction of a step do not end it."""
@@ -38,7 +36,7 @@ class ReferenceMotion:
     velocity: Floats
     """position, velocity: (nt, nu) Reference of the actuated joints, in the order of the actuators
     (rad, rad/s)."""
-    stance: NDArray[np.int64]
+    stance: Integers
     """(nt,) Index of the foot taken for the stance foot."""
     phase: Floats
     """(nt,) Time since the step began, in s."""
@@ -111,16 +109,6 @@ class TrackingError:
     position: Floats
     velocity: Floats
     """position, velocity: (nt, nu) Errors in rad and rad/s."""
-
-    @cached_property
-    def joint_rms(self) -> Floats:
-        """Root mean square of the position error of each joint over all rows, (nu,), in rad."""
-        return np.asarray(np.sqrt((self.position**2).mean(axis=0)))
-
-    @cached_property
-    def joint_max(self) -> Floats:
-        """Largest position error of each joint, (nu,), in rad."""
-        return np.asarray(np.abs(self.position).max(axis=0))
 
     @property
     def rms(self) -> float:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import Motion, in_world, run_motion
+from heelstrike.robot.model import Floats
 from heelstrike.robot.sole import soles
 from heelstrike.sim.run import Run
-
-Floats = NDArray[np.float64]
 
 
 def foot_wrenches(run: Run, *, motion: Motion | None = None) -> Floats:

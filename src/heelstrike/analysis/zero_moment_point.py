@@ -23,12 +23,11 @@ from heelstrike.analysis.motion import Motion
 from heelstrike.analysis.support import NOTHING, pushing, single_support
 from heelstrike.analysis.wrenches import sole_points
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import soles
 from heelstrike.sim.run import Run
 from heelstrike.tolerances import STANDING_GAP
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

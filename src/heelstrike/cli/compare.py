@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -12,19 +12,14 @@ from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
     SEVERAL,
     AsJson,
-    ControlledBy,
-    Debug,
-    Friction,
     Method,
-    OnGround,
-    Pushed,
+    Reading,
     RobotName,
-    SavedGait,
+    Step,
     Steps,
-    method_called,
-    reads_robots,
+    Walking,
 )
-from heelstrike.cli.planning import law_asked, planned_walk
+from heelstrike.cli.planning import asked_for, methods_asked, with_gait
 from heelstrike.cli.terminal import (
     FAILED,
     complain,
@@ -35,7 +30,6 @@ from heelstrike.cli.terminal import (
     tell_interruption,
     wrote,
 )
-from heelstrike.cli.values import ground_called, pushes_called
 
 USUAL = (
     Method.EVENT_DRIVEN,
@@ -50,9 +44,9 @@ USUAL = (
 
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
 @spoken
-@reads_robots
 def compare(
     robot: RobotName = "bravo7",
+    *,
     method: Annotated[
         list[Method] | None,
         typer.Option(
@@ -60,54 +54,40 @@ def compare(
             show_default=f"{', '.join(USUAL)}",
         ),
     ] = None,
-    controller: ControlledBy = None,
-    gait: SavedGait = None,
+    walking: Walking,
     steps: Steps = 3,
-    step: Annotated[
-        float, typer.Option(help="Time step in s of the methods that have one.")
-    ] = 1e-4,
-    ground: OnGround = "flat",
-    friction: Friction = 0.75,
+    step: Step = 1e-4,
     restitution: Annotated[
         float,
         typer.Option(help="Restitution of the ground; methods that know none are left out."),
     ] = 0.0,
-    push: Pushed = None,
-    how: Any = None,
+    how: Reading,
     out: Annotated[
         Path, typer.Option(file_okay=False, help="Directory for the table and the figure.")
     ] = Path("compare"),
     as_json: AsJson = False,
-    debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Walk the same steps by several methods and tell how far they differ."""
     import heelstrike as hs
     from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
     from heelstrike.experiments.walk import beginning
-    from heelstrike.gait import Gait
     from heelstrike.view.style import save_figure
     from heelstrike.whole_file import write_whole
 
-    surface = ground_called(ground, friction=friction, restitution=restitution)
-    pushes = pushes_called(push)
-    machine = hs.load_robot(robot, **how)
-    for each in pushes:
-        each.place(machine)
-    law = law_asked(controller, machine)
-    ways = method or USUAL
-    methods = {way.value: method_called(way, step, passive=not machine.nu) for way in ways}
-    planned = planned_walk(machine, gait, surface, law)
-    start = beginning(machine, planned, surface, law)
+    case = asked_for(robot, how, walking, steps=steps, restitution=restitution)
+    methods = methods_asked(case, method or USUAL, step)
+    case = with_gait(case, walking.gait)
+    start = beginning(case.robot, case.gait, case.ground, case.law)
     doing = f"walking {steps} steps by {len(methods)} methods"
     with stage(doing, when_slow="(compiling each of them, once: about a minute)"):
         comparison = hs.compare(
-            machine,
+            case.robot,
             start.controller,
             methods=methods,
             state=start.state,
             duration=(steps + 0.1) * start.step_duration,
-            ground=surface,
-            pushes=pushes,
+            ground=case.ground,
+            pushes=case.pushes,
         )
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(comparison.to_dict(), indent=2)
@@ -121,9 +101,8 @@ def compare(
         raise typer.Exit(INTERRUPTED)
     save_figure(comparison.plot(), out / "compare.png")
     tell(f"in {out}: compare.json, compare.png")
-    followed = planned if isinstance(planned, Gait) else None
     falls = {  # who stands, or walks without motors, is judged by the end of its run
-        name: first_cause(run, followed) if followed else None
+        name: first_cause(run, case.followed) if case.followed else None
         for name, run in comparison.runs.items()
     }
     for name, fall in falls.items():

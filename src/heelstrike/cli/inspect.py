@@ -5,19 +5,12 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.text import Text
 
-from heelstrike.cli.options import (
-    AsJson,
-    Debug,
-    OnGround,
-    Pushed,
-    RobotName,
-    reads_robots,
-)
+from heelstrike.cli.options import AsJson, OnGround, Pushed, Reading, RobotName
 from heelstrike.cli.terminal import in_options, output, spoken, tell
 from heelstrike.cli.values import ground_called, pushes_called
 
@@ -33,9 +26,9 @@ FOUND = 1
 
 
 @spoken
-@reads_robots
 def inspect(
     robot: RobotName,
+    *,
     picture: Annotated[
         Path | None,
         typer.Option(
@@ -44,9 +37,8 @@ def inspect(
     ] = None,
     ground: OnGround = "flat",
     push: Pushed = None,
-    how: Any = None,
+    how: Reading,
     as_json: AsJson = False,
-    debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Look at a robot: tree, masses, limits, contact points, and what looks wrong.
 
@@ -60,7 +52,7 @@ def inspect(
         raise typer.BadParameter(
             "ground and pushes are drawn: say into which file", param_hint="--out"
         )
-    inspection = inspect_robot(robot, **how)
+    inspection = inspect_robot(robot, **how.keywords())
     look_at(inspection, picture, as_json=as_json, ground=surface, pushes=pushes)
     if not inspection.sound:
         raise typer.Exit(FOUND)

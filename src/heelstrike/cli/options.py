@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import functools
-import inspect
-from collections.abc import Callable
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from heelstrike.cli.values import pose_called, xacro_arguments
 
 if TYPE_CHECKING:
+    from heelstrike.robot.files.options import LoadOptions
     from heelstrike.sim.method import Method as TimeMethod
 
 
@@ -57,55 +56,6 @@ RobotName = Annotated[
     str,
     typer.Argument(help="A built-in robot, or an MJCF, URDF or SDF file.", autocompletion=built_in),
 ]
-Floating = Annotated[
-    bool, typer.Option("--floating", help="Let a trunk float in the plane that the file holds.")
-]
-Projected = Annotated[
-    bool, typer.Option("--projected", help="Lock the joints that leave the x–z plane.")
-]
-Forward = Annotated[
-    Way | None,
-    typer.Option(help="Where the robot looks in its file.", show_default="the plane it moves in"),
-]
-Averaged = Annotated[
-    bool, typer.Option("--mirror", help="Make left and right equal, which nearly are.")
-]
-Packages = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--package-path",
-        exists=True,
-        file_okay=False,
-        help="Folder of ROS packages or Gazebo models, for files that the robot names; repeat the "
-        "option for more.",
-        show_default="around the file",
-    ),
-]
-Xacro = Annotated[
-    bool,
-    typer.Option(
-        "--xacro",
-        help="Expand the macros of the robot's file first, which runs what it says: for files of "
-        "people whom you trust.",
-    ),
-]
-XacroArguments = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--xacro-arg",
-        metavar="NAME:=VALUE",
-        help="Value of an argument of a xacro file; with it --xacro need not be said. Repeat the "
-        "option for more.",
-    ),
-]
-Pose = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="JOINT=VALUE,...",
-        help="Reference positions, locked joints too: rad, m, or degrees as in knee=23deg.",
-        show_default="as in the file",
-    ),
-]
 OnGround = Annotated[
     str,
     typer.Option(
@@ -123,67 +73,99 @@ Pushed = Annotated[
         help="Push a link, in N along x (or X,Z) and s; repeat the option for more.",
     ),
 ]
-SavedGait = Annotated[
-    Path | None, typer.Option("--gait", help="Walk this saved gait instead of designing one.")
-]
-ControlledBy = Annotated[
-    str | None,
-    typer.Option(
-        "--controller",
-        metavar="LAW|MODULE:NAME|FILE.py:NAME",
-        help="Law that moves the joints, by its name; or one of yours, a class or function of "
-        "(robot, gait), whose code is then run.",
-        show_default="ComputedTorque",
-    ),
-]
+LAW = "LAW|MODULE:NAME|FILE.py:NAME"
+OWN_LAW = (
+    "Law that moves the joints, by its name; or one of yours, a class or function of "
+    "(robot, gait), whose code is then run."
+)
 Steps = Annotated[int, typer.Option(min=1, help="Steps to walk.")]
+Step = Annotated[float, typer.Option(help="Time step in s of the methods that have one.")]
 Friction = Annotated[float, typer.Option(help="Friction coefficient of the ground.")]
+OneMethod = Annotated[Method | None, typer.Option(help=METHOD, show_default=USUAL_METHOD)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else.")]
-Debug = Annotated[
-    bool, typer.Option("--debug", help="Show where in the program an error arose.", hidden=True)
-]
 
 
-def reads_robots(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of how a robot's file is read, in the place of its ``how``.
+@dataclass(frozen=True)
+class Reading:
+    """How a robot's file is read."""
 
-    That is what it is called with: the keywords of :func:`heelstrike.load_robot`.
-    """
-    own = inspect.signature(command, eval_str=True)
-    shared = inspect.signature(_reading, eval_str=True).parameters
-    options: list[inspect.Parameter] = []
-    for parameter in own.parameters.values():
-        options += shared.values() if parameter.name == "how" else [parameter]
+    floating: Annotated[
+        bool, typer.Option("--floating", help="Let a trunk float in the plane that the file holds.")
+    ] = False
+    projected: Annotated[
+        bool, typer.Option("--projected", help="Lock the joints that leave the x–z plane.")
+    ] = False
+    forward: Annotated[
+        Way | None,
+        typer.Option(
+            help="Where the robot looks in its file.", show_default="the plane it moves in"
+        ),
+    ] = None
+    pose: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="JOINT=VALUE,...",
+            help="Reference positions, locked joints too: rad, m, or degrees as in knee=23deg.",
+            show_default="as in the file",
+        ),
+    ] = None
+    mirror: Annotated[
+        bool, typer.Option("--mirror", help="Make left and right equal, which nearly are.")
+    ] = False
+    package_path: Annotated[
+        list[Path] | None,
+        typer.Option(
+            exists=True,
+            file_okay=False,
+            help="Folder of ROS packages or Gazebo models, for files that the robot names; repeat "
+            "the option for more.",
+            show_default="around the file",
+        ),
+    ] = None
+    xacro: Annotated[
+        bool,
+        typer.Option(
+            "--xacro",
+            help="Expand the macros of the robot's file first, which runs what it says: for files "
+            "of people whom you trust.",
+        ),
+    ] = False
+    xacro_arg: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME:=VALUE",
+            help="Value of an argument of a xacro file; with it --xacro need not be said. Repeat "
+            "the option for more.",
+        ),
+    ] = None
 
-    @functools.wraps(command)
-    def reading(**given: Any) -> None:
-        how = _reading(**{name: given.pop(name) for name in shared if name in given})
-        command(**given, how=how)
+    def keywords(self) -> LoadOptions:
+        """Return the keywords of :func:`heelstrike.load_robot`."""
+        return {
+            "floating": self.floating,
+            "projected": self.projected,
+            "forward": None if self.forward is None else self.forward.value,
+            "pose": pose_called(self.pose),
+            "mirror": "average" if self.mirror else None,
+            "package_path": self.package_path or (),
+            "xacro": xacro_arguments(self.xacro_arg) or self.xacro,
+        }
 
-    reading.__signature__ = own.replace(parameters=options)  # type: ignore[attr-defined]
-    reading.__annotations__ = {each.name: each.annotation for each in options}
-    return reading
 
+@dataclass(frozen=True)
+class Walking:
+    """What a robot walks by, and on what."""
 
-def _reading(
-    floating: Floating = False,
-    projected: Projected = False,
-    forward: Forward = None,
-    pose: Pose = None,
-    mirror: Averaged = False,
-    package_path: Packages = None,
-    xacro: Xacro = False,
-    xacro_arg: XacroArguments = None,
-) -> dict[str, Any]:
-    return {
-        "floating": floating,
-        "projected": projected,
-        "forward": None if forward is None else forward.value,
-        "pose": pose_called(pose),
-        "mirror": "average" if mirror else None,
-        "package_path": package_path or (),
-        "xacro": xacro_arguments(xacro_arg) or xacro,
-    }
+    controller: Annotated[
+        str | None,
+        typer.Option(metavar=LAW, help=OWN_LAW, show_default="ComputedTorque"),
+    ] = None
+    gait: Annotated[
+        Path | None, typer.Option(help="Walk this saved gait instead of designing one.")
+    ] = None
+    ground: OnGround = "flat"
+    friction: Friction = 0.75
+    push: Pushed = None
 
 
 def method_called(name: str, step: float, *, passive: bool = False) -> TimeMethod:

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from heelstrike.cli.options import Debug
 from heelstrike.cli.terminal import output, spoken, stage, tell
 
 
@@ -17,7 +16,6 @@ def paper(
     out: Annotated[Path, typer.Option(file_okay=False, help="Directory for the report.")] = Path(
         "paper"
     ),
-    debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Reproduce the paper's Figures 3 to 6 and set its claims beside computed figures.
 

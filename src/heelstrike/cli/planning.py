@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
+from heelstrike.cli.options import Method, Reading, Walking, method_called
 from heelstrike.cli.terminal import stage, tell
+from heelstrike.cli.values import ground_called, pushes_called
 
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle
-    from heelstrike.contact.ground import Ground
     from heelstrike.experiments.laws import Entry
+    from heelstrike.experiments.walk import Case
     from heelstrike.gait import Gait
     from heelstrike.robot import Robot
     from heelstrike.sim import Run
+    from heelstrike.sim.method import Method as TimeMethod
+
+FIRST_TIME = "(compiling the simulator, once: about 20 s)"
 
 
 def law_asked(words: str | None, robot: Robot | None = None) -> Entry | None:
@@ -51,23 +56,45 @@ def hint_of_balance(*runs: Run) -> None:
             )
 
 
-def planned_walk(
-    robot: Robot,
-    path: Path | None,
-    ground: Ground,
-    law: Entry | None = None,
-    **size: float | None,
-) -> Gait | LimitCycle | None:
+def asked_for(
+    robot: str, how: Reading, walking: Walking, *, steps: int, restitution: float = 0.0
+) -> Case:
+    """Make of options what is walked, but for its gait, which may take long to find."""
+    from heelstrike.experiments.walk import Case
+    from heelstrike.robot import load_robot
+
+    ground = ground_called(walking.ground, friction=walking.friction, restitution=restitution)
+    pushes = pushes_called(walking.push)
+    machine = load_robot(robot, **how.keywords())
+    for each in pushes:
+        each.place(machine)
+    law = law_asked(walking.controller, machine)
+    return Case(robot=machine, gait=None, law=law, ground=ground, pushes=pushes, steps=steps)
+
+
+def with_gait(case: Case, path: Path | None, **size: float | None) -> Case:
     """Load a gait, or design one; what is None of the size of its steps suits the robot.
 
     Of a robot without motors it is the limit cycle on the ground; for a law that makes it stand
     there is none.
     """
+    given = {name: value for name, value in size.items() if value is not None}
+    return replace(case, gait=_gait(case, path, given))
+
+
+def methods_asked(case: Case, ways: Sequence[Method], step: float) -> dict[str, TimeMethod]:
+    """Return methods by their names; where none is asked for, the usual one for a robot."""
+    passive = not case.robot.nu
+    ways = ways or [Method.EVENT_DRIVEN if passive else Method.TIME_STEPPING]
+    return {way.value: method_called(way, step, passive=passive) for way in ways}
+
+
+def _gait(case: Case, path: Path | None, given: dict[str, float]) -> Gait | LimitCycle | None:
     from heelstrike.experiments.laws import gait_for
     from heelstrike.experiments.walk import design, typical_step
     from heelstrike.gait import load_gait
 
-    given = {name: value for name, value in size.items() if value is not None}
+    robot, law = case.robot, case.law
     if law is not None and law.stands:
         if path is not None or given:
             raise typer.BadParameter(
@@ -77,7 +104,7 @@ def planned_walk(
             )
         return None
     if robot.nu == 0 and robot.nc:
-        return _passive(robot, path, ground, given)
+        return _passive(case, path, given)
     if path is not None:
         if given:
             raise typer.BadParameter(
@@ -90,7 +117,7 @@ def planned_walk(
         with stage("designing a gait with bent knees"):
             return gait_for(robot)
     chosen = replace(typical_step(robot), **given)
-    friction = float(ground.model().friction.min())
+    friction = float(case.ground.model().friction.min())
     with stage(f"designing a gait of {chosen.length:g} m in {chosen.duration:g} s") as designing:
         gait = design(robot, chosen, friction=friction, progress=designing.reached)
         designing.outcome = (
@@ -100,18 +127,16 @@ def planned_walk(
     return gait
 
 
-def _passive(
-    robot: Robot, path: Path | None, ground: Ground, size: Mapping[str, float]
-) -> LimitCycle:
+def _passive(case: Case, path: Path | None, size: Mapping[str, float]) -> LimitCycle:
     from heelstrike.errors import GaitError
     from heelstrike.experiments.passive import passive_walk
 
     if path is not None or size:
         raise GaitError(
-            f"robot {robot.name!r} has no motors to follow a gait: leave --gait, --step-length, "
-            "--step-duration and --clearance out; the slope says how it walks."
+            f"robot {case.robot.name!r} has no motors to follow a gait: leave --gait, "
+            "--step-length, --step-duration and --clearance out; the slope says how it walks."
         )
     with stage("looking for a walk that repeats") as looking:
-        cycle = passive_walk(robot, ground)
+        cycle = passive_walk(case.robot, case.ground)
         looking.outcome = str(cycle)
     return cycle

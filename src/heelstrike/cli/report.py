@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,18 +15,13 @@ from heelstrike.cli.options import (
     SEVERAL,
     USUAL_METHOD,
     AsJson,
-    ControlledBy,
-    Debug,
-    Friction,
     Method,
-    OnGround,
-    Pushed,
-    SavedGait,
+    Reading,
+    Step,
     Steps,
-    method_called,
-    reads_robots,
+    Walking,
 )
-from heelstrike.cli.planning import law_asked, planned_walk
+from heelstrike.cli.planning import FIRST_TIME, asked_for, methods_asked, with_gait
 from heelstrike.cli.terminal import (
     FAILED,
     output,
@@ -37,26 +32,23 @@ from heelstrike.cli.terminal import (
     this_command,
     wrote,
 )
-from heelstrike.cli.values import ground_called, pushes_called
 
 if TYPE_CHECKING:
     from heelstrike.analysis.diagnosis.changes import Tried
     from heelstrike.gait import Gait
     from heelstrike.sim import Run
 
-OF_A_WALK = ("steps", "method", "step", "ground", "friction", "push", "controller", "tries",
-             "floating",
-             "projected", "forward", "pose", "mirror", "package_path", "xacro",
-             "xacro_arg")  # fmt: skip
+OF_A_WALK = (
+    *("steps", "method", "step", "tries"),
+    *(each.name for group in (Walking, Reading) for each in fields(group) if each.name != "gait"),
+)
 """Options that say how a robot walks, and nothing to a run that is read."""
-
-FIRST_TIME = "(compiling the simulator, once: about 20 s)"
 
 
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
 @spoken
-@reads_robots
 def report(
+    *,
     context: typer.Context,
     what: Annotated[
         list[str],
@@ -66,35 +58,25 @@ def report(
         ),
     ],
     out: Annotated[Path, typer.Option(dir_okay=False, help="Page to write.")] = Path("report.html"),
-    controller: ControlledBy = None,
-    gait: SavedGait = None,
+    walking: Walking,
     steps: Steps = 10,
     method: Annotated[
         list[Method] | None,
         typer.Option(help=SEVERAL, show_default=USUAL_METHOD),
     ] = None,
-    step: Annotated[
-        float, typer.Option(help="Time step in s of the methods that have one.")
-    ] = 1e-3,
-    ground: OnGround = "flat",
-    friction: Friction = 0.75,
-    push: Pushed = None,
+    step: Step = 1e-3,
     tries: Annotated[
         bool, typer.Option(help="Walk again with pushes, slopes and what the report would change.")
     ] = True,
-    how: Any = None,
+    how: Reading,
     as_json: AsJson = False,
-    debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Judge runs on one page: why it fell, margins, what it withstands, what to change, film.
 
     The gait of a run that is read is the one of --gait, or of the gait.json beside it. The exit
     status is 0 if all runs lasted to their end, 1 if not.
     """
-    from heelstrike.experiments.walk import walk
-    from heelstrike.experiments.what_if import NO_CONTROLLER, PAPER, Case, tried_beside
-    from heelstrike.gait import Gait
-    from heelstrike.robot import load_robot
+    from heelstrike.experiments.what_if import NO_CONTROLLER, tried_beside
     from heelstrike.view.page.page import check_page
     from heelstrike.view.report import report
 
@@ -106,43 +88,24 @@ def report(
         )
     if files:
         _refuse_options_of_a_walk(context)
-        runs, followed = _read(files, gait)
+        runs, followed = _read(files, walking.gait)
         tried: dict[str, tuple[Tried, ...]] = dict.fromkeys(runs, (NO_CONTROLLER,))
     elif len(what) > 1:
         raise typer.BadParameter("one robot is walked at a time; repeat --method for several ways")
     else:
-        surface, pushes = ground_called(ground, friction=friction), pushes_called(push)
-        machine = load_robot(what[0], **how)
-        for each in pushes:
-            each.place(machine)
-        law = law_asked(controller, machine)
-        ways = method or [Method.TIME_STEPPING if machine.nu else Method.EVENT_DRIVEN]
-        methods = {way.value: method_called(way, step, passive=not machine.nu) for way in ways}
-        planned = planned_walk(machine, gait, surface, law)
-        followed = planned if isinstance(planned, Gait) else None
+        asked = asked_for(what[0], how, walking, steps=steps)
+        methods = methods_asked(asked, method or (), step)
+        asked = with_gait(asked, walking.gait)
+        followed = asked.followed
+        cases = {name: replace(asked, method=through) for name, through in methods.items()}
         runs = {}
-        for name, through in methods.items():
-            with stage(f"walking {steps} steps ({name})", when_slow=FIRST_TIME) as walking:
-                runs[name] = walk(
-                    machine,
-                    planned,
-                    steps=steps,
-                    law=law,
-                    method=through,
-                    ground=surface,
-                    pushes=pushes,
-                    progress=walking.reached,
-                )
+        for name, case in cases.items():
+            with stage(f"walking {steps} steps ({name})", when_slow=FIRST_TIME) as going:
+                runs[name] = case.run(going.reached)
         tried = {}
         for name, run in runs.items() if tries else ():
-            case = None
-            if followed is not None:
-                case = Case(
-                    robot=machine, gait=followed, ground=surface, pushes=pushes,
-                    method=methods[name], steps=steps, law=law or PAPER,
-                )  # fmt: skip
             with stage("trying pushes, slopes and changes", when_slow=FIRST_TIME):
-                tried[name] = tried_beside(case, run)
+                tried[name] = tried_beside(cases[name], run)
     _stop_if_interrupted(runs)
     with stage("writing the report"):
         only = next(iter(runs.values()))

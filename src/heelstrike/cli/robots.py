@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from heelstrike.cli.inspect import look_at
-from heelstrike.cli.options import AsJson, Debug
+from heelstrike.cli.options import AsJson
 from heelstrike.cli.terminal import output, spoken
 
 
@@ -28,7 +28,6 @@ def robots(
         typer.Option(dir_okay=False, help="Draw the robot NAME into this file (PNG, SVG or PDF)."),
     ] = None,
     as_json: AsJson = False,
-    debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """List the built-in robots, or look at one robot as `heelstrike inspect` does."""
     from heelstrike.robot.inspection import facts, inspect_robot

@@ -7,6 +7,7 @@ terminal (in a pipe, in a log file) stages say nothing and nothing is coloured.
 from __future__ import annotations
 
 import functools
+import inspect
 import io
 import sys
 import warnings
@@ -14,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 from rich.console import Console
@@ -30,6 +31,7 @@ from rich.progress import (
 from rich.text import Text
 
 from heelstrike.cli import INTERRUPTED
+from heelstrike.cli.declared import declared, grouped
 from heelstrike.errors import HeelstrikeError
 from heelstrike.interruption import insistent_interrupts
 
@@ -39,7 +41,6 @@ FAILED = 1
 WRONG_INPUT = 2
 """Exit status when the request could not be carried out as it was made."""
 
-_Parameters = ParamSpec("_Parameters")
 _Result = TypeVar("_Result")
 
 
@@ -84,24 +85,25 @@ def complain(message: str) -> None:
     tell(message, ("error: ", "bold red"))
 
 
-def spoken(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
+def spoken(function: Callable[..., _Result]) -> Callable[..., _Result]:
     """Make a command tell its errors and warnings in words, without a traceback.
 
-    After Ctrl-C it tells what was going on and which files there are (:func:`wrote`). The command
-    takes ``debug``, which lets errors through as they are.
+    After Ctrl-C it tells what was going on and which files there are (:func:`wrote`). It gets the
+    option --debug, which lets errors through as they are, and those of :func:`grouped`.
     """
+    called = grouped(function)
 
-    @functools.wraps(function)
-    def command(*args: _Parameters.args, **options: _Parameters.kwargs) -> _Result:
+    @functools.wraps(called)
+    def command(*, debug: bool = False, **options: Any) -> _Result:
         _written.clear()
         with insistent_interrupts() as interrupts, warnings.catch_warnings():
-            if options.get("debug"):
-                return function(*args, **options)
+            if debug:
+                return called(**options)
             warnings.showwarning = lambda message, *_, **__: tell(
                 in_options(str(message)), ("warning: ", "yellow")
             )
             try:
-                return function(*args, **options)
+                return called(**options)
             except KeyboardInterrupt as error:
                 interrupts.acknowledge()
                 tell_interruption(getattr(error, "doing", ""))
@@ -120,7 +122,17 @@ def spoken(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _R
                     raise
                 raise typer.Exit(WRONG_INPUT) from None
 
-    return command
+    own = inspect.signature(called).parameters.values()
+    return declared(command, [*own, DEBUG])
+
+
+DEBUG = inspect.Parameter(
+    "debug", inspect.Parameter.KEYWORD_ONLY, default=False,
+    annotation=Annotated[
+        bool,
+        typer.Option("--debug", help="Show where in the program an error arose.", hidden=True),
+    ],
+)  # fmt: skip
 
 
 _written: list[Path] = []

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from heelstrike.errors import HeelstrikeError, RobotError, SimulationError
+from heelstrike.wording import meant
 
 if TYPE_CHECKING:
     from heelstrike.contact.ground import Ground
@@ -24,11 +24,9 @@ GROUNDS = {
 """Kinds of ground that have a name, and how each is written."""
 
 AHEAD = 0.5
-"""Where stairs and roughness begin, in m: in front of the feet of the start."""
+"""Where stairs begin, in m: in front of the feet of the start, as rough ground does."""
 STAIRS = 100
 """Number of stairs."""
-SPACING, ROUGH_LENGTH = 0.1, 100.0
-"""Distance between the corners of rough ground, and how far it is rough, in m."""
 LARGEST_FILE = 2**20
 """Bytes of the largest file of corners that is read."""
 
@@ -53,7 +51,7 @@ def ground_called(words: str, *, friction: float = 0.75, restitution: float = 0.
     """
     from heelstrike.contact.ground import Ground
 
-    given = {"friction": friction, "restitution": restitution}
+    given: dict[str, Any] = {"friction": friction, "restitution": restitution}
     flat = Ground(**given)
     where = f"--ground {words}"
 
@@ -79,9 +77,7 @@ def ground_called(words: str, *, friction: float = 0.75, restitution: float = 0.
             case ["rough", height, seed]:
                 if not seed.isdecimal():
                     raise SimulationError(f"{where}: the seed is a whole number, not {seed!r}.")
-                amplitude = number(height)
-                rough = partial(Ground.rough, spacing=SPACING, length=ROUGH_LENGTH, start=AHEAD)
-                shaped = partial(rough, amplitude=amplitude, seed=int(seed))
+                shaped = partial(Ground.rough, amplitude=number(height), seed=int(seed))
             case _:
                 raise SimulationError(f"{where}: write {GROUNDS[kind]}.")
     try:
@@ -175,8 +171,7 @@ def _corners(name: str) -> list[tuple[float, float]]:
     path = Path(name)
     if not path.is_file():
         there = "is no file" if path.exists() else "there is no such file"
-        near = difflib.get_close_matches(name.partition(":")[0].lower(), GROUNDS, n=1)
-        guess = f" Did you mean {GROUNDS[near[0]]}?" if near else ""
+        guess = meant(name.partition(":")[0].lower(), GROUNDS)
         raise SimulationError(
             f"--ground {name}: {there}.{guess} A ground is {'; '.join(GROUNDS.values())}; or a "
             "text file with a corner x z a line, in m."

@@ -5,28 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from heelstrike.cli import INTERRUPTED
-from heelstrike.cli.options import (
-    METHOD,
-    USUAL_METHOD,
-    AsJson,
-    ControlledBy,
-    Debug,
-    Friction,
-    Method,
-    OnGround,
-    Pushed,
-    RobotName,
-    SavedGait,
-    Steps,
-    method_called,
-    reads_robots,
+from heelstrike.cli.options import AsJson, OneMethod, Reading, RobotName, Steps, Walking
+from heelstrike.cli.planning import (
+    FIRST_TIME,
+    asked_for,
+    hint_of_balance,
+    methods_asked,
+    with_gait,
 )
-from heelstrike.cli.planning import hint_of_balance, law_asked, planned_walk
 from heelstrike.cli.terminal import (
     FAILED,
     complain,
@@ -38,18 +29,15 @@ from heelstrike.cli.terminal import (
     this_command,
     wrote,
 )
-from heelstrike.cli.values import ground_called, pushes_called
 from heelstrike.errors import HeelstrikeError
 
 if TYPE_CHECKING:
-    from heelstrike.analysis.limit_cycle import LimitCycle
     from heelstrike.experiments.results import Results, Saved
+    from heelstrike.experiments.walk import Case
     from heelstrike.gait import Gait
     from heelstrike.sim import Run
-    from heelstrike.sim.method import Method as TimeMethod
 
 
-FIRST_TIME = "(compiling the simulator, once: about 20 s)"
 SUITS = "suits the robot's size"
 
 
@@ -63,9 +51,9 @@ class Animation(StrEnum):
 
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
 @spoken
-@reads_robots
 def walk(
     robot: RobotName = "bravo7",
+    *,
     step_length: Annotated[
         float | None, typer.Option(help="Length of a step in m.", show_default=SUITS)
     ] = None,
@@ -75,20 +63,13 @@ def walk(
     clearance: Annotated[
         float | None, typer.Option(help="Height of the swing foot's path in m.", show_default=SUITS)
     ] = None,
-    gait: SavedGait = None,
-    controller: ControlledBy = None,
+    walking: Walking,
     steps: Steps = 20,
-    method: Annotated[
-        Method | None,
-        typer.Option(help=METHOD, show_default=USUAL_METHOD),
-    ] = None,
+    method: OneMethod = None,
     step: Annotated[
         float, typer.Option(help="Time step h in s; of the record, for the other methods.")
     ] = 1e-3,
-    ground: OnGround = "flat",
-    friction: Friction = 0.75,
-    push: Pushed = None,
-    how: Any = None,
+    how: Reading,
     out: Annotated[
         Path,
         typer.Option(file_okay=False, help="For the results; those of an earlier walk go."),
@@ -105,7 +86,6 @@ def walk(
         typer.Option("--csv", dir_okay=False, help="Also write the walk as a table of text."),
     ] = None,
     as_json: AsJson = False,
-    debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Design (or load) a gait, walk it, and write figures, an animation and all data.
 
@@ -116,56 +96,35 @@ def walk(
     """
     with stage("loading"):
         from heelstrike.experiments.results import Results
-        from heelstrike.experiments.walk import walk
-        from heelstrike.gait import Gait
-        from heelstrike.robot import load_robot
+        from heelstrike.sim import EventDriven
         from heelstrike.sim.files.run_file import TABLE, check_run_file
         from heelstrike.view.page.page import check_page, save_html
 
         # All that is cheap to refuse is refused before anything that takes long.
-        surface, pushes = ground_called(ground, friction=friction), pushes_called(push)
-        machine = load_robot(robot, **how)
-        for each in pushes:
-            each.place(machine)
-        law = law_asked(controller, machine)
-        through = _through_time(method, step, passive=not machine.nu)
+        case = asked_for(robot, how, walking, steps=steps)
+        (through,) = methods_asked(case, [] if method is None else [method], step).values()
+        if isinstance(through, EventDriven):
+            through = replace(through, output_period=step)
         results = Results(out)
         if html is not None:
             check_page(html)
         if table is not None:
             check_run_file(table, TABLE)
-    planned = planned_walk(
-        machine, gait, surface, law, length=step_length, duration=step_duration, clearance=clearance
-    )
-    followed = planned if isinstance(planned, Gait) else None
-    wrote(*results.save_gait(followed))
-    with stage(f"walking {steps} steps", when_slow=FIRST_TIME) as walking:
-        run = walk(
-            machine,
-            planned,
-            steps=steps,
-            law=law,
-            method=through,
-            ground=surface,
-            pushes=pushes,
-            progress=walking.reached,
-        )
-    saved = _save(results, run, followed, animation)
+    case = with_gait(
+        replace(case, method=through), walking.gait,
+        length=step_length, duration=step_duration, clearance=clearance,
+    )  # fmt: skip
+    wrote(*results.save_gait(case.followed))
+    with stage(f"walking {steps} steps", when_slow=FIRST_TIME) as going:
+        run = case.run(going.reached)
+    saved = _save(results, run, case.followed, animation)
     if html is not None and len(run.time):
-        wrote(save_html(run, html, gait=followed, command=this_command()))
+        wrote(save_html(run, html, gait=case.followed, command=this_command()))
         tell(f"{html}: the walk as one page, for any browser")
     if table is not None:
         wrote(run.save(table))
         tell(f"{table}: the walk as a table")
-    _tell_outcome(run, planned, steps, saved, usual=law is None, as_json=as_json)
-
-
-def _through_time(method: Method | None, step: float, *, passive: bool) -> TimeMethod:
-    from heelstrike.sim import EventDriven
-
-    method = method or (Method.EVENT_DRIVEN if passive else Method.TIME_STEPPING)
-    through = method_called(method, step, passive=passive)
-    return replace(through, output_period=step) if isinstance(through, EventDriven) else through
+    _tell_outcome(case, run, saved, as_json=as_json)
 
 
 def _save(results: Results, run: Run, gait: Gait | None, animation: Animation) -> tuple[Saved, ...]:
@@ -191,22 +150,13 @@ def _save(results: Results, run: Run, gait: Gait | None, animation: Animation) -
     return saved
 
 
-def _tell_outcome(
-    run: Run,
-    planned: Gait | LimitCycle | None,
-    steps: int,
-    saved: tuple[Saved, ...],
-    *,
-    usual: bool,
-    as_json: bool,
-) -> None:
+def _tell_outcome(case: Case, run: Run, saved: tuple[Saved, ...], *, as_json: bool) -> None:
     """Show the figures of a walk and say how it went, by the exit status, too."""
     from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
     from heelstrike.experiments.walk import steps_taken, why_unstable
-    from heelstrike.gait import Gait
     from heelstrike.sim import EventDriven, RunStatus
 
-    gait = planned if isinstance(planned, Gait) else None
+    gait, planned, steps = case.followed, case.gait, case.steps
     summary = run.summary(gait=gait)
     interrupted = run.status is RunStatus.INTERRUPTED
     if as_json:
@@ -233,7 +183,7 @@ def _tell_outcome(
         tell(reason + ("" if exact else " --method event-driven keeps to it for longer."))
     elif not (walked or gait or exact):
         tell("Legs of one length scuff the ground; --method event-driven lets them swing through.")
-    if usual:
+    if case.law is None:
         hint_of_balance(run)
     if not walked or any(each.error for each in saved):
         raise typer.Exit(FAILED)

@@ -10,16 +10,15 @@ import typer
 
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
-    METHOD,
+    LAW,
     METHODS,
-    USUAL_METHOD,
-    Debug,
+    OWN_LAW,
     Friction,
-    Method,
+    OneMethod,
     OnGround,
+    Reading,
     built_in,
     method_called,
-    reads_robots,
 )
 from heelstrike.cli.planning import law_asked
 from heelstrike.cli.terminal import spoken, stage, tell
@@ -32,8 +31,8 @@ if TYPE_CHECKING:
 
 # As many arguments as the command has options: a person's.
 @spoken
-@reads_robots
 def watch(
+    *,
     robots: Annotated[
         list[str] | None,
         typer.Argument(
@@ -50,16 +49,12 @@ def watch(
     controller: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="LAW|MODULE:NAME|FILE.py:NAME",
-            help="Law that moves the joints, by its name; or one of yours, a class or function of "
-            "(robot, gait), whose code is then run. Repeat the option to choose among several.",
+            metavar=LAW,
+            help=f"{OWN_LAW} Repeat the option to choose among several.",
             show_default="FootstepFeedback where the robot can have it; ComputedTorque",
         ),
     ] = None,
-    method: Annotated[
-        Method | None,
-        typer.Option(help=METHOD, show_default=USUAL_METHOD),
-    ] = None,
+    method: OneMethod = None,
     step: Annotated[float, typer.Option(help="Time step h in s.")] = 1e-3,
     ground: OnGround = "flat",
     friction: Friction = 0.75,
@@ -70,8 +65,7 @@ def watch(
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")
     ] = True,
-    how: Any = None,
-    debug: Debug = False,  # noqa: ARG001 - for `spoken`
+    how: Reading,
 ) -> None:
     """Walk a robot live, in the browser: watch it, halt it, take it back, push it.
 
@@ -99,7 +93,7 @@ def watch(
             laws=[law for words in controller or () if (law := law_asked(words))],
             **_shape(ground, surface),
         )
-        walks = WalkStage(named, method_called, METHODS, first, **how)
+        walks = WalkStage(named, method_called, METHODS, first, **how.keywords())
         viewer = view(stage=walks, rate=speed, port=port)
     tell(f"watch at {viewer.url}")
     try:

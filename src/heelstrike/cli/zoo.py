@@ -5,18 +5,11 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from heelstrike.cli.options import (
-    METHOD,
-    AsJson,
-    Debug,
-    Method,
-    method_called,
-    reads_robots,
-)
+from heelstrike.cli.options import METHOD, AsJson, Method, Reading, Step, method_called
 from heelstrike.cli.terminal import many, output, spoken, stage, tell, this_command, wrote
 
 ROBOTS = "bravo7,geyer7,spring_flamingo,rabbit,human7,walker2d"
@@ -24,8 +17,8 @@ ROBOTS = "bravo7,geyer7,spring_flamingo,rabbit,human7,walker2d"
 
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
 @spoken
-@reads_robots
 def zoo(
+    *,
     robots: Annotated[
         str,
         typer.Option(
@@ -48,13 +41,11 @@ def zoo(
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="A coarse table, for a try.")] = False,
     method: Annotated[Method, typer.Option(help=METHOD)] = Method.TIME_STEPPING,
-    step: Annotated[
-        float, typer.Option(help="Time step in s of the methods that have one.")
-    ] = 1e-3,
+    step: Step = 1e-3,
     workers: Annotated[
         int | None, typer.Option(min=1, help="Threads.", show_default="one a processor")
     ] = None,
-    how: Any = None,
+    how: Reading,
     out: Annotated[
         Path,
         typer.Option(
@@ -77,7 +68,6 @@ def zoo(
         bool, typer.Option("--afresh", help="Begin anew whatever is in --out.")
     ] = False,
     as_json: AsJson = False,
-    debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Find how large a disturbance each controller withstands on each robot.
 
@@ -91,7 +81,7 @@ def zoo(
 
         entries = campaign.chosen_controllers(controllers)
         kinds = campaign.chosen_disturbances(disturbances)
-        machines = campaign.loaded(robots, how)
+        machines = campaign.loaded(robots, how.keywords())
         targets = Targets(out, page or out / "zoo.md", figure or out / "zoo.svg")
     settings = campaign.QUICK if quick else campaign.USUAL
     with many("measuring") as show:

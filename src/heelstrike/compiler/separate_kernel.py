@@ -160,21 +160,27 @@ def _can_start_python() -> bool:
     return is_python and not getattr(sys, "frozen", False) and (os.cpu_count() or 1) > 1
 
 
-def _call_at(context: Any, address: Any, arguments: Any) -> Any:
-    del context
-    signature = types.int64(address, arguments)
+def _calling(result: Any) -> Any:
+    def call(context: Any, address: Any, arguments: Any) -> Any:
+        del context
+        signature = result(address, arguments)
 
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        kinds = [context.get_value_type(kind) for kind in signature.args[1]]
-        function = ir.FunctionType(ir.IntType(64), kinds)
-        parts = [builder.extract_value(values[1], place) for place in range(len(kinds))]
-        return builder.call(builder.inttoptr(values[0], function.as_pointer()), parts)
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            kinds = [context.get_value_type(kind) for kind in signature.args[1]]
+            function = ir.FunctionType(context.get_value_type(signature.return_type), kinds)
+            parts = [builder.extract_value(values[1], place) for place in range(len(kinds))]
+            return builder.call(builder.inttoptr(values[0], function.as_pointer()), parts)
 
-    return signature, generate
+        return signature, generate
+
+    return intrinsic(call)
 
 
-call_at: Any = intrinsic(_call_at)
+call_at: Any = _calling(types.int64)
 """``call_at(address, arguments)`` calls a :class:`SeparateKernel` that returns an integer.
 
 The types of the arguments must be those of its signature; nothing checks them.
 """
+
+measure_at: Any = _calling(types.float64)
+"""The same of one that returns a number."""

@@ -2,6 +2,7 @@
 
 from heelstrike.contact.certificate import Certificate
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.ground_shape import GroundShape
 from heelstrike.contact.linearized.motion import (
     ActiveContacts,
     ImpactLinearization,
@@ -33,6 +34,7 @@ __all__ = [
     "ContactSolution",
     "ForceDistribution",
     "Ground",
+    "GroundShape",
     "ImpactLinearization",
     "PhaseLinearization",
     "SolveStatus",

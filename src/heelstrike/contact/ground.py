@@ -1,16 +1,27 @@
-"""The ground: a rigid polyline with friction and restitution on every segment."""
+"""The ground: a rigid polyline with friction and restitution on every segment, or a smooth curve.
+
+A smooth curve (:mod:`heelstrike.contact.ground_shape`) is ground of one segment, whose line it is.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
+from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.arguments import check_fields, takes
-from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.contact.ground_shape import (
+    GroundShape,
+    curvature_of_shape,
+    distance_to_shape,
+    height_of_shape,
+)
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
@@ -27,8 +38,15 @@ UPRIGHT = 1e-3
 """Least rise of the normal that counts in how far the nearest segment may be: steeper faces are
 looked for within `REACH` in any case."""
 
+DRAWN, MOST_DRAWN = 0.02, 2000
+"""Distance (m) of the places of a smooth curve that a drawing joins, and how many at most."""
+
 AT_THE_CORNER = 1e-12
 """Distance (m) of a centre from a corner up to which there is no way from one to the other."""
+
+
+_SHAPES: WeakValueDictionary[str, GroundShape] = WeakValueDictionary()
+"""Shapes of grounds that there are, as they are written: so a snapshot finds its ground again."""
 
 
 class GroundModel(Bundle):
@@ -44,6 +62,11 @@ class GroundModel(Bundle):
     """friction, restitution: Coefficients of each segment."""
     concave: int = number(int)
     """Whether there is a corner in which a point can touch two faces."""
+    curved: int = number(int)
+    """Whether it is a smooth curve: then of one segment."""
+    shape: Bundle = part(Bundle, address=True)
+    shape_code: int = number(int)
+    """shape, shape_code: The numbers of the curve, and where its machine code is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +95,21 @@ class Ground(ShownInNotebooks):
     """(ns + 1, 2) Corners (x, z) of the ground in metres, from left to right; two corners with the
     same x make a vertical step. The first and last segments go on for ever. See also :meth:`stairs`
     and :meth:`rough`."""
+    shape: GroundShape | None = None
+    """A smooth curve in the place of slope and profile, perhaps of a class of one's own."""
     _model: GroundModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         check_fields(self, SimulationError)
         if not abs(self.slope) < 0.5 * np.pi:
             raise SimulationError(f"the slope must lie within ±π/2 rad, got {self.slope}")
-        if self.profile is None:
+        numbers, code = Bundle(), 0
+        if self.shape is not None:
+            self._check_shape(self.shape)
+            numbers = self.shape.parameters()
+            code = self.shape.code(numbers)
+            vertices = _chord(self.shape)
+        elif self.profile is None:
             vertices = np.array([[0.0, 0.0], [1.0, np.tan(self.slope)]])
         elif self.slope != 0.0:
             raise SimulationError("give the ground either a slope or a profile, not both")
@@ -89,6 +120,9 @@ class Ground(ShownInNotebooks):
         restitution = _coefficients("restitution", self.restitution, segments, 1.0)
         normal = _normals(vertices)
         model = GroundModel(
+            curved=int(self.shape is not None),
+            shape=numbers,
+            shape_code=code,
             vertices=vertices,
             normal=normal,
             concave=int(np.any(_turn(normal[:-1].T, normal[1:].T) > STRAIGHT_GROUND)),
@@ -96,6 +130,15 @@ class Ground(ShownInNotebooks):
             restitution=restitution,
         )
         object.__setattr__(self, "_model", model)
+
+    def _check_shape(self, shape: GroundShape) -> None:
+        if not isinstance(shape, GroundShape):
+            raise SimulationError(
+                f"shape must be a GroundShape(...), got {shape!r}; corners are given as profile"
+            )
+        if self.slope != 0.0 or self.profile is not None:
+            raise SimulationError("give the ground a shape, or a slope or a profile, not both")
+        _SHAPES[repr(shape)] = shape
 
     @classmethod
     @takes(SimulationError)
@@ -150,9 +193,9 @@ class Ground(ShownInNotebooks):
         cls,
         *,
         amplitude: float,
-        spacing: float,
-        length: float,
         seed: int,
+        spacing: float = 0.1,
+        length: float = 100.0,
         start: float = 0.5,
         friction: ArrayLike = 0.75,
         restitution: ArrayLike = 0.0,
@@ -163,14 +206,14 @@ class Ground(ShownInNotebooks):
         ----------
         amplitude : float
             Greatest height or depth of a corner (m).
+        seed : int
+            Of the random heights; the same seed gives the same ground.
         spacing : float
             Distance between corners (m).
         length : float
             How far it is rough (m).
-        seed : int
-            Of the random heights; the same seed gives the same ground.
         start : float
-            Where it begins to be rough (m).
+            Where it begins to be rough (m): in front of the feet of most robots.
         friction, restitution : float or array
             As for the class.
 
@@ -196,9 +239,13 @@ class Ground(ShownInNotebooks):
         ends = [[start - 1.0, 0.0]], np.column_stack((x, z)), [[x[-1] + 1.0, 0.0]]
         return cls(friction=friction, restitution=restitution, profile=np.concatenate(ends))
 
-    def numbers(self) -> dict[str, Floats]:
-        """Return the ground as arrays that :meth:`of_numbers` makes it of."""
-        return {
+    def numbers(self) -> dict[str, NDArray[Any]]:
+        """Return the ground as arrays that :meth:`of_numbers` makes it of.
+
+        Of a smooth one there is its shape as it is written, which is a text.
+        """
+        shape = {} if self.shape is None else {"shape": np.array(repr(self.shape))}
+        return shape | {
             "corner": self._model.vertices,
             "friction": self._model.friction,
             "restitution": self._model.restitution,
@@ -207,7 +254,7 @@ class Ground(ShownInNotebooks):
         }
 
     @classmethod
-    def of_numbers(cls, numbers: Mapping[str, Floats]) -> Ground:
+    def of_numbers(cls, numbers: Mapping[str, NDArray[Any]]) -> Ground:
         """Make the ground of :meth:`numbers`.
 
         Parameters
@@ -219,8 +266,17 @@ class Ground(ShownInNotebooks):
         -------
         Ground
             The ground.
+
+        Raises
+        ------
+        SimulationError
+            If it has a shape that nobody here has made: of numbers alone none is made.
         """
+        told = str(numbers.get("shape", ""))
+        if told not in _SHAPES and told:
+            raise SimulationError(f"this was on ground of the shape {told}: give that ground again")
         return cls(
+            shape=_SHAPES.get(told),
             friction=_one_if_equal(numbers["friction"]),
             restitution=_one_if_equal(numbers["restitution"]),
             slope=float(numbers["slope"]),
@@ -246,6 +302,9 @@ class Ground(ShownInNotebooks):
             Heights (m).
         """
         x = np.asarray(x, dtype=np.float64)
+        if self.shape is not None:
+            of_shape = [self.shape.at(each)[0] for each in x.reshape(-1).tolist()]
+            return np.array(of_shape, dtype=np.float64).reshape(x.shape)
         vertices = self._model.vertices
         segment = np.clip(
             np.searchsorted(vertices[:, 0], x, side="right") - 1, 0, len(vertices) - 2
@@ -255,6 +314,39 @@ class Ground(ShownInNotebooks):
         slope = (right[..., 1] - left[..., 1]) / np.where(run > 0.0, run, np.inf)
         height: Floats = left[..., 1] + slope * (x - left[..., 0])
         return height
+
+    def outline(self, left: float, right: float) -> Floats:
+        """Return the surface between two places, to be drawn.
+
+        Parameters
+        ----------
+        left, right : float
+            The places x (m), the left one first.
+
+        Returns
+        -------
+        (n, 2) float
+            Corners (x, z) in m; of a smooth curve so many places that it looks like one.
+        """
+        if self.shape is not None:
+            places = min(max(int((right - left) / DRAWN), 2), MOST_DRAWN)
+            x = np.linspace(left, right, places)
+            return np.column_stack((x, self.height(x)))
+        corners = self._model.vertices
+        inside = corners[(corners[:, 0] > left) & (corners[:, 0] < right)]
+        ends = np.array([[x, float(self.height(x))] for x in (left, right)])
+        return np.concatenate((ends[:1], inside, ends[1:]))
+
+
+def _chord(shape: GroundShape) -> Floats:
+    """Two places of a smooth curve: the ends of the one segment that it stands for."""
+    ends = np.array([[x, shape.at(x)[0]] for x in (0.0, 1.0)])
+    if not np.all(np.isfinite(ends)):
+        raise SimulationError(
+            f"the height of ground shape {type(shape).__name__} must be finite everywhere, and "
+            f"is {ends[0, 1]:g} m at x = 0, {ends[1, 1]:g} m at x = 1 m"
+        )
+    return ends
 
 
 def _one_if_equal(values: Floats) -> Floats | float:
@@ -323,6 +415,8 @@ def segment_below(ground: GroundModel, x: float) -> int:
 @kernel
 def ground_height(ground: GroundModel, x: float) -> float:
     """Height of the ground at x."""
+    if ground.curved == 1:
+        return height_of_shape(ground.shape_code, ground.shape, x, ground.normal[0])
     segment = segment_below(ground, x)
     slope = -ground.normal[segment, 0] / ground.normal[segment, 1]
     return ground.vertices[segment, 1] + slope * (x - ground.vertices[segment, 0])
@@ -330,12 +424,26 @@ def ground_height(ground: GroundModel, x: float) -> float:
 
 @kernel
 def line_contact(ground: GroundModel, segment: int, x: float, z: float, normal: Floats) -> float:
-    """Signed distance to the line through a segment; writes its upward normal."""
+    """Signed distance to the line through a segment, or to the curve; writes its upward normal."""
+    if ground.curved == 1:
+        return distance_to_shape(ground.shape_code, ground.shape, x, z, normal)
     normal[0] = ground.normal[segment, 0]
     normal[1] = ground.normal[segment, 1]
     return (x - ground.vertices[segment, 0]) * normal[0] + (
         z - ground.vertices[segment, 1]
     ) * normal[1]
+
+
+@kernel
+def path_curvature(ground: GroundModel, x: float, distance: float, normal: Floats) -> float:
+    """Curvature (1/m) of the way of a place that keeps its distance from a smooth ground.
+
+    Positive where it goes over a hill: what makes a gap grow by its product with the square of the
+    speed along the ground. `x` is where the place is, `normal` that of the ground beneath it.
+    """
+    foot = x - distance * normal[0]
+    bend = curvature_of_shape(ground.shape_code, ground.shape, foot, normal)
+    return -bend / (1.0 - bend * distance)
 
 
 @dissolved_kernel

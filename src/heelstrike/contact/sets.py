@@ -14,14 +14,27 @@ has no normal row: what stands in its place belongs to the solvers (:func:`press
 
 from __future__ import annotations
 
+import enum
+
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import product_error
 from heelstrike.contact.workspace import ContactProblem
 
-CONE = 0
-HALF_LINE = 1
-LINE = 2
-INTERVAL = 3
+CONE, HALF_LINE, LINE, INTERVAL = range(4)
+
+
+class ImpulseSet(enum.IntEnum):
+    """Where the impulses of a constraint may lie.
+
+    ``CONE`` is contact with friction: it presses, and rubs by at most μ times that. ``HALF_LINE``
+    presses or pulls, but never both, and lets go: a stop, a cable. ``LINE`` holds either way and
+    never lets go: a closed loop, a pin. ``INTERVAL`` rubs with a force up to a bound: dry friction.
+    """
+
+    CONE = CONE
+    HALF_LINE = HALF_LINE
+    LINE = LINE
+    INTERVAL = INTERVAL
 
 
 @kernel

@@ -12,7 +12,7 @@ import math
 from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.around import Around, Shell, Shown, own_period
+from heelstrike.control.around import Around, Shell, Shown, copy, copy_contacts, own_period
 from heelstrike.control.sensing import periods
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats
@@ -61,17 +61,10 @@ def look(
 ) -> None:  # fmt: skip
     """Show the controller inside what is shown to this."""
     seen, told = memory.state, memory.contacts
-    for j in range(robot.nq):
-        seen.q[j] = state.q[j]
-    for j in range(robot.nv):
-        seen.v[j] = state.v[j]
+    copy(state.q, seen.q)
+    copy(state.v, seen.v)
     robot.update(seen)
-    for i in range(robot.nc):
-        told.gap[i] = contacts.gap[i]
-        for k in range(2):
-            told.position[i, k] = contacts.position[i, k]
-            told.normal[i, k] = contacts.normal[i, k]
-            told.force[i, k] = contacts.force[i, k]
+    copy_contacts(contacts, told)
 
 
 @kernel

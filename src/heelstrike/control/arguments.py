@@ -6,15 +6,14 @@ import math
 from numbers import Real
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.arguments import refusal, shown
 from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.gait import Gait
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.law import REAL, per_actuator
-
-Floats = NDArray[np.float64]
 
 
 def must_be(kind: type, name: str, value: object) -> None:

@@ -38,6 +38,23 @@ PERIOD = 1e-3
 """Seconds between two calls of a shell around a controller that names no period."""
 
 
+@kernel
+def copy(source: Floats, target: Floats) -> None:
+    """Copy as many numbers as there is place for."""
+    for j in range(target.shape[0]):
+        target[j] = source[j]
+
+
+@kernel
+def copy_contacts(contacts: Contacts, told: Contacts) -> None:
+    """Copy everything that is told of contact points."""
+    copy(contacts.gap, told.gap)
+    for i in range(contacts.gap.shape[0]):
+        copy(contacts.position[i], told.position[i])
+        copy(contacts.normal[i], told.normal[i])
+        copy(contacts.force[i], told.force[i])
+
+
 class Turn(Bundle):
     """When the controller inside is called."""
 

@@ -24,7 +24,7 @@ import numpy as np
 from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.around import Around, Shell, Shown, own_period
+from heelstrike.control.around import Around, Shell, Shown, copy, copy_contacts, own_period
 from heelstrike.dynamics.held import (
     HeldRows,
     Reaction,
@@ -225,10 +225,8 @@ def estimate(
     """Show the controller inside the estimate, which begins with what is shown first."""
     seen, told = memory.state, memory.contacts
     if memory.calls == 0:
-        for j in range(robot.nq):
-            seen.q[j] = state.q[j]
-        for j in range(robot.nv):
-            seen.v[j] = state.v[j]
+        copy(state.q, seen.q)
+        copy(state.v, seen.v)
         robot.update(seen)
         find_points(robot, parameters, memory)
         note_standing(contacts, robot, parameters, memory)
@@ -237,16 +235,11 @@ def estimate(
         predict(robot, parameters, memory)
         correct(state, robot, parameters, memory)
     memory.calls += 1
-    for j in range(robot.nq):
-        log.estimated_position[j] = seen.q[j]
-    for j in range(robot.nv):
-        log.estimated_velocity[j] = seen.v[j]
+    copy(seen.q, log.estimated_position)
+    copy(seen.v, log.estimated_velocity)
+    copy_contacts(contacts, told)
     for i in range(robot.nc):
-        told.gap[i] = contacts.gap[i]
-        for k in range(2):
-            told.position[i, k] = memory.point[i, k]
-            told.normal[i, k] = contacts.normal[i, k]
-            told.force[i, k] = contacts.force[i, k]
+        copy(memory.point[i], told.position[i])
 
 
 @kernel

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.control.arguments import must_be, numbers_of
@@ -105,7 +105,7 @@ class JointFeedback(Law):
         parameters = Parameters(kp=kp, kd=kd, begins=begins, coefficients=command)
         super().__init__(joint_feedback, parameters, robot=robot, stiffness=kp, damping=kd)
 
-    def command(self, times: ArrayLike) -> NDArray[np.float64]:
+    def command(self, times: ArrayLike) -> Floats:
         """Return c(t) at some times, (nt, nu): what an actuator with an affine bias is told."""
         times = np.asarray(times, dtype=np.float64)
         begins, coefficients = self.parameters.begins, self.parameters.coefficients
@@ -115,7 +115,7 @@ class JointFeedback(Law):
         return command
 
 
-def _polynomials(name: str, value: ArrayLike, pieces: int, nu: int) -> NDArray[np.float64]:
+def _polynomials(name: str, value: ArrayLike, pieces: int, nu: int) -> Floats:
     polynomials = numbers_of(name, value)
     if polynomials.ndim < 3:
         polynomials = np.broadcast_to(polynomials[..., None], (pieces, nu, 1))

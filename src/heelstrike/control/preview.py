@@ -9,13 +9,12 @@ weighs the error of p against jerk and looks at the reference ahead of time.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import solve_discrete_are
 
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

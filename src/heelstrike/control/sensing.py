@@ -15,7 +15,7 @@ import numpy as np
 from heelstrike.arguments import check_fields, takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.around import Around, Shell, Shown, own_period
+from heelstrike.control.around import Around, Shell, Shown, copy, own_period
 from heelstrike.control.noise import normal, seeded
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
@@ -243,10 +243,8 @@ def read_all(
         begin(parameters, memory)
     row = memory.calls % memory.past_q.shape[0]
     q, v = memory.past_q[row], memory.past_v[row]
-    for j in range(robot.nq):
-        q[j] = state.q[j]
-    for j in range(robot.nv):
-        v[j] = state.v[j]
+    copy(state.q, q)
+    copy(state.v, v)
     if parameters.encoder_every > 0:
         if memory.calls % parameters.encoder_every == 0:
             read_encoders(state, parameters, memory)
@@ -286,17 +284,13 @@ def sense(
     read_all(state, contacts, robot, parameters, memory)
     seen, told = memory.state, memory.contacts
     row = max(memory.calls - parameters.late, 0) % memory.past_q.shape[0]
-    for j in range(robot.nq):
-        seen.q[j] = memory.past_q[row, j]
-    for j in range(robot.nv):
-        seen.v[j] = memory.past_v[row, j]
+    copy(memory.past_q[row], seen.q)
+    copy(memory.past_v[row], seen.v)
     if parameters.encoder_every > 0:
         robot.follow_motors(seen)
     robot.update(seen)
-    for j in range(robot.nq):
-        log.measured_position[j] = seen.q[j]
-    for j in range(robot.nv):
-        log.measured_velocity[j] = seen.v[j]
+    copy(seen.q, log.measured_position)
+    copy(seen.v, log.measured_velocity)
     for i in range(robot.nc):
         told.gap[i] = memory.past_gap[row, i]
         for k in range(2):

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import Bundle, array, number
 from heelstrike.compiler.compilation import kernel
@@ -282,7 +282,7 @@ class VirtualConstraints(Law):
         self.gait = gait
 
 
-def _outputs(robot: Robot, outputs: ArrayLike | None) -> NDArray[np.float64]:
+def _outputs(robot: Robot, outputs: ArrayLike | None) -> Floats:
     matrix = np.eye(robot.nu) if outputs is None else numbers_of("outputs", outputs)
     if matrix.shape != (robot.nu, robot.nu) or not np.all(np.isfinite(matrix)):
         raise ControllerError(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
-from heelstrike.dynamics.places import bias_at, velocity_at
+from heelstrike.dynamics.places import point_at, point_bias, velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
 
@@ -39,11 +39,6 @@ class LoopRows(Bundle):
 def count_rows(model: Model) -> int:
     """How many equations the loops and couplings of a robot are."""
     return 2 * model.loops + model.couplings
-
-
-def most_rows(model: Model) -> int:
-    """How many equations there are in a simulation while all brakes are on."""
-    return count_rows(model) + model.brakes
 
 
 @kernel
@@ -69,21 +64,14 @@ def add_end(model: Model, work: Workspace, loop: int, end: int, rows: LoopRows) 
     displacement, jacobian, bias = rows.displacement, rows.jacobian, rows.bias
     along_x, along_z = 2 * loop, 2 * loop + 1
     sign = 1.0 - 2.0 * end
-    link = model.loop_link[loop, end]
-    x, z = model.loop_position[loop, end, 0], model.loop_position[loop, end, 1]
-    if link < 0:
-        displacement[along_x] += sign * x
-        displacement[along_z] += sign * z
-        return
-    c, s = work.cosine[link], work.sine[link]
-    world_x = work.origin[link, 0] + c * x + s * z
-    world_z = work.origin[link, 1] - s * x + c * z
-    displacement[along_x] += sign * world_x
-    displacement[along_z] += sign * world_z
-    place = world_x - work.pivot[0], world_z - work.pivot[1]
-    bias_x, bias_z = bias_at(work, link, place)
+    link, position = model.loop_link[loop, end], model.loop_position[loop, end]
+    at = point_at(work, link, position[0], position[1])
+    displacement[along_x] += sign * at[0]
+    displacement[along_z] += sign * at[1]
+    bias_x, bias_z = point_bias(work, link, at)
     bias[along_x] += sign * bias_x
     bias[along_z] += sign * bias_z
+    place = at[0] - work.pivot[0], at[1] - work.pivot[1]
     j = link
     while j >= 0:
         column_x, column_z = velocity_at(work.motion, j, place)

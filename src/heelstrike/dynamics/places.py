@@ -39,6 +39,47 @@ def bias_at(work: Workspace, link: int, place: Vector) -> Vector:
 
 
 @kernel
+def point_at(work: Workspace, link: int, x: float, z: float) -> Vector:
+    """World position of the point (x, z) of a link; link -1 is the world."""
+    if link < 0:
+        return x, z
+    c, s = work.cosine[link], work.sine[link]
+    return work.origin[link, 0] + c * x + s * z, work.origin[link, 1] - s * x + c * z
+
+
+@kernel
+def point_velocity(work: Workspace, link: int, at: Vector) -> Vector:
+    """Velocity (x, z) of the point of a link that is at a world position."""
+    if link < 0:
+        return 0.0, 0.0
+    return velocity_at(work.velocity, link, (at[0] - work.pivot[0], at[1] - work.pivot[1]))
+
+
+@kernel
+def point_bias(work: Workspace, link: int, at: Vector) -> Vector:
+    """Acceleration (x, z) at v̇ = 0 of the point of a link that is at a world position."""
+    if link < 0:
+        return 0.0, 0.0
+    return bias_at(work, link, (at[0] - work.pivot[0], at[1] - work.pivot[1]))
+
+
+@kernel
+def add_point_row(
+    model: Model, work: Workspace, link: int, at: Vector, along: Vector, row: Floats
+) -> None:
+    """Add to a row what the velocities make of that, along a direction, of a point at a position.
+
+    The direction may be of any length: minus one takes away, as at the other end of a rod.
+    """
+    place = at[0] - work.pivot[0], at[1] - work.pivot[1]
+    j = link
+    while j >= 0:
+        x, z = velocity_at(work.motion, j, place)
+        row[j] += along[0] * x + along[1] * z
+        j = model.parent[j]
+
+
+@kernel
 def write_point_rows(
     model: Model,
     work: Workspace,

@@ -29,9 +29,8 @@ from heelstrike.dynamics import point_jacobian
 from heelstrike.experiments.evidence import STEPS, TIME_STEP, Evidence
 from heelstrike.experiments.refinement import SCHEMES
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim import EventKind, Run, RunStatus, Scheme
-
-Floats = NDArray[np.float64]
 
 SETTLING = 1e-3
 """Time (s) after a touchdown in which the feedback reacts to the impact."""
@@ -433,7 +432,7 @@ def _row_at(run: Run, time: float) -> int:
     return int(np.abs(run.time - time).argmin())
 
 
-def _stretches(rows: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+def _stretches(rows: NDArray[np.bool_]) -> list[Integers]:
     """Consecutive true entries, as arrays of indices."""
     indices = np.flatnonzero(rows)
     return [

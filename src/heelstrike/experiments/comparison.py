@@ -8,7 +8,6 @@ from dataclasses import asdict, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
 from rich.console import Group
 from rich.table import Table
@@ -27,6 +26,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.interruption import acknowledge
 from heelstrike.robot import Robot, State
+from heelstrike.robot.model import Floats
 from heelstrike.sim import Controller, Push, Run, simulate
 from heelstrike.sim.closed_sets import OnError, RunStatus
 from heelstrike.sim.method import Method
@@ -34,7 +34,6 @@ from heelstrike.sim.method import Method
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 GRID = 1e-3
 """Time between the instants at which runs are compared, in s."""

@@ -7,13 +7,11 @@ height; nothing is tuned for a robot.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.stability.trial import Trial
 from heelstrike.analysis.stability.zero_dynamics import zero_dynamics
@@ -41,8 +39,10 @@ from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, PhasedGait, StepFamily, optimize_gait
 from heelstrike.gait.sole import sole
 from heelstrike.robot import Robot
+from heelstrike.robot.model import Floats
 from heelstrike.sim import Controller
 from heelstrike.sim.controller.law import Law
+from heelstrike.wording import meant
 
 SAMPLE = 1e-3
 """Time between two calls of every controller, in s; a longer step of the method goes before."""
@@ -182,7 +182,7 @@ def on_points(
 
 def standing(
     name: str,
-    law: Callable[[Robot, NDArray[np.float64]], Law],
+    law: Callable[[Robot, Floats], Law],
     needs: Callable[[Robot], str] = flat_feet,
 ) -> Entry:
     """Enter a controller that makes a robot stand, as it does on level ground.
@@ -218,7 +218,7 @@ def _joint_pd(robot: Robot, gait: Gait) -> Law:
     return JointPD(robot, gait, kp=1000.0 * size[0] * size[1], kd=damping, feedforward="full")
 
 
-def _joint_springs(robot: Robot, q: NDArray[np.float64]) -> Law:
+def _joint_springs(robot: Robot, q: Floats) -> Law:
     size = _size(robot)
     damping = _at_most(robot, 100.0 * size[0] * size[1] ** 1.5)
     return JointFeedback(
@@ -282,8 +282,7 @@ def law_called(words: str) -> Entry:
         raise ControllerError(
             f"{words} is a file: say which law of it is meant, as in {words}:NAME"
         )
-    near = difflib.get_close_matches(name, known, n=1)
-    guess = f" Did you mean {known[near[0]].name!r}?" if near else ""
+    guess = meant(name, {each: repr(entry.name) for each, entry in known.items()})
     raise ControllerError(
         f"there is no controller {words!r}.{guess} There are "
         f"{', '.join(entry.name for entry in LAWS)}. One of your own is MODULE:NAME or "
@@ -400,8 +399,8 @@ def _size(robot: Robot) -> tuple[float, float]:
     return robot.total_mass / BRAVO7_WEIGHT, typical_step(robot).length / BRAVO7_STEP
 
 
-def _at_most(robot: Robot, damping: float) -> NDArray[np.float64]:
+def _at_most(robot: Robot, damping: float) -> Floats:
     """Return a damping of all joints (N m s/rad) that none of them takes amiss."""
     moved = np.diag(mass_matrix(robot, robot.model.reference))[robot.model.actuator_joint]
-    most: NDArray[np.float64] = MOST_DAMPING * moved / SAMPLE
+    most: Floats = MOST_DAMPING * moved / SAMPLE
     return np.minimum(damping, most)

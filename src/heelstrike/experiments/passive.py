@@ -70,7 +70,7 @@ def passive_walk(robot: Robot, ground: Ground) -> LimitCycle:
             "a state near it, and hs.simulate starts there."
         )
     descent = -ground.slope
-    if ground.profile is not None or not descent > 0.0:
+    if ground.profile is not None or ground.shape is not None or not descent > 0.0:
         raise LimitCycleError(
             f"robot {robot.name!r} has no motors and walks down a slope only: give it ground that "
             f"descends along +x, {_ground_for(robot)}."

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis import Summary, summarize
 from heelstrike.contact.ground import Ground
@@ -22,8 +21,6 @@ from heelstrike.gait import Gait
 from heelstrike.robot import Robot
 from heelstrike.sim import Run, Scheme, TimeStepping, simulate
 from heelstrike.sim.whole_run import whole
-
-Floats = NDArray[np.float64]
 
 SCHEMES = (Scheme.IMPACT_RESOLVED, Scheme.PAPER_EXPLICIT, Scheme.PAPER_SYMPLECTIC)
 """Discretisations compared: the default, and the paper's equations and text."""

@@ -19,8 +19,8 @@ from scipy.optimize import root
 from heelstrike.arguments import check_fields
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 
-Floats = NDArray[np.float64]
 Phases = list[tuple[Floats, Floats]]
 
 RTOL, ATOL = 1e-13, 1e-14

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ from heelstrike.errors import GaitError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State
-from heelstrike.sim import Controller, Push, Run, simulate
+from heelstrike.sim import Controller, Push, Run, TimeStepping, simulate
 from heelstrike.sim.closed_sets import OnError
 from heelstrike.sim.controller.law import Law
 from heelstrike.sim.method import Method
@@ -171,7 +172,7 @@ def beginning(
     else:
         trial = law.trial(robot, walked)
         state, duration, controller = trial.state, trial.step_duration, trial.controller
-    if ground is not None and np.any(ground.model().vertices[:, 1]):
+    if ground is not None and (ground.shape is not None or np.any(ground.model().vertices[:, 1])):
         if law is not None and law.stands:
             state = robot.standing(ground)
         else:
@@ -181,6 +182,8 @@ def beginning(
 
 def _slope_at(ground: Ground, x: float) -> float:
     """Inclination (rad) of the ground at x; positive climbs."""
+    if ground.shape is not None:
+        return float(np.arctan(ground.shape.at(x)[1]))
     corners = ground.model().vertices
     segment = int(np.clip(np.searchsorted(corners[:, 0], x, "right") - 1, 0, len(corners) - 2))
     run, rise = corners[segment + 1] - corners[segment]
@@ -259,6 +262,38 @@ def walk(
         progress=report,
         on_error=on_error,
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """A walk, with all that decides how it goes."""
+
+    robot: Robot
+    gait: Gait | LimitCycle | None
+    """Its gait, or its walk without motors; None of a law that makes it stand."""
+    law: Entry | None = None
+    """What moves the joints; computed torque by default."""
+    ground: Ground = field(default_factory=Ground)
+    pushes: Sequence[Push] = ()
+    method: Method = field(default_factory=lambda: TimeStepping(step=1e-3))
+    steps: int = 10
+    """Steps that it is to take."""
+
+    @property
+    def followed(self) -> Gait | None:
+        """Gait that motors follow, if they follow one."""
+        return self.gait if isinstance(self.gait, Gait) else None
+
+    def run(
+        self,
+        progress: Callable[[float], None] | None = None,
+        on_error: OnError | str = OnError.WARN,
+    ) -> Run:
+        """Walk, as :func:`walk` does."""
+        return walk(
+            self.robot, self.gait, steps=self.steps, law=self.law, method=self.method,
+            ground=self.ground, pushes=self.pushes, progress=progress, on_error=on_error,
+        )  # fmt: skip
 
 
 def steps_taken(run: Run, walked: Gait | LimitCycle | None) -> int:

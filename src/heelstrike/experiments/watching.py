@@ -42,8 +42,6 @@ STEEPEST = 8.0
 """Degrees."""
 ROUGHEST = 0.03
 """Metres."""
-AHEAD, SPACING, ROUGH_LENGTH = 0.5, 0.1, 100.0
-"""Where roughness begins, the distance of its corners and its length, in m."""
 DESCENT = -3.0
 """Degrees of the slope on which passive walkers begin."""
 
@@ -193,16 +191,11 @@ class WalkStage(Stage):
         """Make the ground of a slope, a roughness and a friction."""
         friction = values["friction"]
         if self._first.ground is not None:
-            numbers = self._first.ground.numbers()
-            same = np.full_like(numbers["friction"], friction)
-            return Ground.of_numbers(numbers | {"friction": same})
+            return replace(self._first.ground, friction=friction)
         slope = float(np.deg2rad(values["slope"]))
         if not values["roughness"]:
             return Ground(friction=friction, slope=slope)
-        rough = Ground.rough(
-            amplitude=values["roughness"], spacing=SPACING, length=ROUGH_LENGTH, start=AHEAD,
-            seed=self._first.seed,
-        )  # fmt: skip
+        rough = Ground.rough(amplitude=values["roughness"], seed=self._first.seed)
         corners = rough.numbers()["corner"].copy()
         corners[:, 1] += np.tan(slope) * corners[:, 0]
         return Ground(friction=friction, profile=corners)

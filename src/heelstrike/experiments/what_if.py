@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,15 +13,12 @@ from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
 from heelstrike.analysis.support import walking_steps
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import HeelstrikeError
-from heelstrike.experiments.laws import Entry, bent_knees, law_called
-from heelstrike.experiments.walk import walk
+from heelstrike.experiments.laws import bent_knees, law_called
+from heelstrike.experiments.walk import Case
 from heelstrike.experiments.zoo.disturbances import DISTURBANCES, Chance, Effort
-from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, optimize_gait
-from heelstrike.robot import Robot
-from heelstrike.sim import Push, Run, RunStatus
+from heelstrike.sim import Run, RunStatus
 from heelstrike.sim.closed_sets import OnError
-from heelstrike.sim.method import Method
 from heelstrike.sim.time_stepping.method import TimeStepping
 from heelstrike.sim.whole_run import whole
 
@@ -55,28 +52,6 @@ NO_GAIT = Tried(
 """Why nothing was tried."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Case:
-    """A walk, with all that decides how it goes."""
-
-    robot: Robot
-    gait: Gait
-    law: Entry = PAPER
-    """What moves the joints; computed torque by default."""
-    ground: Ground = field(default_factory=Ground)
-    pushes: Sequence[Push] = ()
-    method: Method = field(default_factory=lambda: TimeStepping(step=1e-3))
-    steps: int = 10
-    """Steps that it is to take."""
-
-    def run(self, progress: Callable[[float], None] | None = None) -> Run:
-        """Walk. What the law raises was told by the walk itself, and is not told again."""
-        return walk(
-            self.robot, self.gait, steps=self.steps, law=self.law, method=self.method,
-            ground=self.ground, pushes=self.pushes, progress=progress, on_error=OnError.STOP,
-        )  # fmt: skip
-
-
 def changed(case: Case, change: Change) -> Case:
     """Return a walk with a change made.
 
@@ -90,9 +65,8 @@ def changed(case: Case, change: Change) -> Case:
         case Lever.CONTROLLER:
             return replace(case, law=law_called(str(value)))
         case Lever.FRICTION:
-            numbers = case.ground.numbers()
-            more = np.maximum(numbers["friction"], value)
-            return replace(case, ground=Ground.of_numbers(numbers | {"friction": more}))
+            more = np.maximum(case.ground.friction, value)
+            return replace(case, ground=replace(case.ground, friction=more))
         case Lever.TORQUE_LIMIT:
             model = case.robot.model
             ends = {
@@ -105,8 +79,7 @@ def changed(case: Case, change: Change) -> Case:
         case Lever.GAIT_CLEARANCE:
             return replace(case, gait=_designed(case, clearance=float(value)))
         case Lever.GAIT_SPEED:
-            duration = case.gait.step_duration / float(value)
-            return replace(case, gait=_designed(case, step_duration=duration))
+            return replace(case, gait=_designed(case, faster=float(value)))
         case Lever.GAIT_JOINT_RANGES:
             joint = case.robot.joint_index(change.where)
             room = (
@@ -120,7 +93,9 @@ def changed(case: Case, change: Change) -> Case:
 
 def _designed(case: Case, **asked: Any) -> Gait:
     """Design the gait of a walk with something else asked; knees that it keeps bent stay so."""
-    gait = case.gait
+    gait = case.followed
+    assert gait is not None
+    asked["step_duration"] = gait.step_duration / asked.pop("faster", 1.0)
     ranges = bent_knees(case.robot, gait)
     for joint, (low, high) in asked.pop("joint_ranges", {}).items():
         kept = ranges.get(joint, (low, high))
@@ -129,20 +104,19 @@ def _designed(case: Case, **asked: Any) -> Gait:
         asked["joint_ranges"] = ranges
     given: dict[str, Any] = {
         "step_length": gait.step_length,
-        "step_duration": gait.step_duration,
         "friction": gait.friction,
         "clearance": gait.clearance,
     }
     return optimize_gait(case.robot, **(given | asked))
 
 
-def tried_beside(case: Case | None, run: Run) -> tuple[Tried, ...]:
+def tried_beside(case: Case, run: Run) -> tuple[Tried, ...]:
     """Try beside a run what a report shows: what to change if it fell, pushes and slopes.
 
     Parameters
     ----------
-    case : Case or None
-        What the run is one of; nothing if it followed no gait.
+    case : Case
+        What the run is one of.
     run : Run
         The run.
 
@@ -158,10 +132,10 @@ def tried_beside(case: Case | None, run: Run) -> tuple[Tried, ...]:
     """
     if run.status is RunStatus.INTERRUPTED or not len(run.time):  # it did not begin
         return ()
-    if case is None:
+    if case.followed is None:
         return (NO_GAIT,)
-    fall = first_cause(run, case.gait)
-    asked = () if fall is None else changes(run, fall, case.gait)
+    fall = first_cause(run, case.followed)
+    asked = () if fall is None else changes(run, fall, case.followed)
     return (*try_changes(case, asked), *try_disturbances(case))
 
 
@@ -171,11 +145,13 @@ def try_changes(case: Case, asked: Sequence[Change]) -> Iterator[Tried]:
         what = change.lever.value
         try:
             other = changed(case, change)
-            run = whole(other.run())
+            # What the law raises was told by the walk itself.
+            run = whole(other.run(on_error=OnError.STOP))
         except HeelstrikeError as error:
             yield Tried(what, str(error), None, change)
             continue
-        fall = first_cause(run, other.gait)
+        assert other.followed is not None
+        fall = first_cause(run, other.followed)
         lasted = walked_on(run, fall)
         steps = f"{len(walking_steps(run))} steps in {float(run.time[-1]):.3g} s"
         yield Tried(what, steps if fall is None else f"{steps}, then {fall}", lasted, change)
@@ -190,10 +166,8 @@ def try_disturbances(case: Case) -> Iterator[Tried]:
     stepping at 1 ms.
     """
     friction = float(case.ground.model().friction.min())
-    trial = replace(
-        case.law.trial(case.robot, case.gait), method=BY, ground=Ground(friction=friction),
-        on_error=OnError.STOP,
-    )  # fmt: skip
+    walking = (case.law or PAPER).trial(case.robot, case.followed)
+    trial = replace(walking, method=BY, ground=Ground(friction=friction), on_error=OnError.STOP)
     for disturbance in DISTURBANCES:
         if disturbance.name not in TOLD:
             continue

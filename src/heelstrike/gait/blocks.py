@@ -16,11 +16,9 @@ from typing import Any
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.field_texts import dataclass
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 
 class Block:

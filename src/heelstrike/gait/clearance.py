@@ -5,7 +5,9 @@ from __future__ import annotations
 import enum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from heelstrike.robot.model import Floats
 
 ROUNDED = 0.04
 """Share of the step, at either end, over which the parabola is rounded off."""
@@ -29,7 +31,7 @@ class ClearanceProfile(enum.Enum):
         """Phases at which the curvature of the profile jumps."""
         return (ROUNDED, 1.0 - ROUNDED) if self is ClearanceProfile.PARABOLA else ()
 
-    def height(self, phase: ArrayLike) -> NDArray[np.float64]:
+    def height(self, phase: ArrayLike) -> Floats:
         """Share of the greatest height at phases, (...), from 0 to 1.
 
         Parameters
@@ -48,9 +50,9 @@ class ClearanceProfile(enum.Enum):
         [0.0, 0.75, 1.0]
         """
         s = np.asarray(phase, dtype=np.float64)
-        hump: NDArray[np.float64] = 4.0 * s * (1.0 - s)
+        hump: Floats = 4.0 * s * (1.0 - s)
         if self is ClearanceProfile.SMOOTH:
             return hump**2
         from_end = np.minimum(s, 1.0 - s)
-        rounding: NDArray[np.float64] = 1.0 - np.maximum(1.0 - from_end / ROUNDED, 0.0) ** 2
+        rounding: Floats = 1.0 - np.maximum(1.0 - from_end / ROUNDED, 0.0) ** 2
         return hump * rounding

@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import casadi
-import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.dynamics.queries.symbolic import expression
 from heelstrike.errors import GaitError
 from heelstrike.gait.cost import Cost, Instant, OwnCost
 from heelstrike.gait.support import Support, Symbols
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 ROUNDED = 1e-3
 """Power, in units of weight times height over the pendulum time, below which |x| is rounded off to

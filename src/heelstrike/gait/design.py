@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Footing, Gait, Phase, actuated_joints, fingerprint
@@ -19,10 +18,9 @@ from heelstrike.gait.refinement import checked_instants, held_between_nodes
 from heelstrike.gait.request import Request
 from heelstrike.gait.starts import starts
 from heelstrike.gait.transcription import Group, transcribed
+from heelstrike.robot.model import Floats
 from heelstrike.robot.motors import torque_range
 from heelstrike.robot.state import State
-
-Floats = NDArray[np.float64]
 
 
 def designed(request: Request, profile: ClearanceProfile, report: Callable[[float], None]) -> Gait:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.arguments import takes
 from heelstrike.errors import GaitError, InfeasibleGaitError, WriteError
@@ -18,10 +17,10 @@ from heelstrike.gait.file import LARGEST_NUMBER, check_robot, entries_of, gait_o
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.optimize import optimize_gait, request_of
 from heelstrike.json_checksum import Entries, json_text, reading_json
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.whole_file import write_whole
 
-Floats = NDArray[np.float64]
 Place = tuple[int, ...]
 """Indices of a point of the grid, an axis each."""
 

@@ -9,7 +9,7 @@ from functools import cached_property
 from os import PathLike
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.arguments import takes
 from heelstrike.errors import GaitError
@@ -18,11 +18,9 @@ from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.polynomials import evaluated
 from heelstrike.notebook import ShownInNotebooks
-from heelstrike.robot.model import NUMBERS
+from heelstrike.robot.model import NUMBERS, Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-
-Floats = NDArray[np.float64]
 
 
 class Footing(enum.Enum):
@@ -102,7 +100,7 @@ class Gait(ShownInNotebooks):
     """Distance (m) between the feet when both are on the ground: how far the body moves a step."""
     phases: tuple[Phase, ...]
     """The first step, phase by phase."""
-    mirror_joint: NDArray[np.int64]
+    mirror_joint: Integers
     """(nu,) Counterpart of every joint on the other side."""
     mirror_sign: Floats
     mirror_offset: Floats

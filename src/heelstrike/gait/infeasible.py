@@ -6,14 +6,13 @@ from dataclasses import replace
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.program import FEASIBLE, Program, Solution
 from heelstrike.gait.starts import starts
 from heelstrike.gait.transcription import Group
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
+from heelstrike.wording import some_of
 
 TAKES_PART = 0.05
 """Multiplier from which a constraint takes part in a conflict; 1 for those that are violated."""
@@ -45,21 +44,16 @@ def _message(program: Program, nearest: Solution) -> str:
     request = program.request
     violated = _worst_violations(program, nearest.unknowns)
     binding = _binding_groups(program, nearest, set(violated))
-    against = f" They are in conflict with: {_listed(binding)}." if binding else ""
+    against = f" They are in conflict with: {some_of(binding, NAMED, '; ')}." if binding else ""
     step = ""
     if request.free_step:
         duration, length = nearest.unknowns[-2:]
         step = f", with steps of {length:.3g} m in {duration:.3g} s,"
     return (
         f"robot {request.robot.name!r}: no gait with {request} was found. The nearest to one{step} "
-        f"violates: {_listed(list(violated.values()))}.{against} Ask for a shorter or slower step, "
-        "or relax one of these constraints."
+        f"violates: {some_of(list(violated.values()), NAMED, '; ')}.{against} Ask for a shorter or "
+        "slower step, or relax one of these constraints."
     )
-
-
-def _listed(items: list[str]) -> str:
-    more = f"; and {len(items) - NAMED} more" if len(items) > NAMED else ""
-    return "; ".join(items[:NAMED]) + more
 
 
 def _worst_violations(program: Program, unknowns: Floats) -> dict[Group, str]:

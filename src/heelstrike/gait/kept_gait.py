@@ -16,8 +16,8 @@ from heelstrike.gait.request import Request
 from heelstrike.gait.request_digest import digest_of
 from heelstrike.kept_files import kept_file, make_room, program_digest
 
-_ROOMS = ("gait", "contact", "dynamics", "robot")
-"""Packages whose text decides what gait is found."""
+_ROOMS = ("gait", "contact", "dynamics", "robot", "compiler", "tolerances")
+"""Packages and modules whose text decides what gait is found."""
 
 
 class KeptGait:

@@ -8,13 +8,10 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import Legendre, Polynomial, legendre
 from numpy.polynomial.polynomial import polyder, polyval, polyvander
-from numpy.typing import NDArray
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.field_texts import dataclass
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from heelstrike.robot.model import Floats, Integers
 
 
 def cubic(positions: Sequence[Floats], velocities: Sequence[Floats], duration: float) -> Floats:

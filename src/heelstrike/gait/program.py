@@ -10,7 +10,6 @@ import casadi
 import numpy as np
 import scipy.sparse.linalg
 from numpy.polynomial.legendre import legvander
-from numpy.typing import NDArray
 
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.blocks import BlockProgram, Copies
@@ -21,8 +20,7 @@ from heelstrike.gait.request import Request
 from heelstrike.gait.starts import Start, typical_step
 from heelstrike.gait.transcription import Group, Row, Transcription
 from heelstrike.interruption import deferred_interrupts
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 CONVERGED = 1e-8
 """Tolerance of IPOPT on scaled constraints and optimality."""

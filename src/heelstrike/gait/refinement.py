@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.infeasible import nearest_to_feasible
-from heelstrike.gait.polynomials import Instants, Integers
+from heelstrike.gait.polynomials import Instants
 from heelstrike.gait.program import Program, Solution
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats, Integers
 
 FINER = 10
 """Constraints are checked this many times between two instants of the program."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.dynamics.queries.following import Drive, drive_of
 from heelstrike.errors import GaitError, InfeasibleGaitError, RobotError
@@ -17,10 +16,9 @@ from heelstrike.gait.cost import costs_of
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.sole import reach, sole, standing_height
 from heelstrike.robot.loops import refuse_loops
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sides.mirror import Mirror
-
-Floats = NDArray[np.float64]
 
 JointRanges = Mapping[str, tuple[float, float]]
 """Lowest and highest position (rad, m for a slide) of joints by name."""

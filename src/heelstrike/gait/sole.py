@@ -5,14 +5,12 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import GaitError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.tolerances import CLOSED_GAP
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,13 @@ from itertools import product
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, symbols
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.request import Request
 from heelstrike.gait.sole import leg
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 HEIGHTS = (0.97, 0.92, 0.85)
 """Heights of the trunk over the ground, as a share of what straight legs would allow."""

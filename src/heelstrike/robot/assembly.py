@@ -15,6 +15,7 @@ from heelstrike.robot.robot import Foot, LockedJoint, Robot
 from heelstrike.robot.sides.averaging import averaged
 from heelstrike.robot.sides.symmetry import find_mirror
 from heelstrike.robot.warning import warn
+from heelstrike.wording import some_of
 
 LARGEST_NUMBER = 1e10
 """Largest length, mass, inertia … of a robot in SI units; MuJoCo's own bound on a state."""
@@ -83,10 +84,9 @@ def assembled(
     friction = tuple(point.friction for point in points)
     mirror, differences = find_mirror(model, joint_names, link_names, feet)
     if differences:
-        more = f"; and {len(differences) - SHOWN} more" if len(differences) > SHOWN else ""
         warn(
             f"{source}: {DIFFERENT}, so the robot has no mirror image: "
-            f"{'; '.join(differences[:SHOWN])}{more}. Gaits whose steps mirror each other need two "
+            f"{some_of(differences, SHOWN, '; ')}. Gaits whose steps mirror each other need two "
             'equal legs, as load_robot makes them with mirror="average".'
         )
     return Robot(

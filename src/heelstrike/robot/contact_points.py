@@ -8,14 +8,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.shapes import mesh_corners
 from heelstrike.robot.files.snapping import IN_PLANE
-from heelstrike.robot.model import NUMBERS, SCALES, bounds
+from heelstrike.robot.model import NUMBERS, SCALES, Floats, Integers, bounds
 from heelstrike.robot.shapes.convex import lowest_chain, touches_first
 from heelstrike.robot.warning import warn
 from heelstrike.tolerances import LEVEL_GROUND, ONE_POINT
@@ -96,7 +95,7 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
         turn = pose.geom_xmat[geom].reshape(3, 3)
         if model.geom_type[geom] == MESH:
             vertices = pose.geom_xpos[geom, ::2] + mesh_corners(file, geom) @ turn[::2].T
-            shape: tuple[NDArray[np.float64], float] | None = (lowest_chain(vertices), 0.0)
+            shape: tuple[Floats, float] | None = (lowest_chain(vertices), 0.0)
         else:
             shape = _outline(
                 int(model.geom_type[geom]), model.geom_size[geom], pose.geom_xpos[geom], turn
@@ -189,9 +188,7 @@ def _geoms_that_touch(file: MujocoFile, links: Links) -> list[int]:
     return [g for g in candidates if g in met or _touches(file, g, np.array(ground), excluded)]
 
 
-def _touches(
-    file: MujocoFile, geom: int, ground: NDArray[np.int64], excluded: set[tuple[int, int]]
-) -> bool:
+def _touches(file: MujocoFile, geom: int, ground: Integers, excluded: set[tuple[int, int]]) -> bool:
     """Whether the file lets a geom collide with any of the ground."""
     model = file.model
     types, affinities = model.geom_contype, model.geom_conaffinity
@@ -218,9 +215,7 @@ def _mention_terrain(file: MujocoFile, ground: Iterable[int]) -> None:
         )
 
 
-def _outline(
-    kind: int, size: NDArray[np.float64], center: NDArray[np.float64], turn: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], float] | None:
+def _outline(kind: int, size: Floats, center: Floats, turn: Floats) -> tuple[Floats, float] | None:
     """Centres (world x, z) and radius of the discs that stand for a geom; None if it has none."""
     middle = center[::2]
     along = turn[::2, 2]  # the geom's own axis (third column), seen in the plane
@@ -241,13 +236,13 @@ def _outline(
     return None
 
 
-def _corners(middle: NDArray[np.float64], half: NDArray[np.float64]) -> NDArray[np.float64]:
+def _corners(middle: Floats, half: Floats) -> Floats:
     """Corners of the box with centre `middle` and half edges `half`, seen in the plane."""
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * len(half))).reshape(len(half), -1).T
     return middle + signs @ half
 
 
-def _sole(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sole(corners: Floats) -> Floats:
     """Two corners between which a flat ground would carry the shape, back to front.
 
     They are the ends of the edge of the convex hull that leaves the lowest corner least steeply.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from heelstrike.arguments import refusal
 from heelstrike.errors import RobotError
 from heelstrike.robot.model import Floats
 from heelstrike.robot.state import State
+from heelstrike.wording import meant
 
 if TYPE_CHECKING:
     from heelstrike.robot.robot import Robot
@@ -38,8 +38,7 @@ def index_of(robot: Robot, what: str, names: tuple[str, ...], given: str | int) 
         and -len(names) <= given < len(names)
     ):
         return int(given) % len(names)
-    near = difflib.get_close_matches(str(given), names, n=1)
-    guess = f" Did you mean {near[0]!r}?" if near else ""
+    guess = meant(str(given), names)
     known = ", ".join(dict.fromkeys(names)) or "none"
     raise RobotError(
         f"robot {robot.name!r} has no {what} {given!r}.{guess} It has {known}"

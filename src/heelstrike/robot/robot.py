@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -84,6 +84,8 @@ class Robot(ShownInNotebooks):
     """Joints of its file that do not move here, as ``projected=True`` makes them."""
     outlines: tuple[Outline, ...] = field(default=(), repr=False)
     """What its links look like, for pictures; nothing if its file has no shapes."""
+    constraints: tuple[Any, ...] = field(default=(), repr=False)
+    """What else holds it in simulations, by :func:`~heelstrike.sim.constrained`."""
 
     def __post_init__(self) -> None:
         if self.mirror is not None:

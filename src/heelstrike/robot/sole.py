@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Foot, Robot
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

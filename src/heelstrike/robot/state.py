@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.arguments import are_numbers, refusal
 from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 
 
 @dataclass(frozen=True)
 class State:
     """Position and velocity of a robot at one instant."""
 
-    q: NDArray[np.float64]
+    q: Floats
     """(nq,) Generalised positions (m, rad)."""
-    v: NDArray[np.float64]
+    v: Floats
     """(nv,) Generalised velocities (m/s, rad/s)."""
 
     def __post_init__(self) -> None:
@@ -27,6 +27,6 @@ class State:
         object.__setattr__(self, "v", np.array(self.v, dtype=np.float64))
 
     @property
-    def vector(self) -> NDArray[np.float64]:
+    def vector(self) -> Floats:
         """Positions, then velocities, (nq + nv,)."""
         return np.concatenate((self.q, self.v))

@@ -7,8 +7,13 @@ its kernels are handed, and the kernels that those of this package call.
 from heelstrike.compiler.compilation import kernel as kernel
 from heelstrike.contact.modes import SOLVED as SOLVED
 from heelstrike.contact.problem import solve_contact_kernel as solve_contact_kernel
+from heelstrike.contact.sets import ImpulseSet
 from heelstrike.dynamics.kernels import integrate as integrate
 from heelstrike.dynamics.kernels import passive_force as passive_force
+from heelstrike.dynamics.places import add_point_row as add_point_row
+from heelstrike.dynamics.places import point_at as point_at
+from heelstrike.dynamics.places import point_bias as point_bias
+from heelstrike.dynamics.places import point_velocity as point_velocity
 from heelstrike.sim.batch import Batch, simulate_batch
 from heelstrike.sim.clock import Clock as Clock
 from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus, Scheme
@@ -24,6 +29,7 @@ from heelstrike.sim.compliant.law import NormalLaw as NormalLaw
 from heelstrike.sim.contacts.brakes import find_loops_of_step as find_loops_of_step
 from heelstrike.sim.contacts.brakes import note_brakes as note_brakes
 from heelstrike.sim.contacts.brakes import share_friction as share_friction
+from heelstrike.sim.contacts.candidates import find_constraints as find_constraints
 from heelstrike.sim.contacts.candidates import hold_latched as hold_latched
 from heelstrike.sim.contacts.candidates import list_candidate as list_candidate
 from heelstrike.sim.contacts.candidates import list_dry_joints as list_dry_joints
@@ -31,6 +37,7 @@ from heelstrike.sim.contacts.candidates import locate_stops as locate_stops
 from heelstrike.sim.contacts.candidates import note_answer as note_answer
 from heelstrike.sim.contacts.candidates import note_group as note_group
 from heelstrike.sim.contacts.candidates import write_rows as write_rows
+from heelstrike.sim.contacts.constraint import Constraint, constrained
 from heelstrike.sim.contacts.geometry import add_impulse as add_impulse
 from heelstrike.sim.contacts.geometry import assemble_delassus as assemble_delassus
 from heelstrike.sim.contacts.geometry import contact_rows as contact_rows
@@ -45,6 +52,7 @@ from heelstrike.sim.contacts.loops import close_loops as close_loops
 from heelstrike.sim.contacts.loops import free_loops as free_loops
 from heelstrike.sim.contacts.loops import rows_of as rows_of
 from heelstrike.sim.contacts.loops import steady_loops as steady_loops
+from heelstrike.sim.contacts.rows import CONSTRAINT as CONSTRAINT
 from heelstrike.sim.contacts.rows import DRY_JOINT as DRY_JOINT
 from heelstrike.sim.contacts.rows import LOOP as LOOP
 from heelstrike.sim.contacts.rows import POINT as POINT
@@ -80,6 +88,7 @@ __all__ = [
     "BristleFriction",
     "Certificates",
     "Compliant",
+    "Constraint",
     "Contacts",
     "Controller",
     "ControllerWarning",
@@ -88,6 +97,7 @@ __all__ = [
     "EventDriven",
     "EventKind",
     "HuntCrossley",
+    "ImpulseSet",
     "KelvinVoigt",
     "Kernels",
     "Logged",
@@ -105,6 +115,7 @@ __all__ = [
     "TimeStepping",
     "Timing",
     "UnknownMethod",
+    "constrained",
     "load_run",
     "load_snapshot",
     "simulate",

@@ -34,7 +34,7 @@ from heelstrike.sim.controller.law import Law, law_of
 from heelstrike.sim.controller.raised import tell
 from heelstrike.sim.frame import compiled_loop, fixed_for
 from heelstrike.sim.memory import allocate_memory
-from heelstrike.sim.method import Method, work_of
+from heelstrike.sim.method import Method, check_constraints, work_of
 from heelstrike.sim.push import Push, pushes_on
 from heelstrike.sim.record.size import check_runs
 from heelstrike.sim.run import COUNTS, WORST, Run, Timing
@@ -304,8 +304,8 @@ class _Task(NamedTuple):
 
 def _fixed(method: Method, setting: Setting) -> Fixed:
     """Return what the loop of a run can take for granted."""
-    model, ground = setting.robot.model, setting.ground.model()
-    return fixed_for(model, ground, work_of(method, setting.robot), method.usual_numbers)
+    ground = setting.ground.model()
+    return fixed_for(setting.robot, ground, work_of(method, setting.robot), method.usual_numbers)
 
 
 def _task(
@@ -316,6 +316,7 @@ def _task(
     about.pop("controller")
     setting = checked_setting(robot, state, **setup, **about)
     check_duration(duration)
+    check_constraints(method, setting)
     method.check(setting)
     has_warned(method, setting)
     method.check_span(setting, duration)

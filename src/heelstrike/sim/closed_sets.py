@@ -86,6 +86,9 @@ class EventKind(enum.IntEnum):
     ``JOINT_BRAKE``
         A brake that was put on took hold of a joint, whose index the event's `contact` is, with the
         impulse on its coordinate (N m s, N s of a slide) that it took.
+    ``CONSTRAINT_HOLDS``, ``CONSTRAINT_LETS_GO``
+        A constraint from outside came to hold, as a cable that becomes taut, with its impulse; or
+        it let go. The event's `contact` is its place among the robot's constraints.
     """
 
     TOUCHDOWN = 0
@@ -104,11 +107,18 @@ class EventKind(enum.IntEnum):
     WEDGED = 13
     JOINT_RELEASE = 14
     JOINT_BRAKE = 15
+    CONSTRAINT_HOLDS = 16
+    CONSTRAINT_LETS_GO = 17
 
     @property
     def of_joint(self) -> bool:
         """Whether it happens to a joint, and not to a contact point."""
         return self.name.startswith("JOINT_")
+
+    @property
+    def of_constraint(self) -> bool:
+        """Whether it happens to a constraint from outside."""
+        return self.name.startswith("CONSTRAINT_")
 
 
 class Scheme(enum.IntEnum):

@@ -30,6 +30,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.solvers.certified_solve import try_solvers
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Model
+from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.controller.asking import ask
 from heelstrike.sim.controller.control import Control
@@ -200,22 +201,25 @@ def frame(kernels: Kernels) -> Callable[..., int]:
 
 PLAIN: Fixed = (
     ("loops", 0), ("couplings", 0), ("latches", 0), ("brakes", 0), ("loop_rows", 0), ("nd", 0),
-    ("segments", 1), ("concave", 0),
+    ("segments", 1), ("concave", 0), ("curved", 0), ("constraints", 0), ("ties", 0),
 )  # fmt: skip
 """What a robot and a ground without rarer features have none of.
 
-A loop that is made for these has no code for closed loops, latches, brakes, dry friction, profiles.
+A loop that is made for these has no code for closed loops, latches, brakes, dry friction,
+constraints from outside, profiles or curves.
 """
 
 
-def fixed_for(model: Model, ground: GroundModel, work: Any, usual: Mapping[str, int]) -> Fixed:
+def fixed_for(robot: Robot, ground: GroundModel, work: Any, usual: Mapping[str, int]) -> Fixed:
     """Return what the loop of a simulation can take for granted: all that is rare, or nothing.
 
     Two loops a method are enough: each is compiled when it is first needed.
     """
+    model = robot.model
     dry = model.dry_friction.any() or np.isfinite(model.brake_limit).any()
-    rare = dry or model.loops or model.couplings or model.latches or model.brakes
-    plain = not rare and ground.friction.size == 1
+    joints = dry or model.loops or model.couplings or model.latches or model.brakes
+    rare = joints or len(robot.constraints)
+    plain = not rare and ground.friction.size == 1 and ground.curved == 0
     if not (plain and all(getattr(work, name) == value for name, value in usual.items())):
         return ()
     return PLAIN + tuple(usual.items())

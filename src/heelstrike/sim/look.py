@@ -38,7 +38,7 @@ class Look:
     @cached_property
     def _scratch(self) -> tuple[Workspace, Surface]:
         extents = self._robot.model.extents
-        return Workspace.allocate(extents), Surface.allocate(capacity=self._robot.nc)
+        return Workspace.allocate(extents), Surface.allocate(extents, capacity=self._robot.nc)
 
     @cached_property
     def _mold(self) -> Mold[Contacts]:

@@ -14,19 +14,23 @@ from heelstrike.contact.modes import STICK
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
-from heelstrike.dynamics.loops import LoopRows, most_rows
+from heelstrike.dynamics.loops import LoopRows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.contacts.constraint import friction_of
 from heelstrike.sim.contacts.rows import (
     BRAKE,
+    CONSTRAINT,
     DRY_JOINT,
     LOOP,
     POINT,
     SECOND_FACE,
     Rows,
     lay_out_rows,
+    most_rows,
 )
 from heelstrike.sim.contacts.straight_line import straight_line_programs, usual_points
+from heelstrike.sim.contacts.writers import lay_out_ties
 from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.push import Push, Pushes, pushes_on
@@ -85,8 +89,12 @@ class Surface(Bundle):
 
     friction: Floats = array("capacity")
     restitution: Floats = array("capacity")
-    """friction, restitution: Of contact points and their second faces; of joint stops zero, and
-    friction 1 of dry joints. Numbered by the table of rows."""
+    """friction, restitution: Of contact points and their second faces; of joint stops zero, of
+    constraints their own, and friction 1 of dry joints and what else rubs. Numbered by the table of
+    rows."""
+    bend: Floats = array("nc")
+    """Curvature (1/m) of the way along the ground of the centre of each contact point's disc,
+    positive over a hill: zero but on smooth ground."""
 
 
 class Assembly(Bundle):
@@ -144,7 +152,7 @@ class Reaction(Bundle):
 
 
 class Loops(Bundle):
-    """What holds besides the joints: closed loops, coupled joints, latches and brakes."""
+    """What holds besides the joints: closed loops, coupled joints, latches, brakes and ties."""
 
     rows: LoopRows = part(LoopRows)
     """Their equations in the state now."""
@@ -172,6 +180,11 @@ class Loops(Bundle):
     """Where those that are on hold their joints (rad, m)."""
     brake_force: Floats = array("brakes")
     """What they held them with in the last solve."""
+    tie: Integers = array("ties", 3, of=int, address=True)
+    """Of each constraint that never lets go where its machine code is, and its numbers; and how
+    many rows it has."""
+    constraint_force: Floats = array("constraints", "components")
+    """Forces of all constraints along their rows in the last solve."""
 
 
 class Reported(Bundle):
@@ -259,14 +272,14 @@ _MOLDS: WeakKeyDictionary[Robot, Mold[Memory]] = WeakKeyDictionary()
 
 def _laid_out(robot: Robot) -> Memory:
     nc, model = robot.nc, robot.model
-    rows = lay_out_rows(model)
+    rows = lay_out_rows(robot)
     points = usual_points(robot)
     place = np.full(nc, -1)
     place[points] = np.arange(len(points))
     most = len(rows.kind)
     extents = {
         **model.extents, "kinds": len(rows.first), "capacity": most,
-        "points": len(points), "components": 2, "loop_rows": most_rows(model),
+        "points": len(points), "components": 2, "loop_rows": most_rows(robot),
     }  # fmt: skip
     programs = straight_line_programs(model, points)
     assembly = Assembly.allocate(
@@ -300,12 +313,17 @@ def _laid_out(robot: Robot) -> Memory:
             every_point=np.arange(nc),
         ),
         loops=Loops.allocate(
-            extents, entry=np.arange(rows.first[LOOP], most),
+            extents, constraints=len(robot.constraints), tie=lay_out_ties(robot),
+            entry=np.arange(rows.first[LOOP], most),
             brake_entry=np.arange(rows.first[BRAKE], rows.end[BRAKE]),
         ),
         pushes=pushes_on(robot, ()),
     )  # fmt: skip
     memory.surface.friction[rows.first[DRY_JOINT] : rows.end[DRY_JOINT]] = 1.0
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        constraint = robot.constraints[rows.owner[entry]]
+        memory.surface.restitution[entry] = constraint.restitution
+        memory.surface.friction[entry] = friction_of(constraint)
     memory.reaction.mode[rows.first[LOOP] :] = STICK
     memory.reported.resting[:] = -1
     return memory

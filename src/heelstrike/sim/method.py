@@ -14,17 +14,22 @@ from dataclasses import field
 from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.mold import Mold
 from heelstrike.contact import problem
+from heelstrike.contact.sets import ImpulseSet
 from heelstrike.errors import ContactProblemError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
+from heelstrike.sim.contacts.constraint import constraint_names, is_line
+from heelstrike.sim.contacts.writers import gaps_at
 from heelstrike.sim.frame import Kernels
 from heelstrike.sim.record.size import check_room, check_steps
-from heelstrike.sim.setting import Setting
+from heelstrike.sim.setting import OPEN_LOOP, Setting
 
 
 class Method(ABC):
@@ -69,6 +74,10 @@ class Method(ABC):
 
     impulses_in_events: ClassVar[bool] = False
     """Whether impulses of impacts are in the events of a run, not in the forces of its rows."""
+
+    holds: ClassVar[frozenset[ImpulseSet]] = frozenset()
+    """Sets of the constraints from outside that it can simulate. The kernels of `heelstrike.sim`
+    for loops hold those that are lines."""
 
     python_period: ClassVar[float | None] = None
     """Seconds between two calls of a Python controller without a period of its own; None for
@@ -287,6 +296,33 @@ class Method(ABC):
             In a person's words.
         """
         return ""
+
+
+def check_constraints(method: Method, setting: Setting) -> None:
+    """Refuse constraints that a method cannot simulate, or that a state breaks.
+
+    Raises
+    ------
+    SimulationError
+        That says which, and what to do instead.
+    """
+    robot = setting.robot
+    names = constraint_names(robot)
+    for name, each in zip(names, robot.constraints, strict=True):
+        if each.set not in method.holds:
+            told = each.set.name.lower().replace("_", "-")
+            raise SimulationError(
+                f"{method.name} cannot simulate constraint {name}, whose set is a {told}; "
+                "TimeStepping() can"
+            )
+    gaps = gaps_at(robot, setting.state)
+    for name, each, gap in zip(names, robot.constraints, gaps, strict=True):
+        open_by = float(np.max(np.abs(gap))) if is_line(each) else -float(gap[0])
+        if each.set is not ImpulseSet.INTERVAL and not open_by <= OPEN_LOOP:
+            raise SimulationError(
+                f"in this state constraint {name} of robot {robot.name!r} is broken by "
+                f"{open_by:.3g} (m, rad); begin where it holds"
+            )
 
 
 def work_of(method: Method, robot: Robot) -> Any:

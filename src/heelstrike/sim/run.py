@@ -23,6 +23,7 @@ from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.contacts.constraint import constraint_names
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import Push
 from heelstrike.sim.snapshot import Snapshot
@@ -87,7 +88,7 @@ class Event:
     kind: EventKind
     """Touchdown, lift-off, beginning of slip or of stick."""
     contact: int
-    """Index of the contact point, or of the joint of a ``JOINT_`` event."""
+    """Index of the contact point, of the joint of a ``JOINT_`` event, or of the constraint."""
     impulse: tuple[float, float]
     """Impulse (normal, tangent) on the robot over the step in which it happened, in N s. Of a
     ``BRIDGE`` its length (s) and how far it may be wrong."""
@@ -110,7 +111,9 @@ class Event:
         str
             The name.
         """
-        names = robot.joint_names if self.kind.of_joint else robot.contact_names
+        names: Sequence[str] = robot.joint_names if self.kind.of_joint else robot.contact_names
+        if self.kind.of_constraint:
+            names = constraint_names(robot)
         somewhere = self.kind is not EventKind.BRIDGE and 0 <= self.contact < len(names)
         return names[self.contact] if somewhere else ""
 
@@ -240,6 +243,11 @@ class Run(ShownInNotebooks):
         label="force of the brakes on their joints",
     )  # fmt: skip
     """Zero while it is off."""
+    constraint_force: Floats = recorded(
+        "constraints", "components", of="loops.constraint_force", unit="N or N m", later=True,
+        label="force of the constraints from outside along their rows",
+    )  # fmt: skip
+    """On the robot as Jᵀ λ, mean over the step that follows."""
     residual: Floats = recorded(
         "conditions", of="assembly.answer.residual", unit="1",
         label="relative residuals of the contact problem",

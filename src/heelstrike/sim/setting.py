@@ -157,12 +157,16 @@ def checked_pushes(robot: Robot, pushes: Sequence[Push] | Push) -> tuple[Push, .
 def identity_of(setting: Setting, method: Method, controller: str) -> dict[str, str]:
     """Say what a snapshot is one of: a simulation that is the same in this can take it up."""
     return {
-        "robot": f"{setting.robot.name} {model_digest(setting.robot.model)}",
+        "robot": f"{setting.robot.name} {model_digest(setting.robot.model)}{_held_by(setting)}",
         "method": repr(method),
         "controller": controller + (", checked" if setting.checked else ""),
         "control_period": str(setting.control_period),
         "record_every": str(setting.record_every),
     }
+
+
+def _held_by(setting: Setting) -> str:
+    return f", {setting.robot.constraints}" if setting.robot.constraints else ""
 
 
 _DIGESTS: WeakKeyDictionary[Model, str] = WeakKeyDictionary()

@@ -40,7 +40,7 @@ from heelstrike.sim.frame import Outcome, compiled_loop, fixed_for
 from heelstrike.sim.image import Camera
 from heelstrike.sim.look import Look
 from heelstrike.sim.memory import Memory, allocate_memory
-from heelstrike.sim.method import Method, UnknownMethod, work_of
+from heelstrike.sim.method import Method, UnknownMethod, check_constraints, work_of
 from heelstrike.sim.push import Push, numbers_of_pushes, pushes_of_numbers, pushes_on
 from heelstrike.sim.record.record import Record, allocate_record
 from heelstrike.sim.run import Run, Timing, counted, joined, tallied
@@ -251,8 +251,8 @@ class Simulation:
 
     def _choose_loop(self) -> float:
         """Take the loop that is made for what this robot, ground and method do not have."""
-        model, method = self.robot.model, self.method
-        fixed = fixed_for(model, self._ground.model(), self._work, method.usual_numbers)
+        method = self.method
+        fixed = fixed_for(self.robot, self._ground.model(), self._work, method.usual_numbers)
         self._loop, compile_s = compiled_loop(method.kernels, method.work, fixed)
         return compile_s
 
@@ -312,7 +312,8 @@ class Simulation:
             )
         self._check(replace(self._setting, ground=ground, state=self.state))
         mine, its = self._ground.numbers(), ground.numbers()
-        if not all(np.array_equal(mine[name], its[name]) for name in mine):
+        alike = mine.keys() == its.keys()
+        if not (alike and all(np.array_equal(mine[name], its[name]) for name in mine)):
             self.method.forget_ground(self.robot, self._work, self._clock)
             self._clock.moving = 0
         self._ground = ground
@@ -320,6 +321,7 @@ class Simulation:
 
     def _check(self, setting: Setting) -> None:
         """Refuse what the method cannot simulate, and warn of what it can hardly, once."""
+        check_constraints(self.method, setting)
         self.method.check(setting)
         self._has_warned = self._has_warned or has_warned(self.method, setting)
 

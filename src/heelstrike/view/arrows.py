@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from numpy.typing import NDArray
 
+from heelstrike.robot.model import Floats
 from heelstrike.view.style import FORCE_COLOR
-
-Floats = NDArray[np.float64]
 
 HEAD_LENGTH = 0.035
 """Length of an arrow's head as a fraction of the robot's size."""

@@ -10,14 +10,12 @@ from heapq import heapify, heappop, heappush
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.dynamics import link_poses
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.shapes.convex import nearest_points
 from heelstrike.robot.shapes.outlines import Outline
-
-Floats = NDArray[np.float64]
 
 THICKNESS = 0.25
 """Radius of a bar as a share of the narrow side of the slimmest shape that it leads to."""

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from heelstrike.robot import Robot
+from heelstrike.robot.model import Floats
 from heelstrike.view.style import (
     FOOT_COLORS,
     INK,
@@ -18,8 +18,6 @@ from heelstrike.view.style import (
     new_figure,
     styled,
 )
-
-Floats = NDArray[np.float64]
 
 PANELS = (
     ("position", "positions (rad, m)"),

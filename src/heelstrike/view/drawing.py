@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import in_world
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import LinkPoses, link_poses
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import are_around
 from heelstrike.sim.push import Push
@@ -43,7 +43,6 @@ from heelstrike.view.style import (
     styled,
 )
 
-Floats = NDArray[np.float64]
 Bone = tuple[int, Floats, int, Floats, float]  # link, place, link, place, width
 
 DISC_CORNERS = 16
@@ -68,15 +67,15 @@ class Side(enum.IntEnum):
 class Skeleton:
     """Line segments fixed to the links of a robot."""
 
-    link: NDArray[np.int64]
+    link: Integers
     """(ns, 2) Link of each end of each segment."""
     local: Floats
     """(ns, 2, 2) Place (x, z) of each end in the frame of its link, in m."""
     width: Floats
     """(ns,) Line width in points."""
-    side: NDArray[np.int64]
+    side: Integers
     """(ns,) `Side` of each segment."""
-    foot: NDArray[np.int64]
+    foot: Integers
     """(ns,) Index of the foot at the end of the segment's leg, -1 for the trunk."""
     pieces: tuple[slice, ...] = ()
     """Segments that go round an outline, or are a bone, in the order of drawing; empty where all
@@ -275,7 +274,7 @@ def _disc(center: Floats, radius: float) -> list[tuple[Floats, Floats]]:
     return list(pairwise(rim))
 
 
-def legs(robot: Robot) -> NDArray[np.int64]:
+def legs(robot: Robot) -> Integers:
     """Index of the foot whose leg each link belongs to, -1 if it carries none or several."""
     carried: list[set[int]] = [set() for _ in range(robot.nv)]
     for index, foot in enumerate(robot.feet):
@@ -297,7 +296,7 @@ def leg_labels(robot: Robot) -> list[tuple[str, str]]:
     return [(foot_color(i), in_words(foot.name)) for i, foot in enumerate(robot.feet)]
 
 
-def _sides(robot: Robot) -> NDArray[np.int64]:
+def _sides(robot: Robot) -> Integers:
     """Near and far links. Of two mirrored ones the left one, or else the later one, is far."""
     side = np.full(robot.nv, int(Side.MIDDLE))
     if robot.mirror is None:
@@ -383,7 +382,7 @@ def robot_picture(
             height = float(points[:, 1].min()) if len(points) else float(low[1])
             surface = np.array([[left, height], [right, height]])
         else:
-            surface = ground_outline(ground, left, right)
+            surface = ground.outline(left, right)
         bottom = float(surface[:, 1].min()) - 0.06 * size
         axes.fill_between(surface[:, 0], surface[:, 1], bottom, color=PALE, lw=0.0, zorder=0)
         _draw_pushes(axes, robot, poses, pushes, size)
@@ -457,14 +456,6 @@ def _contact_bottoms(robot: Robot, origin: Floats, angle: Floats) -> Floats:
     model, link = robot.model, robot.model.contact_link
     center = in_world(origin[link], angle[link], model.contact_position)
     return center - np.outer(model.contact_radius, [0.0, 1.0])
-
-
-def ground_outline(ground: Ground, left: float, right: float) -> Floats:
-    """Corners (x, z) of the surface of the ground from one x to another, (n, 2), in m."""
-    corners = ground.model().vertices
-    inside = corners[(corners[:, 0] > left) & (corners[:, 0] < right)]
-    ends = np.array([[x, float(ground.height(x))] for x in (left, right)])
-    return np.concatenate((ends[:1], inside, ends[1:]))
 
 
 def extent(segments: Floats) -> tuple[Floats, Floats]:

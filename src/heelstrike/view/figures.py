@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -17,6 +16,7 @@ from heelstrike.view import contact_figures, energy_figure, joint_figures, snaps
 from heelstrike.view.panels import Excerpt
 from heelstrike.view.quantity_figure import draw_quantity
 from heelstrike.view.style import save_figure, styled
+from heelstrike.wording import meant
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
@@ -109,8 +109,7 @@ def _rows(run: Run, span: tuple[float, float] | None) -> slice:
 
 
 def _unknown(what: str, logged: tuple[str, ...]) -> str:
-    near = difflib.get_close_matches(str(what).lower(), (*FIGURES, *QUANTITIES, *logged), n=1)
-    guess = f" Did you mean {near[0]!r}?" if near else ""
+    guess = meant(str(what).lower(), (*FIGURES, *QUANTITIES, *logged))
     names = " ".join(f"{name}: {drawing.__doc__}" for name, drawing in _DRAWINGS.items())
     return (
         f"there is no figure called {what!r}.{guess} There are: {names} And what is recorded: "

@@ -15,13 +15,13 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import run_motion
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows, draw_scale
-from heelstrike.view.drawing import body, extent, ground_outline, leg_labels
+from heelstrike.view.drawing import body, extent, leg_labels
 from heelstrike.view.style import (
     FORCE_COLOR,
     GREY,
@@ -30,8 +30,6 @@ from heelstrike.view.style import (
     PALE,
     ZERO_MOMENT_POINT_COLOR,
 )
-
-Floats = NDArray[np.float64]
 
 DPI = 100
 FOLLOWS_WITHIN = 0.6
@@ -44,7 +42,7 @@ class Frames:
 
     time: Floats
     """(nf,) Time of each frame, in s."""
-    row: NDArray[np.int64]
+    row: Integers
     """(nf,) Row of the run that each frame shows."""
     segments: Floats
     """(nf, ns, 2, 2) The robot."""
@@ -205,7 +203,7 @@ class Film:
 
     def _draw_ground(self, camera: Floats) -> None:
         left, right = self._x
-        outline = ground_outline(self._ground, left + camera[0], right + camera[0]) - camera
+        outline = self._ground.outline(left + camera[0], right + camera[0]) - camera
         below = self._z[0] - 1.0
         self._soil.set_xy(np.concatenate((outline, [[right, below], [left, below]])))
         marks = np.arange(np.ceil(2.0 * (left + camera[0])), 2.0 * (right + camera[0])) / 2.0

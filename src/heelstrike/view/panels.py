@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Run
 from heelstrike.view.style import (
@@ -27,7 +28,6 @@ from heelstrike.view.style import (
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
 
-Floats = NDArray[np.float64]
 
 WIDTH = 9.0  # inches
 # Points: each curve is wider than the one that is drawn over it, so that neither hides the other.

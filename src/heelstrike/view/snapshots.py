@@ -7,13 +7,13 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.support import walking_steps
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows, draw_scale
-from heelstrike.view.drawing import body, extent, ground_outline, leg_labels
+from heelstrike.view.drawing import body, extent, leg_labels
 from heelstrike.view.panels import Excerpt, impact_rows
 from heelstrike.view.style import FORCE_COLOR, PALE, figure_title, new_figure
 
@@ -39,7 +39,7 @@ def draw_snapshots(excerpt: Excerpt) -> Figure:
     shift = np.column_stack((spacing * np.arange(POSES), np.zeros(POSES))) - origin
     for i, row in enumerate(at):
         axes.add_collection(shape.drawn(segments[i] + shift[i], 0.55))
-        surface = ground_outline(run.ground, center[i] - 0.5 * spacing, center[i] + 0.5 * spacing)
+        surface = run.ground.outline(center[i] - 0.5 * spacing, center[i] + 0.5 * spacing)
         below = surface - [0.0, 0.02 * size]
         axes.fill(*(np.concatenate((surface, below[::-1])) + shift[i]).T, color=PALE, zorder=0)
         axes.annotate(
@@ -73,7 +73,7 @@ def draw_snapshots(excerpt: Excerpt) -> Figure:
     return figure
 
 
-def _usual_rows(run: Run, times: NDArray[np.float64]) -> NDArray[np.int64]:
+def _usual_rows(run: Run, times: Floats) -> Integers:
     """Rows at the given times, but the impacts' ones: after the first, before the last."""
     usual = np.flatnonzero(~impact_rows(run))
     if not len(usual):

@@ -21,9 +21,9 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
-from numpy.typing import NDArray
 
 from heelstrike.errors import ViewError, WriteError
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.whole_file import check_target, write_whole
 
@@ -195,7 +195,7 @@ def figure_title(figure: Figure, robot: Robot, title: str, *, note: str = "") ->
         figure.text(0.99, 0.985, note, ha="right", va="top", fontsize=8.5, color=GREY)
 
 
-def time_axis(axes: Axes, time: NDArray[np.float64], *, labelled: bool = True) -> None:
+def time_axis(axes: Axes, time: Floats, *, labelled: bool = True) -> None:
     """Let the x axis show a span of time, without margins."""
     if time[-1] > time[0]:
         axes.set_xlim(time[0], time[-1])

@@ -5,13 +5,12 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from fresh_python import fresh_python
 from synthetic_runs import box, make_run
 
 import heelstrike as hs
@@ -140,9 +139,7 @@ def test_what_the_system_does_not_grant(tmp_path: Path) -> None:
         "resource.setrlimit(resource.RLIMIT_AS, (2**31, 2**31));"
         "record_size.machine_memory = lambda: 2**40; print(record_size.room())"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
+    done = fresh_python("-c", script)
     assert 2**27 < int(done.stdout) < 2**31
 
 

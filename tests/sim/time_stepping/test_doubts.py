@@ -124,6 +124,28 @@ def test_where_a_spring_or_damper_becomes_too_stiff(share: float) -> None:
     assert largest >= 1e3
 
 
+@pytest.mark.parametrize(("share", "doubtful"), [(0.32, False), (0.35, True)])
+def test_how_wrong_the_energy_of_a_spring_may_be(share: float, doubtful: bool) -> None:
+    """With s = h ω / 2 the energy of a swing goes to and fro between E and (1 + s) / (1 − s) E."""
+    inertia, stiffness = 0.5, 0.5 * (2.0 * share / 1e-3) ** 2
+    build = hs.RobotBuilder("wheel", gravity=0.0)
+    build.hinge("axle", None, mass=1.0, inertia=inertia, stiffness=stiffness)
+    run = hs.simulate(
+        build.build(), state=hs.State([1e-3], [0.0]), duration=0.4, method=hs.TimeStepping(),
+        stop_when_fallen=False,
+    )  # fmt: skip
+    energy = 0.5 * inertia * run.velocity[:, 0] ** 2 + 0.5 * stiffness * run.position[:, 0] ** 2
+    told = (1.0 + share) / (1.0 - share)
+    assert energy.max() / energy.min() == pytest.approx(told, rel=1e-2)
+    assert (f"tells up to {told:.2g} times its energy" in run.doubt) == doubtful
+
+
+def test_no_robot_of_the_library_is_in_doubt() -> None:
+    for name in hs.builtin_robots():
+        robot = hs.load_robot(name)
+        assert not hs.TimeStepping().doubts(robot, robot.reference_state().q)
+
+
 def test_a_step_that_ends_deep_in_the_ground_is_no_good_run() -> None:
     """Moreau and Jean foresee half a step: at 1.3 m/s and 40 ms the foot gets 2 cm into it.
 

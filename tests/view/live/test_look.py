@@ -44,6 +44,11 @@ LAID_OUT = """() => {
   for (const each of document.querySelectorAll("button, select, input"))
     if (!(each.getAttribute("aria-label") || each.textContent.trim() || each.labels?.length))
       wrong.push(`${each.tagName} ${each.id} has no name`);
+  for (const each of document.querySelectorAll("#sliders b"))
+    if (shown(each) && each.scrollWidth > each.clientWidth)
+      wrong.push(`${each.textContent} is cut`);
+  const side = document.getElementById("side");
+  if (innerWidth >= 1440 && side.scrollHeight > side.clientHeight) wrong.push("a panel is cut");
   const plane = document.getElementById("plane").getBoundingClientRect();
   if (plane.width < 0.4 * innerWidth || plane.height < 230) wrong.push("a small picture");
   return wrong;

@@ -21,8 +21,8 @@ ANSWERS = {Cause.TORQUE_LIMIT: 0.02, Cause.SPEED_LIMIT: 0.02, Cause.CONTROLLER: 
 """What a controller shows that answers something else, such as a foot that slips or tips, and how
 long before (s) that is seen: a foot that begins to tip turns slowly at first."""
 SUNK = 0.8
-"""Height of the centre of mass above the ground, in that at the start, of a robot that is falling
-when its run ends."""
+"""Height of the centre of mass above the ground, in that at the start, of a robot that goes
+down."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
     Returns
     -------
     Fall or None
-        Nothing if the run lasted as long as it was asked to and the robot is still up, or its
-        controller ended it while nothing went wrong.
+        Nothing if the run lasted as long as it was asked to and the robot is still up and was so
+        for a step and a half, or its controller ended it while nothing went wrong.
 
     Raises
     ------
@@ -118,12 +118,13 @@ def walked_on(run: Run, fall: Fall | None) -> bool:
 
 
 def _sinks(walk: Walk) -> bool:
-    """Whether a robot on feet is on its way down when its run ends."""
+    """Whether a robot on feet goes down, or did so too shortly before the end to have recovered."""
     if not (walk.run.robot.floating and walk.run.robot.feet):
         return False
-    center = walk.motion.center_of_mass[[0, -1]]
-    height = center[:, 1] - walk.run.ground.height(center[:, 0])
-    return bool(height[1] < SUNK * height[0])
+    x, z = walk.motion.center_of_mass.T
+    height = z - walk.run.ground.height(x)
+    late = walk.run.time >= walk.run.time[-1] - RECOVERED * walk.step_duration
+    return bool(height[late].min() < SUNK * height[0])
 
 
 def _unrecovered(found: tuple[Symptom, ...], end: float, calm: float) -> list[Symptom]:

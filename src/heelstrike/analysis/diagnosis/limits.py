@@ -12,10 +12,10 @@ from heelstrike.analysis.actuation import torque_bounds
 from heelstrike.analysis.friction import friction_coefficient, friction_use
 from heelstrike.analysis.zero_moment_point import zero_moment_point
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.robot.sole import has_length, soles
 from heelstrike.sim.run import Run
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 REACHED = 1.0 - 1e-6

@@ -7,21 +7,20 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.actuation import actuator_power, cost_of_transport
 from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.slip import max_slip
-from heelstrike.analysis.support import stances, walking_steps
+from heelstrike.analysis.support import stances, step_times, walking_steps
 from heelstrike.analysis.tracking import tracking_error
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Integers
 from heelstrike.sim.run import Run
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
 
-Floats = NDArray[np.float64]
 
 MID_SWING = (0.2, 0.8)
 """Parts of a swing between which its clearance counts: the foot is on the ground at both ends."""
@@ -118,7 +117,7 @@ def measures(run: Run, gait: Gait | None = None) -> tuple[Measure, ...]:
 def _measures(run: Run, gait: Gait | None) -> Iterator[Measure]:
     motion = run_motion(run)
     landings = walking_steps(run)
-    times = [float(run.time[0]), *(landing.touchdown for landing in landings)]
+    times = step_times(run)
     rows = np.minimum(np.searchsorted(run.time, np.array(times) - 1e-9), len(run.time) - 1)
     center = motion.center_of_mass[rows, 0]
     if len(times) > 1:
@@ -182,7 +181,7 @@ def _measures(run: Run, gait: Gait | None) -> Iterator[Measure]:
             )  # fmt: skip
 
 
-def _repetition(run: Run, rows: NDArray[np.int64]) -> Iterator[Measure]:
+def _repetition(run: Run, rows: Integers) -> Iterator[Measure]:
     """How much the states after touchdowns differ from those two steps before."""
     state = np.hstack((run.position[rows, 1:], run.velocity[rows]))  # but where it is
     if len(state) > 4:

@@ -22,11 +22,12 @@ from heelstrike.analysis.diagnosis.limits import REACHED
 from heelstrike.analysis.friction import friction_coefficient
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.slip import slip_distance
-from heelstrike.analysis.support import pushing, pushing_feet, stances, walking_steps
+from heelstrike.analysis.support import pushing, pushing_feet, stances, step_times
 from heelstrike.analysis.tracking import reference_motion
 from heelstrike.analysis.wrenches import sole_points
 from heelstrike.dynamics import leg_joints
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.sole import has_length, soles
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.run import Run
@@ -34,7 +35,6 @@ from heelstrike.sim.run import Run
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 SLOW = 1e-3
@@ -160,7 +160,7 @@ class Walk:
     @cached_property
     def landings(self) -> tuple[float, ...]:
         """When steps began, in s: at the start and at the touchdowns that ended one."""
-        return (float(self.run.time[0]), *(s.touchdown for s in walking_steps(self.run)))
+        return step_times(self.run)
 
     @cached_property
     def step_duration(self) -> float:
@@ -216,7 +216,7 @@ class Walk:
         return pushing_feet(self.run)
 
     @cached_property
-    def edge(self) -> NDArray[np.int64]:
+    def edge(self) -> Integers:
         """What each foot stands on, (nt, nf): its sole, its toe or heel, or nothing.
 
         Feet without a length stand on what they have.

@@ -18,8 +18,7 @@ from scipy.linalg import null_space
 
 from heelstrike.analysis.stability.returns import Disturbed
 from heelstrike.field_texts import dataclass
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 NEUTRAL = 1e-6
 """What of an error that is still there, and of its effects on others, is nothing."""

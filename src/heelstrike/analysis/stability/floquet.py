@@ -22,13 +22,12 @@ from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.method import Method
 from heelstrike.sim.snapshot import Snapshot
-
-Floats = NDArray[np.float64]
 
 SURE = 2.0
 """A factor is told from one by so many standard errors."""

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.poincare_map import check_steps, is_wheel
 from heelstrike.contact.ground import Ground
@@ -14,6 +13,7 @@ from heelstrike.contact.linearized.slopes import along_the_ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
@@ -24,8 +24,6 @@ from heelstrike.sim.simulation import CAN_GO_ON, Simulation
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.whole_run import whole
 from heelstrike.tolerances import SAME_ROW
-
-Floats = NDArray[np.float64]
 
 LATE = 2.0
 """Disturbances (m, rad) are this many times the seconds between two calls, as a touchdown falls

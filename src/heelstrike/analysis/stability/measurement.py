@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.analysis.stability.across import Across
 from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk
@@ -20,8 +20,6 @@ from heelstrike.analysis.stability.section import Section
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
-
-Floats = NDArray[np.float64]
 
 LESS = 0.25
 """Part of a disturbance that is tried where a walk that nobody chose it for falls."""

@@ -19,6 +19,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.contact.linearized.slopes import along_the_ground, contact_slopes
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
@@ -26,8 +27,6 @@ from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.linearized.flow import Variation
 from heelstrike.sim.linearized.step import SAME_INSTANT, Motion, Saltation, linearized
 from heelstrike.sim.simulation import Simulation, simulate
-
-Floats = NDArray[np.float64]
 
 BEYOND = 1.02
 """How much longer than a step is simulated."""

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.stability.across import NEUTRAL, Across
 from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk
@@ -21,9 +20,8 @@ from heelstrike.analysis.stability.returns import Disturbed, returned, stays_ear
 from heelstrike.analysis.stability.section import Section
 from heelstrike.errors import LimitCycleError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.sim.snapshot import Snapshot
-
-Floats = NDArray[np.float64]
 
 SETTLING = 4
 """Steps before a walk is looked at."""

@@ -16,7 +16,7 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.analysis.stability.loop import ClosedLoop, Walk, steps_of
 from heelstrike.analysis.stability.measurement import Measurement, measure
@@ -28,6 +28,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
@@ -37,7 +38,6 @@ from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.whole_run import whole
 
-Floats = NDArray[np.float64]
 ROWS = 10
 """Steps of the method between two rows of a return that an indicator is told from."""
 

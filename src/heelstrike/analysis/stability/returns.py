@@ -6,17 +6,16 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.analysis.stability.loop import ClosedLoop, Walk
 from heelstrike.analysis.stability.section import Section
 from heelstrike.errors import LimitCycleError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.sim.run import Run
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.whole_run import whole
-
-Floats = NDArray[np.float64]
 
 IN_STEP = 0.1
 """A walk that is nearer to itself than it moves in this part of a sample, return by return, may be

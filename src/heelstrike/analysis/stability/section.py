@@ -13,14 +13,13 @@ from heelstrike.contact.ground import Ground
 from heelstrike.contact.linearized.standing import Chart, Standing
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.robot.model import Floats
 from heelstrike.robot.state import State
 from heelstrike.sim.compliant.method import Compliant
 from heelstrike.sim.controller.law import law_of
 from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.tolerances import STANDING_GAP, STANDING_SPEED
-
-Floats = NDArray[np.float64]
 
 TURNED = 10.0
 """m/s²: over a fixed step a standing point's Jacobian turns, and by so much of it its speed with

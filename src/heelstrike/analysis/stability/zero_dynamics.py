@@ -13,7 +13,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
@@ -23,8 +22,6 @@ from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.gait.phased.surface import Surface, Touchdown
 from heelstrike.gait.polynomials import gauss
 from heelstrike.robot.state import State
-
-Floats = NDArray[np.float64]
 
 # Phases at which the least momentum is looked for, and of the quadrature of the period.
 GRID = 2001

@@ -142,7 +142,7 @@ def plane(ground: Ground | None) -> tuple[tuple[float, float], float, float]:
         If it is not.
     """
     terrain = (Ground() if ground is None else ground).model()
-    if len(terrain.friction) > 1:
+    if len(terrain.friction) > 1 or terrain.curved:
         raise SimulationError(
             "contact is linearised on level or sloping ground, the same everywhere"
         )

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.arguments import takes
-from heelstrike.contact.ground import Ground, ground_contact
+from heelstrike.contact.ground import Ground, ground_contact, path_curvature
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics.frames import into_frame
-from heelstrike.dynamics.places import write_point_rows
+from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.errors import ContactProblemError
 from heelstrike.field_texts import dataclass
@@ -77,6 +77,11 @@ def contact_kinematics(
         acceleration = at.bias_acceleration(link, center)
         bias[i] = into_frame(normal[i], tuple(acceleration[:axes]))
         bias[i, 1] -= radius * acceleration[axes]
+        if terrain.curved:
+            at_center = velocity_at(at.work.velocity, link, place_of(at.work, center))
+            _, along = into_frame(normal[i], at_center)
+            bend = path_curvature(terrain, center[0], gap[i] + radius, normal[i])
+            bias[i, 0] += bend * along**2
         position[i] = center - radius * normal[i]
         write_point_rows(model, at.work, link, position[i], normal[i], 0, jacobian[i])
     velocity = jacobian @ at.v

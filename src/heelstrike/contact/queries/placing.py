@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from heelstrike import dynamics
-from heelstrike.contact.ground import Ground
+from heelstrike.contact.ground import Ground, GroundModel, ground_contact, ground_height
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.contact.workspace import Floats, Integers
 from heelstrike.errors import RobotError
@@ -137,6 +137,8 @@ def _above(robot: Robot, link: int) -> list[int]:
 def touching_height(ground: Ground, x: float, radius: float) -> float:
     """Height of the centre of a disc above x that touches the ground and lies in no part of it."""
     model = ground.model()
+    if ground.shape is not None:
+        return _touching_curve(model, x, radius)
     left, right = model.vertices[:-1], model.vertices[1:]
     heights = [float(ground.height(x)) + radius]
     for corner in model.vertices[np.abs(model.vertices[:, 0] - x) <= radius]:
@@ -149,6 +151,18 @@ def touching_height(ground: Ground, x: float, radius: float) -> float:
             base = left[k, 1] + slope * (x - left[k, 0])
             heights.append(float(base + radius / model.normal[k, 1]))
     return max(heights)
+
+
+def _touching_curve(model: GroundModel, x: float, radius: float) -> float:
+    """Height of the centre of a disc above x that touches smooth ground: its gap is zero."""
+    normal = np.zeros(2)
+    height = ground_height(model, x) + radius
+    for _ in range(MOST_ITERATIONS):
+        gap = ground_contact(model, x, height, radius, normal)[0]
+        height -= gap / normal[1]
+        if abs(gap) < PLACED_GAP:
+            break
+    return float(height)
 
 
 def _soles(robot: Robot) -> list[int]:

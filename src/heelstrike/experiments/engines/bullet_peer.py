@@ -9,8 +9,9 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient  # type: ignore[import-not-found,unused-ignore]
 
 from heelstrike.experiments.engines.links import Link, links
-from heelstrike.experiments.engines.peer import Engine, Floats, Peer
+from heelstrike.experiments.engines.peer import Engine, Peer
 from heelstrike.experiments.engines.scenario import Scenario
+from heelstrike.robot.model import Floats
 
 RADIUS = 1e-4
 """Least radius of a contact point, in m: Bullet's own margins are larger than nothing."""

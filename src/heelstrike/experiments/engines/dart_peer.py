@@ -8,8 +8,9 @@ import dartpy
 import numpy as np
 
 from heelstrike.experiments.engines.links import links, space
-from heelstrike.experiments.engines.peer import Engine, Floats, Peer
+from heelstrike.experiments.engines.peer import Engine, Peer
 from heelstrike.experiments.engines.scenario import Scenario
+from heelstrike.robot.model import Floats
 
 LEAST_RADIUS = 1e-4
 """Least radius of a contact point, in m: its collision detectors want spheres of some size."""

@@ -13,8 +13,9 @@ from pydrake.multibody import tree
 from pydrake.systems import analysis, framework, primitives
 
 from heelstrike.experiments.engines.links import links
-from heelstrike.experiments.engines.peer import Engine, Floats, Peer
+from heelstrike.experiments.engines.peer import Engine, Peer
 from heelstrike.experiments.engines.scenario import Scenario
+from heelstrike.robot.model import Floats
 
 FASTEST = "tamsi" if hasattr(plants.DiscreteContactApproximation, "kTamsi") else "lagged"
 """Drake calls TAMSI deprecated; it is several times as fast as what is to take its place."""

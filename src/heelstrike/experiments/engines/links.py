@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot import Robot
 from heelstrike.robot.loops import refuse_loops
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 
 @dataclass(frozen=True)

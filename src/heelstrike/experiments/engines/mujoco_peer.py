@@ -12,13 +12,11 @@ from typing import Any
 import mujoco
 import numpy as np
 from mujoco import rollout
-from numpy.typing import NDArray
 
 from heelstrike.experiments.engines.peer import Engine, InvalidRunError, Peer
 from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.robot import State
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 KIND = mujoco.mjtState.mjSTATE_FULLPHYSICS
 

@@ -9,14 +9,12 @@ from time import perf_counter
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.field_texts import dataclass
 from heelstrike.robot import Robot, State
+from heelstrike.robot.model import Floats
 from heelstrike.sim import TimeStepping
-
-Floats = NDArray[np.float64]
 
 SINKING = 0.01
 """How far a standing robot may sink into soft ground, in m."""

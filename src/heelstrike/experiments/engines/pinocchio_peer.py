@@ -12,14 +12,12 @@ from typing import Any
 
 import numpy as np
 import pinocchio
-from numpy.typing import NDArray
 
 from heelstrike.dynamics import forward_dynamics
 from heelstrike.experiments.engines.links import links, space
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.scenario import Scenario
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 BATCH = 2000
 ERROR = 1e-9

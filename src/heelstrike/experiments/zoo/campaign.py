@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -31,6 +30,7 @@ from heelstrike.robot import Robot, builtin_robots, load_robot
 from heelstrike.robot.files.options import LoadOptions
 from heelstrike.sim.method import Method
 from heelstrike.sim.time_stepping.method import TimeStepping
+from heelstrike.wording import meant
 
 USUAL, QUICK = Settings(), Settings(trials=1, strides=5, halvings=2)
 """Settings of a table to show, and of one for a try."""
@@ -189,8 +189,7 @@ def chosen_disturbances(words: str | None) -> tuple[Disturbance, ...]:
     chosen = found if words is None else {}
     for name in _words(words or ""):
         if name.lower() not in found:
-            near = difflib.get_close_matches(name.lower(), found, n=1)
-            guess = f" Did you mean {found[near[0]].name!r}?" if near else ""
+            guess = meant(name.lower(), {low: repr(each.name) for low, each in found.items()})
             raise SimulationError(
                 f"there is no disturbance {name!r}.{guess} There are "
                 f"{', '.join(each.name for each in DISTURBANCES)}."

@@ -85,29 +85,24 @@ def _push(sign: float, trial: Trial, chance: Chance, effort: Effort) -> Largest:
     most = PUSH * robot.total_mass / BRAVO7_WEIGHT * np.sqrt(_size(trial))
     return largest_push(
         trial, phase=chance.phase, direction=(sign, 0.0), link=int(robot.model.pivot),
-        most=float(most), strides=effort.strides, halvings=effort.halvings,
+        most=float(most), **vars(effort),
     )  # fmt: skip
 
 
 def _slope(uphill: bool, trial: Trial, _: Chance, effort: Effort) -> Largest:
-    return largest_slope(
-        trial, uphill=uphill, most=SLOPE, strides=effort.strides, halvings=effort.halvings
-    )
+    return largest_slope(trial, uphill=uphill, most=SLOPE, **vars(effort))
 
 
 def _ground_step(up: bool, trial: Trial, _: Chance, effort: Effort) -> Largest:
-    found = largest_ground_step(
-        trial, up=up, most=STEP * _size(trial), strides=effort.strides, halvings=effort.halvings
-    )
+    found = largest_ground_step(trial, up=up, most=STEP * _size(trial), **vars(effort))
     return _scaled(found, 1000.0, "mm")
 
 
 def _roughness(trial: Trial, chance: Chance, effort: Effort) -> Largest:
     size = _size(trial)
     found = largest_roughness(
-        trial, seed=chance.seed, spacing=0.1 * size, most=ROUGH * size, strides=effort.strides,
-        halvings=effort.halvings,
-    )  # fmt: skip
+        trial, seed=chance.seed, spacing=0.1 * size, most=ROUGH * size, **vars(effort)
+    )
     return _scaled(found, 1000.0, "mm")
 
 
@@ -122,9 +117,7 @@ def _friction(trial: Trial, _: Chance, effort: Effort) -> Largest:
         run = trial.run(trial.begins, ground=ground)
         return bool(trial.recovered(run, (trial.begins, trial.begins), same_speed=False))
 
-    found = largest(
-        recovers, most=friction - LEAST_FRICTION, strides=effort.strides, halvings=effort.halvings
-    )
+    found = largest(recovers, most=friction - LEAST_FRICTION, **vars(effort))
     failed = friction - found.failed if np.isfinite(found.failed) else np.inf
     return replace(found, recovered=friction - found.recovered, failed=failed, unit="μ")
 
@@ -140,7 +133,7 @@ def _trunk_mass(trial: Trial, _: Chance, effort: Effort) -> Largest:
                 return False
         return True
 
-    return largest(recovers, most=MASS, strides=effort.strides, halvings=effort.halvings, unit="%")
+    return largest(recovers, most=MASS, **vars(effort), unit="%")
 
 
 def _price(trial: Trial, _: Chance, __: Effort) -> Largest:

@@ -14,7 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
@@ -26,8 +25,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.gait.phased.series import fitted
 from heelstrike.gait.phased.surface import Surface, make_invariant
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 # Postures of a step that are changed, for each coefficient that is fitted to them.
 POSTURES = 6

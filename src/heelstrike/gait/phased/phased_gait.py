@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import comb
 
 from heelstrike import dynamics
@@ -22,10 +22,9 @@ from heelstrike.errors import GaitError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.phased.series import fitted, interpolated
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sides.mirror import Mirror
-
-Floats = NDArray[np.float64]
 
 # A contact point with a smaller radius (m) is a point; files of MuJoCo's format want a positive.
 POINT_FOOT = 1e-9

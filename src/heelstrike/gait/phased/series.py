@@ -6,9 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebmul, chebvander
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 
 def interpolated(function: Callable[[Floats], Floats], degree: int) -> Floats:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from heelstrike import dynamics
@@ -20,8 +19,7 @@ from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.errors import GaitError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.phased.phased_gait import PhasedGait
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 # A touchdown is looked for within this much of the range of the phase about its end.
 NEAR_THE_END = 0.05
@@ -70,7 +68,7 @@ class Surface:
         self.gait = gait
         self.robot = gait.robot
         terrain = (Ground() if ground is None else ground).model()
-        if len(terrain.friction) > 1:
+        if len(terrain.friction) > 1 or terrain.curved:
             raise GaitError("a gait that repeats needs level or sloping ground")
         along = np.diff(terrain.vertices[:2], axis=0)[0]
         along = along / np.hypot(*along)

@@ -32,9 +32,9 @@ from heelstrike.robot.files.posture import (
 )
 from heelstrike.robot.files.snapping import IN_PLANE, snap
 from heelstrike.robot.files.spatial import asymmetry, nothing_to_keep, refuse_spatial_joints
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import LockedJoint
-
-Floats = NDArray[np.float64]
+from heelstrike.wording import some_of
 
 KINDS = ("free", "ball", "slide", "hinge")
 MANY = 12  # joints that are named in a remark
@@ -181,10 +181,9 @@ def _seen(model: Any, forward: str, options: Options, label: str, hanging: bool)
 
 def _of_snapped(model: Any, snapped: dict[int, float]) -> Iterator[str]:
     if snapped:
-        shown = list(snapped)[:MANY]
-        names = ", ".join(f"{joint_name(model, joint)} by {snapped[joint]:.2g}" for joint in shown)
-        more = f" and {len(snapped) - MANY} more" if len(snapped) > MANY else ""
-        yield f"axes that miss the x–z plane by rounding are turned into it (rad): {names}{more}."
+        turned = [f"{joint_name(model, joint)} by {by:.2g}" for joint, by in snapped.items()]
+        names = some_of(turned, MANY)
+        yield f"axes that miss the x–z plane by rounding are turned into it (rad): {names}."
 
 
 def _of_root(model: Any, floating: list[int]) -> Iterator[str]:
@@ -208,17 +207,16 @@ def _of_root(model: Any, floating: list[int]) -> Iterator[str]:
 def _of_locked(locked: tuple[LockedJoint, ...], options: Options) -> Iterator[str]:
     if not locked:
         return
-    words = ", ".join(joint.name for joint in locked[:SHOWN])
-    more = f" and {len(locked) - SHOWN} more" if len(locked) > SHOWN else ""
+    words = some_of([joint.name for joint in locked], SHOWN)
     number = f"{len(locked)} joints are" if len(locked) > 1 else "1 joint is"
     if options.projected:
         yield (
-            f"projected onto the x–z plane; {number} locked: {words}{more}. "
+            f"projected onto the x–z plane; {number} locked: {words}. "
             "Robot.locked is their table. What the robot does out of this plane (roll, yaw, side "
             "steps) is left out."
         )
     else:
-        yield f"{words}{more} cannot move, for equality constraints hold them: they are locked."
+        yield f"{words} cannot move, for equality constraints hold them: they are locked."
 
 
 # What moves in the plane

@@ -11,14 +11,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.files.snapping import IN_PLANE
+from heelstrike.robot.model import Floats
 from heelstrike.robot.plausibility import is_possible
 from heelstrike.robot.warning import warn
-
-Floats = NDArray[np.float64]
 
 MASSLESS = 1e-14  # kg, kg m²; no link that is meant to weigh anything weighs less
 MOMENT_MARGIN = 1e-9  # share of the largest moment by which parsers may judge otherwise than we do

@@ -13,7 +13,6 @@ from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
@@ -37,6 +36,7 @@ from heelstrike.robot.files.urdf import (
     urdf_text,
     weigh_no_shapes,
 )
+from heelstrike.robot.model import Floats
 from heelstrike.robot.plausibility import is_possible
 from heelstrike.robot.robot import LockedJoint
 from heelstrike.robot.warning import warn
@@ -96,16 +96,16 @@ class MujocoFile:
         bit = getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)
         return bool(self.model.opt.disableflags & int(bit))
 
-    def of_joints(self, values: Any, default: float) -> NDArray[np.float64]:
+    def of_joints(self, values: Any, default: float) -> Floats:
         """Numbers of the file's joints, for the coordinates; a default where it has none."""
         given = np.append(np.asarray(values, dtype=np.float64), default)
         return given[[one.joint for one in self.coordinates]]
 
-    def of_velocities(self, values: Any) -> NDArray[np.float64]:
+    def of_velocities(self, values: Any) -> Floats:
         """Numbers of the file's velocities, for the coordinates; zero where it has none."""
         return self.of_joints(np.asarray(values)[self.model.jnt_dofadr], 0.0)
 
-    def field(self, name: str) -> NDArray[np.float64]:
+    def field(self, name: str) -> Floats:
         """Return an array of the model, empty where this version of MuJoCo does not have it."""
         return np.asarray(getattr(self.model, name, np.zeros(0)), dtype=np.float64)
 
@@ -175,12 +175,12 @@ def _screened(source: Path | str, text: str | None, options: Options, label: str
         return file
     directory = source.parent if isinstance(source, Path) else Path()
     mjcf = as_mjcf(file.xml, directory, options.packages, label)
-    return replace(file, xml=mjcf, text=xml_text(mjcf), massless=True)
+    return replace(file, xml=mjcf, massless=True)
 
 
 def stated_bodies(
     path: Path | str, options: Options, text: str | None = None
-) -> list[tuple[str, float, NDArray[np.float64]]]:
+) -> list[tuple[str, float, Floats]]:
     """Name, mass and inertia tensor of bodies; see `heelstrike.robot.files.reading.read_bodies`."""
     import mujoco
 
@@ -195,7 +195,7 @@ def stated_bodies(
     return _stated(spec)
 
 
-def _stated(spec: Any) -> list[tuple[str, float, NDArray[np.float64]]]:
+def _stated(spec: Any) -> list[tuple[str, float, Floats]]:
     tensors = [(body, stated_tensor(body)) for body in spec.bodies]
     return [(body.name, float(body.mass), t) for body, t in tensors if t is not None]
 
@@ -240,13 +240,14 @@ def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path
     """Return a file as MuJoCo understands it, not yet compiled."""
     import mujoco
 
-    text = file.text
     urdf = file.xml.tag == "robot"
     if urdf:
         translate_dialects(file.xml)
         directory = source.parent if isinstance(source, Path) else Path()
         text = urdf_text(file.xml, directory, packages, label)
         check_urdf_tree(file.xml, label)
+    else:
+        text = xml_text(file.xml)
     spec = mujoco.MjSpec.from_string(text, include=file.models)
     # Welded bodies are joined by our own reader, which needs to know where each of them is.
     spec.compiler.fusestatic = False

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.files.options import Options
 from heelstrike.robot.files.snapping import IN_PLANE
-
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
+from heelstrike.wording import meant
 
 FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
 LONGEST_TRAIN = 20  # joints each of which follows the one before
@@ -26,8 +24,7 @@ def positions(model: Any, options: Options, label: str) -> Floats:
     pose = options.pose or {}
     for name, value in pose.items():
         if name not in names:
-            near = difflib.get_close_matches(name, names, n=1)
-            guess = f" Did you mean {near[0]!r}?" if near else ""
+            guess = meant(name, list(names))
             raise RobotError(f"{label}: pose names {name!r}, and there is no such joint.{guess}")
         joint = names[name]
         if model.jnt_type[joint] not in (SLIDE, HINGE):

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
 from heelstrike.kept_files import kept_file, make_room, program_digest
@@ -29,6 +28,7 @@ from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.packages import FOLDERS
 from heelstrike.robot.files.robot_json import robot_entries, robot_of_entries
 from heelstrike.robot.files.ros.xacro import expanded
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import RobotWarning, warn
 from heelstrike.whole_file import write_whole
@@ -38,7 +38,7 @@ LONGEST = 60.0
 that does nothing else."""
 
 _JOB = f"{__name__}:answer"
-_ROOMS = ("robot",)
+_ROOMS = ("robot", "tolerances")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,7 +110,7 @@ def read_own(path: Path, **how: Unpack[LoadOptions]) -> Robot:
     return _told(kept.load() or kept.save(_found(order)))
 
 
-def read_bodies(path: Path, options: Options) -> list[tuple[str, float, NDArray[np.float64]]]:
+def read_bodies(path: Path, options: Options) -> list[tuple[str, float, Floats]]:
     """Name, mass and inertia tensor (about the centre of mass, kg m²) as a file states them.
 
     Bodies that do not move, and those that leave their inertia to their geoms, are not among them.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 SLIDE, HINGE = 2, 3  # MuJoCo's mjtJoint
 

@@ -11,6 +11,7 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.files.posture import BALL, FREE, HINGE
 from heelstrike.robot.files.snapping import IN_PLANE
 from heelstrike.robot.sides.symmetry import counterparts
+from heelstrike.wording import some_of
 
 SHOWN = 4  # how many culprits a message lists before it counts the rest
 
@@ -60,8 +61,7 @@ def refuse_spatial_joints(
             said.append(f"{name!r} of body {body!r} slides along {direction}")
     if not said:
         return
-    shown = "; ".join(f"joint {one}" for one in said[:SHOWN])
-    more = f"; and {len(said) - SHOWN} more" if len(said) > SHOWN else ""
+    shown = some_of([f"joint {one}" for one in said], SHOWN, "; ")
     mend = (
         "Remove these joints (or weld them) to keep the motion in the plane, or load the robot "
         "with projected=True, which locks them."
@@ -71,7 +71,7 @@ def refuse_spatial_joints(
     raise RobotError(
         f"{label}: this robot leaves the x–z plane; heelstrike simulates planar robots, whose "
         "hinges turn about y and whose slides stay in x–z. In its reference configuration, "
-        f"{shown}{more}. {mend}"
+        f"{shown}. {mend}"
     )
 
 
@@ -92,8 +92,7 @@ def nothing_to_keep(model: Any, pose: Any) -> str:
             "All its level hinges are parallel: turn the robot in its file by "
             f"{-several[0]:g} degrees about z, so that they point along y."
         )
-    words = ", ".join(f"{turn:g}" for turn in several[:SHOWN])
-    more = "" if len(several) <= SHOWN else f" and {len(several) - SHOWN} more"
+    words = some_of([f"{turn:g}" for turn in several], SHOWN)
     upright = np.flatnonzero((model.jnt_type == HINGE) & (np.abs(pose.xaxis[:, 2]) > 0.9))
     pose_words = (
         f" Joints about z, as {model.joint(upright[0]).name!r}, can turn its legs until they "
@@ -102,7 +101,7 @@ def nothing_to_keep(model: Any, pose: Any) -> str:
         else ""
     )
     return (
-        f"Its hinges lie at angles of {words}{more} degrees to y: its legs move in upright planes "
+        f"Its hinges lie at angles of {words} degrees to y: its legs move in upright planes "
         "that differ, and no turn of the whole robot makes one of them. heelstrike simulates "
         f"robots whose legs move in parallel planes.{pose_words}"
     )

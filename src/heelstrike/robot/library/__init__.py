@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import reprlib
 from pathlib import Path
@@ -14,6 +13,7 @@ from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.files.reading import read_mjcf, read_own
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import warn
+from heelstrike.wording import meant
 
 NO_MOTORS = "no joint has a motor"
 NO_CONTACTS = "it has no contact points"
@@ -112,8 +112,7 @@ def _exists(path: Path) -> bool:
 
 def _unknown(name: str) -> str:
     known = builtin_robots()
-    near = difflib.get_close_matches(name.lower(), known, n=1)
-    guess = f" Did you mean {near[0]!r}?" if near else ""
+    guess = meant(name.lower(), known)
     return (
         f"there is no robot called {reprlib.repr(name)}.{guess} Built in are {', '.join(known)}; "
         "any other robot is loaded by the path of its .xml (MJCF), .urdf or .sdf file."

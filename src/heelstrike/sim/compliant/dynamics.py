@@ -41,7 +41,6 @@ from heelstrike.dynamics.kernels import (
     passive_force,
     solve_factorized,
 )
-from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.compliant.corners import (
@@ -52,9 +51,12 @@ from heelstrike.sim.compliant.corners import (
 )
 from heelstrike.sim.compliant.law import FrictionForces, NormalForces
 from heelstrike.sim.compliant.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
+from heelstrike.sim.contacts.candidates import find_constraints
+from heelstrike.sim.contacts.constraint import is_line
 from heelstrike.sim.contacts.geometry import contact_rows, row_product, weigh
 from heelstrike.sim.contacts.loops import find_loops, push_loops, respond, rows_of, speed_along
-from heelstrike.sim.contacts.rows import DRY_JOINT
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, Rows, most_rows
+from heelstrike.sim.contacts.writers import rate_of
 from heelstrike.sim.controller.asking import ask, consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.guard import guarded
@@ -118,6 +120,8 @@ class Rates(Bundle):
     """dry_force, dry_by_speed: Dry friction in the joints, and its derivative."""
     loop: Floats = array("loop_rows")
     """Forces of the loops along their rows."""
+    own: NormalForces = part(NormalForces)
+    """Of the constraints from outside that may let go."""
 
 
 class CompliantWorkspace(Bundle):
@@ -157,6 +161,10 @@ class CompliantWorkspace(Bundle):
     """A − g ∂f/∂v − g² ∂f/∂q, then its triangular factors."""
     order: Integers = array("nv", of=int)
     """Row exchanges of the factors."""
+    now_rows: Floats = array("own", "nv")
+    own_rows: Floats = array("own", "nv")
+    """now_rows, own_rows: Jacobian of the constraints from outside that may let go, at the state
+    evaluated last and at the start of the step."""
     loop_rows: Floats = array("loop_rows", "nv")
     loop_response: Floats = array("loop_rows", "nv")
     loop_matrix: Floats = array("loop_rows", "loop_rows")
@@ -174,8 +182,9 @@ class CompliantWorkspace(Bundle):
     stop_impulse: Floats = array("nv")
     dry_impulse: Floats = array("nv")
     loop_impulse: Floats = array("loop_rows")
-    """Impulses of contacts, joint stops, dry friction and loops since the last sample, in N s (N m
-    s)."""
+    own_impulse: Floats = array("own")
+    """Impulses of contacts, joint stops, dry friction, loops and constraints from outside since the
+    last sample, in N s (N m s)."""
     touched: Floats = array("nc")
     left: Floats = array("nc")
     """touched, left: When a contact point last came to the ground and left it since the last
@@ -206,13 +215,16 @@ def compliant_workspace(
     """Allocate the scratch for a robot."""
     extents = {
         "nv": robot.nv, "nu": robot.nu, "nc": robot.nc, "components": 2, "axes": 2,
-        "stages": STAGES, "loop_rows": most_rows(robot.model),
+        "stages": STAGES, "loop_rows": most_rows(robot),
     }  # fmt: skip
+    let_go = sum(not is_line(each) for each in robot.constraints)
+    extents["own"] = let_go
     rates = Rates.allocate(
         extents,
         normal=NormalForces.allocate(n=2 * robot.nc),
         friction=FrictionForces.allocate(nc=2 * robot.nc),
         stop=NormalForces.allocate(n=robot.nv),
+        own=NormalForces.allocate(n=let_go),
     )
     now, now_words = in_one_block(rates)
     base, base_words = in_one_block(rates)
@@ -319,6 +331,9 @@ def evaluate(
     push_contacts(model, memory, work)
     push_stops(model, work.laws, memory, now)
     rub_joints(work.laws.joint_speed, memory, now)
+    if now.own.gap.shape[0] > 0:
+        push_constraints(model, work.laws, memory, now)
+        write_constraint_rows(memory.rows, work.now_rows)
     if control.continuous == 1 and how != HELD:
         if how == ACCEPTED:
             show_forces(work.force, work.corners, memory.contacts)
@@ -353,6 +368,9 @@ def evaluate(
                     memory.assembly.jacobian[2 * contact, j] * normal
                     + memory.assembly.jacobian[2 * contact + 1, j] * tangent
                 )
+    for own in range(now.own.gap.shape[0]):
+        for j in range(nv):
+            rate[j] += work.now_rows[own, j] * now.own.force[own]
     solve_factorized(model, memory.equations.factor, rate)
     if now.loop.shape[0] > 0:
         hold_loops(model, memory, now)
@@ -365,7 +383,7 @@ def hold_loops(model: Model, memory: Memory, now: Rates) -> None:
     rows = rows_of(loops)
     find_loops(model, memory.q, memory.v, memory.equations.tree, loops)
     weigh(model, memory.equations)
-    respond(model, memory.equations, loops)
+    respond(rows, model, loops.rows.jacobian, memory.equations, loops.response, loops.system)
     for row in range(rows):
         loops.system[row, rows] = -speed_along(row, loops, rate) - loops.rows.bias[row]
     push_loops(loops, rate)
@@ -438,6 +456,27 @@ def push_stops(model: Model, laws: Laws, memory: Memory, now: Rates) -> None:
 
 
 @kernel
+def push_constraints(model: Model, laws: Laws, memory: Memory, now: Rates) -> None:
+    """Forces of the constraints from outside that may let go: those of stops, from their gaps."""
+    rows, own = memory.rows, now.own
+    find_constraints(model, memory.q, memory.v, memory.equations.tree, rows)
+    for i in range(own.gap.shape[0]):
+        entry = rows.first[CONSTRAINT] + i
+        own.gap[i] = rows.gap[entry]
+        own.speed[i] = rate_of(rows.owner[entry], 0, memory.v, rows.outside)
+    call_at(laws.stop_code, (address_of(laws.stop), own))
+
+
+@kernel
+def write_constraint_rows(rows: Rows, target: Floats) -> None:
+    """Write the rows of the constraints from outside that may let go, one after the other."""
+    for i in range(target.shape[0]):
+        own = rows.owner[rows.first[CONSTRAINT] + i]
+        for j in range(target.shape[1]):
+            target[i, j] = rows.outside.jacobian[own, 0, j]
+
+
+@kernel
 def pull_back(model: Model, latch: int, memory: Memory, stop: NormalForces) -> None:
     """Ask the law of a stop that holds for its pull: what it would press with, mirrored."""
     j = model.latch_joint[latch]
@@ -474,6 +513,7 @@ def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     for row in range(work.loop_rows.shape[0]):
         for j in range(model.parent.shape[0]):
             work.loop_rows[row, j] = memory.loops.rows.jacobian[row, j]
+    copy_words(work.now_rows, work.own_rows)
 
 
 @kernel
@@ -528,6 +568,12 @@ def factorize_step(
                     + rubbing * tangent_row[j]
                 )
                 by_q[i, j] += pressing * base.normal.by_gap[contact] * normal_row[j]
+    for own in range(work.own_rows.shape[0]):
+        row = work.own_rows[own]
+        for i in range(nv):
+            for j in range(nv):
+                system[i, j] -= g * row[i] * base.own.by_speed[own] * row[j]
+                by_q[i, j] += row[i] * base.own.by_gap[own] * row[j]
     for i in range(nv):
         for j in range(nv):
             system[i, j] -= g * g * by_q[i, j]

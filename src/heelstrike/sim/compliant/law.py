@@ -8,17 +8,12 @@ compiled by itself and called by its address, so that one loop serves every law.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields
-from functools import cache, lru_cache
 from typing import Any, ClassVar
 
 from numba import types
 
-from heelstrike.compiler.bundle import Bundle, array, number
-from heelstrike.compiler.bundle_type import bundle_at
-from heelstrike.compiler.compilation import CompileError
-from heelstrike.compiler.separate_kernel import SeparateKernel
-from heelstrike.errors import SimulationError
+from heelstrike.compiler.bundle import Bundle, array
+from heelstrike.compiler.kernel_objects import KernelObject
 from heelstrike.robot.model import Floats, Integers
 
 
@@ -57,65 +52,27 @@ class FrictionForces(Bundle):
     """Whether each point slides."""
 
 
-class ContactLaw:
+class ContactLaw(KernelObject):
     """What normal and friction laws have in common: a kernel, and numbers that it reads.
 
     A subclass is a frozen dataclass, and may live outside this package.
     """
 
+    called = "contact law"
+    asked: ClassVar[dict[str, str]] = {"force": "self, ..."}
+
     force: ClassVar[Callable[..., Any]]
     """The kernel of one point, made by :func:`heelstrike.sim.kernel`."""
 
     forces: ClassVar[type[Bundle]]
-    apply: ClassVar[Callable[..., Callable[..., int]]]
 
-    def parameters(self) -> Bundle:
-        """Return what ``self`` is in compiled code: the settings that are numbers, by name.
-
-        Returns
-        -------
-        Bundle
-            A law that needs arrays makes a bundle of its own.
-        """
-        settings = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
-        numbers = {name: each for name, each in settings.items() if isinstance(each, int | float)}
-        kind: Any = type(self)
-        return _numbers(kind, *numbers)(**numbers)
-
-    def code(self, parameters: Bundle) -> int:
-        """Compile its kernel for these parameters, or load it; return where it is.
-
-        Parameters
-        ----------
-        parameters : Bundle
-            What ``self`` is.
-
-        Returns
-        -------
-        int
-            Address of code that finds the forces of all points.
-
-        Raises
-        ------
-        SimulationError
-            If it has no kernel, or one that cannot be compiled.
-        """
-        name = type(self).__name__
-        if not hasattr(getattr(type(self), "force", None), "py_func"):
-            raise SimulationError(
-                f"contact law {name} has no kernel: write force(self, ...) under "
-                "@heelstrike.sim.kernel into its class"
-            )
-        try:
-            kind: Any = type(self)
-            return _compiled(kind, type(parameters)).__wrapper_address__()  # type: ignore[arg-type]
-        except CompileError as error:
-            raise SimulationError(
-                f"the force of contact law {name} cannot be compiled: {error}"
-            ) from error
+    @classmethod
+    def signature(cls) -> Any:
+        """Of the address of its numbers, and all points."""
+        return types.int64(types.int64, cls.forces.compiled_type())
 
 
-def _press(force: Any, numbers_at: Any) -> Callable[..., int]:
+def _press(numbers_at: Any, force: Any) -> Callable[..., int]:
     def press(address: int, points: Any) -> int:
         numbers = numbers_at(address)
         for i in range(points.gap.shape[0]):
@@ -128,7 +85,7 @@ def _press(force: Any, numbers_at: Any) -> Callable[..., int]:
     return press
 
 
-def _rub(force: Any, numbers_at: Any) -> Callable[..., int]:
+def _rub(numbers_at: Any, force: Any) -> Callable[..., int]:
     def rub(address: int, points: Any) -> int:
         numbers = numbers_at(address)
         for i in range(points.normal.shape[0]):
@@ -158,7 +115,7 @@ class NormalLaw(ContactLaw):
     """
 
     forces = NormalForces
-    apply = staticmethod(_press)
+    entry = staticmethod(_press)
 
 
 class FrictionLaw(ContactLaw):
@@ -171,30 +128,9 @@ class FrictionLaw(ContactLaw):
     """
 
     forces = FrictionForces
-    apply = staticmethod(_rub)
+    entry = staticmethod(_rub)
 
     @property
     def joint_speed(self) -> float:
         """Speed around which dry friction of the joints is smoothed beside it (rad/s, m/s)."""
         return 1e-4
-
-
-@cache
-def _numbers(law: Any, *names: str) -> type[Bundle]:
-    """Bundle of the settings of a law."""
-    return type(law.__name__, (Bundle,), {name: number(float) for name in names})
-
-
-@lru_cache
-def _compiled(law: Any, numbers: Any) -> SeparateKernel:
-    """Return the kernel of a law as loops call it: for all points, with the address of numbers."""
-    kernel: Any = law.force
-    call: Any = law.apply(kernel, bundle_at(numbers))
-    # Machine code is kept beside the file of the law, under its name.
-    place = kernel.py_func
-    call.__module__, call.__name__ = place.__module__, place.__name__
-    call.__qualname__ = place.__qualname__
-    call.__code__ = call.__code__.replace(
-        co_filename=place.__code__.co_filename, co_firstlineno=place.__code__.co_firstlineno
-    )
-    return SeparateKernel(call, lambda: types.int64(types.int64, law.forces.compiled_type()))

@@ -12,7 +12,7 @@ where the force really changes fast, after an impact.
 from __future__ import annotations
 
 from dataclasses import field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from heelstrike.arguments import check_fields
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
+from heelstrike.contact.sets import ImpulseSet
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Model
@@ -57,6 +58,7 @@ from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import close_loops, note_loop, rows_of, steady_loops
+from heelstrike.sim.contacts.rows import CONSTRAINT
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels, Scene
@@ -65,6 +67,8 @@ from heelstrike.sim.method import Method
 from heelstrike.sim.push import share_over_step
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import (
+    CONSTRAINT_HOLDS,
+    CONSTRAINT_LETS_GO,
     JOINT_STOP,
     LIFTOFF,
     LIFTOFF_GAP,
@@ -127,6 +131,8 @@ class Compliant(Method):
     bristle, around 1e-4 rad/s (m/s): a joint that should stick creeps.
     """
 
+    holds: ClassVar[frozenset[ImpulseSet]] = frozenset({ImpulseSet.LINE, ImpulseSet.HALF_LINE})
+
     law: NormalLaw = field(default_factory=HuntCrossley)
     """HuntCrossley, KelvinVoigt or another NormalLaw. Normal force from penetration and its rate,
     for each contact point."""
@@ -135,7 +141,8 @@ class Compliant(Method):
     coefficient μ is the ground's. Only a bristle holds a foot in place."""
     stop: NormalLaw = field(default_factory=lambda: KelvinVoigt(stiffness=1e5, damping=1e2))
     """HuntCrossley, KelvinVoigt or another NormalLaw. Torque of a joint beyond the end of its
-    range, from the angle and its rate (with N m and rad in the place of N and m for a hinge)."""
+    range, from the angle and its rate (with N m and rad in the place of N and m for a hinge); and
+    force of a constraint from outside that may let go, from its gap."""
     step: float = 1e-3
     """Time in seconds between two samples: calls of the controller and rows of the record. The
     integration's own steps are never longer and as short as they need to be."""
@@ -193,7 +200,8 @@ class Compliant(Method):
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a sample may add to the record."""
-        return 1, 1 + 4 * robot.nc + robot.nv + robot.model.latches + robot.model.brakes
+        joints = robot.nv + robot.model.latches + robot.model.brakes
+        return 1, 1 + 4 * robot.nc + joints + 2 * len(robot.constraints)
 
     def forget_ground(
         self,
@@ -231,6 +239,8 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
         work.dry_impulse[joint] += 0.5 * h * (base.dry_force[joint] + now.dry_force[joint])
     for row in range(work.loop_impulse.shape[0]):
         work.loop_impulse[row] += 0.5 * h * (base.loop[row] + now.loop[row])
+    for own in range(work.own_impulse.shape[0]):
+        work.own_impulse[own] += 0.5 * h * (base.own.force[own] + now.own.force[own])
     for contact in range(work.corners.sides):
         normal = base.normal.force[contact] + now.normal.force[contact]
         tangent = base.friction.force[contact] + now.friction.force[contact]
@@ -431,6 +441,8 @@ def begin_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> None
         work.dry_impulse[joint] = 0.0
     for row in range(work.loop_impulse.shape[0]):
         work.loop_impulse[row] = 0.0
+    for own in range(work.own_impulse.shape[0]):
+        work.own_impulse[own] = 0.0
     memory.assembly.answer.residual[1] = cone_residual(work)
 
 
@@ -454,6 +466,9 @@ def finish_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> Non
     span = work.step
     for row in range(rows_of(memory.loops)):
         note_loop(memory.rows, row, work.loop_impulse[row] / span, memory.loops)
+    for own in range(work.own_impulse.shape[0]):
+        number = memory.rows.owner[memory.rows.first[CONSTRAINT] + own]
+        memory.loops.constraint_force[number, 0] = work.own_impulse[own] / span
     tell_resultants(model, work.corners, work.impulse, work.place)
     for contact in range(work.touched.shape[0]):
         for k in range(2):
@@ -499,6 +514,16 @@ def note_events(
             impulse = abs(memory.reaction.stop_torque[joint]) * work.step
             log_event(time, JOINT_STOP, joint, impulse, 0.0, record)
         memory.reported.stopped[joint] = 1 if pressed else 0
+    rows = memory.rows
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        own = entry - rows.first[CONSTRAINT]
+        holds = 1 if work.now.own.force[own] > 0.0 else 0
+        if holds != memory.reported.closed[entry]:
+            kind, impulse = CONSTRAINT_LETS_GO, 0.0
+            if holds == 1:
+                kind, impulse = CONSTRAINT_HOLDS, work.own_impulse[own]
+            log_event(time, kind, rows.owner[entry], impulse, 0.0, record)
+        memory.reported.closed[entry] = holds
 
 
 @kernel
@@ -519,6 +544,9 @@ def note_forces(
         record.loop_force[row, loop, 1] = memory.loops.loop_force[loop, 1]
     for coupling in range(record.coupling_force.shape[1]):
         record.coupling_force[row, coupling] = memory.loops.coupling_force[coupling]
+    for own in range(record.constraint_force.shape[1]):
+        for k in range(2):
+            record.constraint_force[row, own, k] = memory.loops.constraint_force[own, k]
     for joint in range(record.brake_torque.shape[1]):
         record.brake_torque[row, joint] = memory.loops.brake_force[joint]
     share_friction(model, memory.breakaway, record.friction_torque[row], record.brake_torque[row])
@@ -579,6 +607,9 @@ def report(
     """Append a row if one is due, with the forces of this instant."""
     for row in range(rows_of(memory.loops)):
         note_loop(memory.rows, row, work.now.loop[row], memory.loops)
+    for own in range(work.own_impulse.shape[0]):
+        number = memory.rows.owner[memory.rows.first[CONSTRAINT] + own]
+        memory.loops.constraint_force[number, 0] = work.now.own.force[own]
     work.row = note_row_when_due(memory, clock, record)
     if work.row >= 0:
         now = work.now

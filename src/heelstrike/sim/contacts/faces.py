@@ -22,6 +22,9 @@ from heelstrike.tolerances import STRAIGHT_GROUND
 
 NO_FACE = -1
 
+CURVE = -2
+"""The one face of smooth ground: how far along it anything has gone is not measured."""
+
 
 @kernel
 def along_segment(ground: GroundModel, segment: int, x: float, z: float) -> tuple[float, float]:

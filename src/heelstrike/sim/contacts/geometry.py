@@ -6,7 +6,8 @@ import math
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
-from heelstrike.contact.ground import GroundModel, ground_contact
+from heelstrike.contact.ground import GroundModel, ground_contact, path_curvature
+from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.dynamics.articulated import articulate, carry_along, solve_articulated
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import (
@@ -44,6 +45,9 @@ def locate_contacts(
         )
         surface.friction[i] = model.friction_scale[i] * friction
         surface.restitution[i] = model.restitution_scale[i] * restitution
+        if ground.curved == 1:
+            distance = contacts.gap[i] + radius
+            surface.bend[i] = path_curvature(ground, point[0], distance, normal)
         point[0] -= radius * normal[0]
         point[1] -= radius * normal[1]
 
@@ -56,6 +60,20 @@ def contact_velocity(
     place = place_of(tree, contacts.position[contact])
     velocity = velocity_at(tree.velocity, model.contact_link[contact], place)
     return into_frame(contacts.normal[contact], velocity)
+
+
+@kernel
+def bend_acceleration(
+    model: Model, tree: Workspace, contacts: Contacts, contact: int, bend: float
+) -> float:
+    """Acceleration of a gap because its point goes along ground that is curved (m/s²)."""
+    radius, center = model.contact_radius[contact], contacts.position[contact]
+    normal = contacts.normal[contact]
+    x, z = place_of(tree, center)
+    above = x + radius * normal[0], z + radius * normal[1]
+    velocity = velocity_at(tree.velocity, model.contact_link[contact], above)
+    _, along = into_frame(normal, velocity)
+    return bend * along * along
 
 
 @kernel
@@ -187,10 +205,12 @@ def assemble_delassus(model: Model, count: int, equations: Equations, assembly: 
             half[j, row] = 0.0
     for place in range(count):
         if assembly.leaf[place] == EVERYWHERE:
-            if straight:
-                halve_all_by_factor(model, factor, 2 * place, assembly)
-            else:
-                halve_all_by_bodies(model, 2 * place, equations, assembly)
+            rubs = assembly.problem.set[place] in (CONE, INTERVAL)
+            for row in range(2 * place, 2 * place + (2 if rubs else 1)):
+                if straight:
+                    halve_all_by_factor(model, factor, row, assembly)
+                else:
+                    halve_all_by_bodies(model, row, equations, assembly)
         elif straight:
             halve_by_factor(model, factor, place, assembly)
         else:

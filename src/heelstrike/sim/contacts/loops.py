@@ -17,6 +17,7 @@ forces are those of the motion alone.
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.contact.modes import STICK
 from heelstrike.contact.sets import LINE
 from heelstrike.dynamics.dense import solve_to_rank
@@ -24,8 +25,8 @@ from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
-from heelstrike.sim.contacts.geometry import EVERYWHERE, solve_mass_matrix, weigh
-from heelstrike.sim.contacts.rows import COUPLING, LOOP, Rows
+from heelstrike.sim.contacts.geometry import EVERYWHERE, row_product, solve_mass_matrix, weigh
+from heelstrike.sim.contacts.rows import COUPLING, LOOP, TIE, Rows
 from heelstrike.sim.memory import Assembly, Equations, Loops
 
 CLOSED = 1e-14
@@ -72,7 +73,7 @@ def find_loops(model: Model, q: Floats, v: Floats, tree: Workspace, loops: Loops
     find_rows(model, q, v, tree, loops.rows)
     for loop in range(model.loops):
         leave_one(loop, loops)
-    row = 2 * model.loops + model.couplings
+    row = add_ties(model, q, v, tree, loops)
     for brake in range(loops.braked.shape[0]):
         if loops.braked[brake] >= TAKES_HOLD:
             loops.entry[row] = loops.brake_entry[brake]
@@ -80,6 +81,18 @@ def find_loops(model: Model, q: Floats, v: Floats, tree: Workspace, loops: Loops
             loops.rows.displacement[row] = q[joint] - loops.brake_position[brake]
             loops.rows.jacobian[row, joint] = 1.0
             row += 1
+
+
+@kernel
+def add_ties(model: Model, q: Floats, v: Floats, tree: Workspace, loops: Loops) -> int:
+    """Let the constraints that never let go write their rows; return the row after them."""
+    rows, row = loops.rows, 2 * model.loops + model.couplings
+    for i in range(loops.tie.shape[0]):
+        code, numbers, last = loops.tie[i, 0], loops.tie[i, 1], row + loops.tie[i, 2]
+        displacement, bias = rows.displacement[row:last], rows.bias[row:last]
+        call_at(code, (numbers, model, tree, q, v, displacement, rows.jacobian[row:last], bias))
+        row = last
+    return row
 
 
 @kernel
@@ -180,25 +193,28 @@ def note_loop(table: Rows, row: int, force: float, loops: Loops) -> None:
                 force_now[axis] = lean[axis] * force_now[1 - axis]
     elif kind == COUPLING:
         loops.coupling_force[owner] = force
+    elif kind == TIE:
+        loops.constraint_force[owner, table.axis[entry]] = force
     else:
         loops.brake_force[owner] = force
 
 
 @kernel
-def respond(model: Model, equations: Equations, loops: Loops) -> None:
+def respond(
+    rows: int, model: Model, jacobian: Floats, equations: Equations, response: Floats,
+    system: Floats,
+) -> None:  # fmt: skip
     """What unit forces of the loops do to the coordinates, A⁻¹ Jᵀ, and to the loops, J A⁻¹ Jᵀ.
 
     What the mass matrix is solved with is there.
     """
-    response, system = loops.response, loops.system
-    rows = rows_of(loops)
     for row in range(rows):
         for j in range(model.nv):
-            response[row, j] = loops.rows.jacobian[row, j]
+            response[row, j] = jacobian[row, j]
         solve_mass_matrix(model, equations, response[row])
     for row in range(rows):
         for other in range(rows):
-            system[row, other] = speed_along(row, loops, response[other])
+            system[row, other] = row_product(jacobian, row, response[other])
 
 
 @kernel
@@ -232,7 +248,7 @@ def close_loops(model: Model, equations: Equations, loops: Loops, q: Floats) -> 
             return worst <= ROUNDING
         before = worst
         weigh(model, equations)
-        respond(model, equations, loops)
+        respond(rows, model, loops.rows.jacobian, equations, loops.response, loops.system)
         for row in range(rows):
             loops.system[row, rows] = -displacement[row]
         push_loops(loops, q)
@@ -247,8 +263,8 @@ def steady_loops(model: Model, q: Floats, equations: Equations, loops: Loops, v:
     link_velocities(model, v, tree)
     find_loops(model, q, v, tree, loops)
     weigh(model, equations)
-    respond(model, equations, loops)
     rows = rows_of(loops)
+    respond(rows, model, loops.rows.jacobian, equations, loops.response, loops.system)
     for row in range(rows):
         loops.system[row, rows] = -speed_along(row, loops, v)
     push_loops(loops, v)

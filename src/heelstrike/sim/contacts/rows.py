@@ -6,17 +6,22 @@ a set in which their impulses lie (:mod:`heelstrike.contact.sets`)::
     kind           set         components   owner          gap
     POINT          cone        2            contact point  to the nearest face of the ground
     STOP           half-line   1            joint          to that end of its range
+    CONSTRAINT     its own     1 or 2       constraint     as its kernel says, or none
     DRY_JOINT      interval    1            joint          none
     SECOND_FACE    cone        2            contact point  to the other face of a concave corner
     LOOP           line        1            closed loop    none: along x, then along z
     COUPLING       line        1            coupled joint  none
+    TIE            line        1            constraint     none: row by row
     BRAKE          line        1            brake          none
 
 The table is laid out before a simulation begins. An entry is whatever has one gap and one set; its
 number is its place in the table, and nothing else: what it is, and of what, is looked up. Kernels
 go kind by kind, ``for stop in range(rows.first[STOP], rows.end[STOP])``, so that a kind that a
 robot does not have costs nothing. Contact points come first: theirs are the same numbers as those
-in ``Contacts``. A latch is no kind of its own: while it holds, the set of its stop is the line.
+in ``Contacts``. Constraints from outside (:mod:`heelstrike.sim.contacts.constraint`) are entries
+like all others: ``TIE`` those that never let go, which are among the rows of the loops,
+``CONSTRAINT`` the rest. A latch is no kind of its own: while it holds, the set of its stop is the
+line.
 """
 
 from __future__ import annotations
@@ -24,16 +29,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, array
+from heelstrike.compiler.bundle import Bundle, array, part
 from heelstrike.compiler.compilation import dissolved_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Model
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.contacts.constraint import is_line, line_rows
+from heelstrike.sim.contacts.writers import Writers, kernels_of
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-POINT, STOP, DRY_JOINT, SECOND_FACE, LOOP, COUPLING, BRAKE = range(7)
+POINT, STOP, CONSTRAINT, DRY_JOINT, SECOND_FACE, LOOP, COUPLING, TIE, BRAKE = range(9)
 
 
 @dataclass(frozen=True)
@@ -42,19 +51,19 @@ class Kind:
 
     name: str
     set: int
-    """Where their impulses lie."""
-    components: int
-    """How many rows of the contact problem each of them is."""
+    """Where their impulses lie; of constraints each has its own."""
 
 
 KINDS = (
-    Kind("contact point", CONE, 2),
-    Kind("joint stop", HALF_LINE, 1),
-    Kind("dry joint", INTERVAL, 1),
-    Kind("second face", CONE, 2),
-    Kind("loop", LINE, 1),
-    Kind("coupling", LINE, 1),
-    Kind("brake", LINE, 1),
+    Kind("contact point", CONE),
+    Kind("joint stop", HALF_LINE),
+    Kind("constraint", HALF_LINE),
+    Kind("dry joint", INTERVAL),
+    Kind("second face", CONE),
+    Kind("loop", LINE),
+    Kind("coupling", LINE),
+    Kind("tie", LINE),
+    Kind("brake", LINE),
 )
 
 
@@ -64,24 +73,26 @@ class Rows(Bundle):
     first: Integers = array("kinds", of=int)
     end: Integers = array("kinds", of=int)
     """first, end: The first entry of each kind, and the one after its last."""
-    set: Integers = array("kinds", of=int)
-    components: Integers = array("kinds", of=int)
-    """set, components: Where impulses of each kind lie, and how many rows each entry is."""
+    set: Integers = array("entries", of=int)
+    """Where impulses of each entry lie."""
     kind: Integers = array("entries", of=int)
     owner: Integers = array("entries", of=int)
-    """kind, owner: What each entry is, and of what: the contact point, joint, loop, coupling or
-    brake."""
+    """kind, owner: What each entry is, and of what: the contact point, joint, constraint, loop,
+    coupling or brake."""
     side: Floats = array("entries")
     """1 for the lower, -1 for the upper end of a joint's range; 1 for all other entries."""
     limit: Floats = array("entries")
-    """Position of the joint at that end (rad, m)."""
+    """Position of the joint at that end (rad, m); the most that a constraint rubs (N, N m)."""
     axis: Integers = array("entries", of=int)
-    """0 for the row along x, 1 for the row along z of a loop; 0 for all other entries."""
+    """0 for the row along x, 1 for the row along z of a loop; the row of a tie; 0 for all other
+    entries."""
     gap: Floats = array("entries")
     """How far each is from what would hold it (m, rad), infinite if it has no gap: of points and
     second faces as they were located last, of stops as somebody wrote it."""
     latch_stop: Integers = array("latches", of=int)
     """The stop that each latch is."""
+    outside: Writers = part(Writers)
+    """The constraints, and what the kernels of those that may let go wrote last."""
 
 
 def dry_joints(model: Model) -> Integers:
@@ -90,10 +101,23 @@ def dry_joints(model: Model) -> Integers:
     return np.union1d(np.flatnonzero(model.dry_friction > 0.0), slipping).astype(np.int64)
 
 
-def contact_count(model: Model) -> int:
-    """Return how many entries there are but for loops, couplings and brakes, which come last."""
+def contact_count(robot: Robot) -> int:
+    """Return how many entries there are but for those that never let go, which come last."""
+    model = robot.model
     stops = np.isfinite(model.lower).sum() + np.isfinite(model.upper).sum()
-    return 2 * model.nc + int(stops) + len(dry_joints(model))
+    let_go = sum(not is_line(each) for each in robot.constraints)
+    return 2 * model.nc + int(stops) + let_go + len(dry_joints(model))
+
+
+def most_rows(robot: Robot) -> int:
+    """Return how many rows never let go while all brakes are on."""
+    return count_rows(robot.model) + line_rows(robot) + robot.model.brakes
+
+
+@dissolved_kernel
+def is_of_ground(entry: int, rows: Rows) -> bool:
+    """Whether an entry is a contact point, on either face."""
+    return bool(rows.kind[entry] == POINT or rows.kind[entry] == SECOND_FACE)
 
 
 @dissolved_kernel
@@ -102,14 +126,22 @@ def second_of(point: int, rows: Rows) -> int:
     return int(rows.first[SECOND_FACE] + point)
 
 
-def lay_out_rows(model: Model) -> Rows:
+def lay_out_rows(robot: Robot) -> Rows:
     """Lay the table of a robot out."""
+    model, outside = (
+        robot.model,
+        Writers.allocate(constraints=len(robot.constraints), nv=robot.nv, kernel=kernels_of(robot)),
+    )
+    lines = [i for i, each in enumerate(robot.constraints) if is_line(each)]
+    others = [i for i, each in enumerate(robot.constraints) if not is_line(each)]
+    count = np.array([robot.constraints[i].components for i in lines], dtype=np.int64)
     ends = np.column_stack((model.lower, model.upper))
     joint, upper = np.nonzero(np.isfinite(ends))
     points = np.arange(model.nc)
     owners = (
-        points, joint, dry_joints(model), points, np.repeat(np.arange(model.loops), 2),
-        np.arange(model.couplings), np.arange(model.brakes),
+        points, joint, np.array(others, dtype=np.int64), dry_joints(model), points,
+        np.repeat(np.arange(model.loops), 2), np.arange(model.couplings),
+        np.repeat(np.array(lines, dtype=np.int64), count), np.arange(model.brakes),
     )  # fmt: skip
     sizes = [len(owner) for owner in owners]
     end = np.cumsum(sizes)
@@ -121,8 +153,8 @@ def lay_out_rows(model: Model) -> Rows:
         latches=model.latches,
         first=first,
         end=end,
-        set=np.array([kind.set for kind in KINDS]),
-        components=np.array([kind.components for kind in KINDS]),
+        set=np.repeat([kind.set for kind in KINDS], sizes),
+        outside=outside,
         kind=np.repeat(np.arange(len(KINDS)), sizes),
         owner=np.concatenate(owners).astype(np.int64),
         latch_stop=first[STOP]
@@ -131,6 +163,9 @@ def lay_out_rows(model: Model) -> Rows:
     rows.side[:] = 1.0
     rows.side[stops] = 1.0 - 2.0 * upper
     rows.limit[stops] = ends[joint, upper]
+    rows.set[first[CONSTRAINT] : end[CONSTRAINT]] = [robot.constraints[i].set for i in others]
+    rows.limit[first[CONSTRAINT] : end[CONSTRAINT]] = [robot.constraints[i].bound for i in others]
     rows.axis[first[LOOP] : end[LOOP]] = np.tile((0, 1), model.loops)
+    rows.axis[first[TIE] : end[TIE]] = [row for each in count for row in range(each)]
     rows.gap[:] = np.inf
     return rows

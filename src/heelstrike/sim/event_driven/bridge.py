@@ -27,6 +27,7 @@ from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.brakes import share_friction
+from heelstrike.sim.contacts.candidates import find_constraints
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
@@ -41,7 +42,15 @@ from heelstrike.sim.contacts.loops import (
     rows_of,
     speed_along,
 )
-from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import (
+    CONSTRAINT,
+    DRY_JOINT,
+    POINT,
+    SECOND_FACE,
+    STOP,
+    Rows,
+    is_of_ground,
+)
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.impact import IMPACT, heading
@@ -60,7 +69,13 @@ from heelstrike.sim.event_driven.smooth.gaps import (
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Reported, Surface
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
+from heelstrike.sim.record.recording import (
+    CONSTRAINT_HOLDS,
+    JOINT_STOP,
+    TOUCHDOWN,
+    log_event,
+    note_residual,
+)
 from heelstrike.tolerances import CLOSED_GAP, NOTICEABLE_ENERGY
 
 BRIDGE = int(EventKind.BRIDGE)
@@ -242,7 +257,7 @@ def keeps_face(contact: int, ground: GroundModel, rows: Rows, face: Integers) ->
     """Whether a candidate is a contact that will be on the same face at the end of a bridge."""
     if rows.kind[contact] == DRY_JOINT:
         return False
-    if rows.kind[contact] in (STOP, SECOND_FACE):
+    if rows.kind[contact] in (STOP, SECOND_FACE, CONSTRAINT):
         return True
     return face[contact] != NO_FACE or not has_corners(ground)
 
@@ -264,19 +279,19 @@ def reach_end(
 
 @kernel
 def observe_rows(
-    state: Floats, scene: Scene, rows: Rows, modes: Modes, tree: Workspace, contacts: Contacts,
+    state: Floats, scene: Scene, modes: Modes, rows: Rows, tree: Workspace, contacts: Contacts,
     surface: Surface, loops: Loops, seconds: Contacts, faces: Faces,
 ) -> None:  # fmt: skip
     """Kinematics, contact points, and loops of a state (q, v)."""
     model = scene.model
-    observe_faces(model, scene.ground, state, rows, modes, seconds, faces, tree, contacts, surface)
+    observe_faces(model, scene.ground, state, modes, rows, seconds, faces, tree, contacts, surface)
     if rows_of(loops) > 0:
         find_loops(model, state[: model.nq], state[model.nq :], tree, loops)
 
 
 @kernel
 def put_in_place(
-    count: int, total: int, scene: Scene, rows: Rows, begin: Floats, equations: Equations,
+    count: int, total: int, scene: Scene, begin: Floats, rows: Rows, equations: Equations,
     contacts: Contacts, surface: Surface, assembly: Assembly, loops: Loops, seconds: Contacts,
     phase: Phase, bridge: Bridge,
 ) -> None:  # fmt: skip
@@ -295,7 +310,7 @@ def put_in_place(
         kept[row] = impulse[row]
     for _ in range(2):
         observe_rows(
-            end, scene, rows, phase.modes, equations.tree, contacts, surface, loops, seconds,
+            end, scene, phase.modes, rows, equations.tree, contacts, surface, loops, seconds,
             phase.faces,
         )  # fmt: skip
         size = 0
@@ -319,7 +334,7 @@ def put_in_place(
         for i in range(pressed, size):
             held.system[i, size] = -loops.rows.displacement[i - pressed]
         observe_rows(
-            begin, scene, rows, phase.modes, equations.tree, contacts, surface, loops, seconds,
+            begin, scene, phase.modes, rows, equations.tree, contacts, surface, loops, seconds,
             phase.faces,
         )  # fmt: skip
         solve_constraints(size, 0.0, assembly.problem.delassus, held)
@@ -334,14 +349,14 @@ def put_in_place(
 
 @kernel
 def turn_rows(
-    count: int, total: int, scene: Scene, rows: Rows, modes: Modes, begin: Floats, bridge: Bridge,
+    count: int, total: int, scene: Scene, modes: Modes, begin: Floats, bridge: Bridge, rows: Rows,
     tree: Workspace, contacts: Contacts, surface: Surface, assembly: Assembly, loops: Loops,
     seconds: Contacts, faces: Faces,
 ) -> None:  # fmt: skip
     """Let the free terms be those with which velocities at the end are what the problem says."""
     model = scene.model
     free, velocity = assembly.problem.free, assembly.answer.velocity
-    observe_rows(bridge.end, scene, rows, modes, tree, contacts, surface, loops, seconds, faces)
+    observe_rows(bridge.end, scene, modes, rows, tree, contacts, surface, loops, seconds, faces)
     for place in range(count, total):
         along = speed_along(place - count, loops, bridge.end[model.nq :])
         free[2 * place] += along - velocity[2 * place]
@@ -351,9 +366,9 @@ def turn_rows(
             continue
         normal, tangent = gap_velocity(contact, model, contacts, tree, rows, seconds, bridge.end)
         free[2 * place] += normal - (velocity[2 * place] - bridge.added[place])
-        if rows.kind[contact] != STOP:
+        if is_of_ground(contact, rows):
             free[2 * place + 1] += tangent - velocity[2 * place + 1]
-    observe_rows(begin, scene, rows, modes, tree, contacts, surface, loops, seconds, faces)
+    observe_rows(begin, scene, modes, rows, tree, contacts, surface, loops, seconds, faces)
 
 
 @kernel
@@ -373,12 +388,12 @@ def solve_bridge(
             return False
         reach_end(total, length, free_end, scene, assembly, begin, memory.equations, bridge.end)
         put_in_place(
-            count, total, scene, memory.rows, begin, memory.equations, memory.contacts,
+            count, total, scene, begin, memory.rows, memory.equations, memory.contacts,
             memory.surface, assembly, memory.loops, memory.seconds, phase, bridge,
         )  # fmt: skip
         if attempt == 0:
             turn_rows(
-                count, total, scene, memory.rows, phase.modes, begin, bridge, memory.equations.tree,
+                count, total, scene, phase.modes, begin, bridge, memory.rows, memory.equations.tree,
                 memory.contacts, memory.surface, assembly, memory.loops, memory.seconds,
                 phase.faces,
             )  # fmt: skip
@@ -506,7 +521,7 @@ def report_impulses(
 ) -> None:  # fmt: skip
     """Append the bridge to the events, and the impulses of the contacts."""
     log_event(time, BRIDGE, 0, length, wrong, record)
-    for contact in range(rows.end[STOP]):
+    for contact in range(rows.end[CONSTRAINT]):
         normal = impact.impulse[contact, 0]
         struck = (
             is_struck(contact, rows, paired, impact.impulse)
@@ -520,6 +535,11 @@ def report_impulses(
             log_event(time, JOINT_STOP, joint, normal, 0.0, record)
             reported.closed[contact] = 1
             continue
+        if rows.kind[contact] == CONSTRAINT:
+            number = rows.owner[contact]
+            log_event(time, CONSTRAINT_HOLDS, number, normal, 0.0, record)
+            reported.closed[contact] = 1
+            continue
         kind = IMPACT
         if reported.closed[contact] == 0:
             kind = TOUCHDOWN
@@ -530,13 +550,15 @@ def report_impulses(
 
 @kernel
 def adopt_end(
-    model: Model, ground: GroundModel, mode: Integers, rows: Rows, begin: Floats,
+    model: Model, ground: GroundModel, mode: Integers, begin: Floats, rows: Rows,
     equations: Equations, contacts: Contacts, surface: Surface, seconds: Contacts, modes: Modes,
     faces: Faces, meets: Integers,
 ) -> None:  # fmt: skip
     """Let the contacts do at the end of the bridge what it found."""
     tree = equations.tree
     evaluate_equations(model, begin[: model.nq], begin[model.nq :], equations)
+    if rows.outside.kernel.shape[0] > 0:
+        find_constraints(model, begin[: model.nq], begin[model.nq :], tree, rows)
     for contact in range(model.nc):
         faces.face[contact] = NO_FACE
         meets[contact] = 0
@@ -622,7 +644,7 @@ def cross_bridge(
     for i in range(step.begin.shape[0]):
         step.begin[i] = bridge.end[i]
     adopt_end(
-        model, scene.ground, memory.reaction.mode, memory.rows, step.begin, memory.equations,
+        model, scene.ground, memory.reaction.mode, step.begin, memory.rows, memory.equations,
         memory.contacts, memory.surface, memory.seconds, modes, phase.faces, work.impact.meets,
     )  # fmt: skip
     work.decision.bridging = 0

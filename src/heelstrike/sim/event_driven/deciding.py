@@ -10,12 +10,14 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.sets import LINE
-from heelstrike.dynamics.kernels import forward_kinematics
+from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.candidates import find_constraints
 from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import rows_of
 from heelstrike.sim.contacts.rows import (
+    CONSTRAINT,
     DRY_JOINT,
     POINT,
     STOP,
@@ -34,7 +36,7 @@ from heelstrike.sim.event_driven.smooth.saddle_point import solve_accelerations
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Memory
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import JOINT_STOP, log_event, note_residual
+from heelstrike.sim.record.recording import CONSTRAINT_HOLDS, JOINT_STOP, log_event, note_residual
 from heelstrike.tolerances import CLOSED_GAP
 
 PAINLEVE = int(EventKind.PAINLEVE)
@@ -114,9 +116,13 @@ def jump(
     solved, _, _ = collide(model, nudge, plastic, memory, phase, impact, step.begin)
     for contact in range(modes.watched):
         plastic[contact] = 0
-    for contact in range(memory.rows.end[STOP]):
+    for contact in range(memory.rows.end[CONSTRAINT]):
         if not solved:
             continue
+        if memory.rows.kind[contact] == CONSTRAINT and impact.impulse[contact, 0] > 0.0:
+            number = memory.rows.owner[contact]
+            impulse = impact.impulse[contact, 0]
+            log_event(step.time, CONSTRAINT_HOLDS, number, impulse, 0.0, record)
         if memory.rows.kind[contact] == STOP and impact.impulse[contact, 0] > 0.0:
             joint = memory.rows.owner[contact]
             log_event(step.time, JOINT_STOP, joint, impact.impulse[contact, 0], 0.0, record)
@@ -181,6 +187,10 @@ def begin_phase(
     adopt_modes(count, assembly, memory.rows, phase.modes, memory.reaction.mode)
     tree, contacts = memory.equations.tree, memory.contacts
     forward_kinematics(model, step.begin[: model.nq], tree)
+    if memory.rows.outside.kernel.shape[0] > 0:
+        q, v = step.begin[: model.nq], step.begin[model.nq :]
+        link_velocities(model, v, tree)
+        find_constraints(model, q, v, tree, memory.rows)
     choose_faces(
         model, ground, tree, memory.rows, memory.reaction.mode, phase.modes, phase.faces,
         work.impact.hit, work.bounces,

@@ -9,6 +9,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.candidates import find_constraints
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -16,7 +17,7 @@ from heelstrike.sim.contacts.geometry import (
     row_product,
 )
 from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
-from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, STOP, Rows
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, POINT, STOP, Rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.phase import Bounces, Impact, Modes, Phase, Step
 from heelstrike.sim.event_driven.smooth.candidates import free_acceleration
@@ -31,7 +32,13 @@ from heelstrike.sim.event_driven.smooth.saddle_point import (
 )
 from heelstrike.sim.memory import Memory, Reported
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
+from heelstrike.sim.record.recording import (
+    CONSTRAINT_HOLDS,
+    JOINT_STOP,
+    TOUCHDOWN,
+    log_event,
+    note_residual,
+)
 from heelstrike.tolerances import NOTICEABLE_ENERGY
 
 IMPACT = int(EventKind.IMPACT)
@@ -177,6 +184,8 @@ def short_bounces(
     was_closed = memory.reported.closed
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
     evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
+    if memory.rows.outside.kernel.shape[0] > 0:
+        find_constraints(model, state[: model.nq], state[model.nq :], equations.tree, memory.rows)
     locate(
         model, ground, equations.tree, memory.rows, modes, memory.seconds, phase.faces, contacts,
         memory.surface,
@@ -293,7 +302,7 @@ def report_impacts(
     """Append the impulses of an impact to the events; return the point with the largest."""
     impulse = impact.impulse
     largest = 0
-    for contact in range(rows.end[STOP]):
+    for contact in range(rows.end[CONSTRAINT]):
         normal = impulse[contact, 0]
         struck = (
             is_struck(contact, rows, paired, impact.impulse)
@@ -306,6 +315,10 @@ def report_impacts(
             continue
         landed = reported.closed[contact] == 0
         reported.closed[contact] = 1
+        if rows.kind[contact] == CONSTRAINT:
+            number = rows.owner[contact]
+            log_event(time, CONSTRAINT_HOLDS, number, normal, 0.0, record)
+            continue
         if rows.kind[contact] == STOP:
             joint = rows.owner[contact]
             log_event(time, JOINT_STOP, joint, normal, 0.0, record)

@@ -78,7 +78,7 @@ def evaluate_within(
         evaluate(scene, time, samples.state, control, memory, phase, slope)
     else:
         look(
-            scene.model, scene.ground, samples.state, memory.rows, phase.modes,
+            scene.model, scene.ground, samples.state, phase.modes, memory.rows,
             memory.equations.tree, memory.contacts, memory.surface, memory.seconds, phase.faces,
             phase.watch,
         )  # fmt: skip

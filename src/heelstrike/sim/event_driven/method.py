@@ -17,6 +17,7 @@ from heelstrike.arguments import check_fields
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.contact.sets import ImpulseSet
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
@@ -24,6 +25,7 @@ from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.contacts.brakes import awaits_hold
+from heelstrike.sim.contacts.candidates import find_constraints
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.loops import close_loops, rows_of, steady_loops
@@ -97,6 +99,7 @@ class EventDriven(Method):
     which the robot moves, passes below the ground until it comes up again."""
 
     impulses_in_events: ClassVar[bool] = True
+    holds: ClassVar[frozenset[ImpulseSet]] = frozenset({ImpulseSet.LINE, ImpulseSet.HALF_LINE})
     python_period: ClassVar[float | None] = 1e-3
 
     def __post_init__(self) -> None:
@@ -143,7 +146,7 @@ class EventDriven(Method):
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
         others = 2 * robot.model.latches + robot.model.brakes
-        contacts = contact_count(robot.model)
+        contacts = contact_count(robot)
         return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contacts + others + 8
 
     def check(self, setting: Setting) -> None:
@@ -238,6 +241,8 @@ def begin(model: Model, ground: GroundModel, memory: Memory, work: Motion, recor
         step.begin[model.nq + i] = v[i]
     begin_rubbing(v, memory.breakaway, memory.rows, modes, memory.reported)
     evaluate_equations(model, q, v, equations)
+    if memory.rows.outside.kernel.shape[0] > 0:
+        find_constraints(model, q, v, equations.tree, memory.rows)
     locate(
         model, ground, equations.tree, memory.rows, modes, memory.seconds, phase.faces,
         memory.contacts, memory.surface,
@@ -256,6 +261,8 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Motion) -> 
     phase = work.phase
     forward_kinematics(model, memory.q, memory.equations.tree)
     link_velocities(model, memory.v, memory.equations.tree)
+    if memory.rows.outside.kernel.shape[0] > 0:
+        find_constraints(model, memory.q, memory.v, memory.equations.tree, memory.rows)
     locate(
         model, ground, memory.equations.tree, memory.rows, phase.modes, memory.seconds, phase.faces,
         memory.contacts, memory.surface,

@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
-from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
-from heelstrike.sim.contacts.rows import contact_count
+from heelstrike.sim.contacts.rows import contact_count, most_rows
 from heelstrike.sim.event_driven.continuous_extension import Extension
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
 
@@ -65,6 +64,8 @@ class Faces(Bundle):
     on, or could meet (:mod:`heelstrike.sim.event_driven.faces`)."""
     paired: int = cell(int)
     """Whether the ground has concave corners, where points have second faces."""
+    bend: Floats = array("contacts")
+    """Curvature (1/m) of the way of the centre of each disc along smooth ground."""
     place: Floats = array(3)
     """Scratch of :func:`~heelstrike.sim.event_driven.smooth.faces.choose_faces`."""
     center: Floats = array(3)
@@ -346,7 +347,7 @@ class Motion(Bundle):
 def allocate_motion(robot: Robot) -> Motion:
     """Allocate the memory of an event-driven simulation of `robot`."""
     model = robot.model
-    contacts, loops = contact_count(model), most_rows(model)
+    contacts, loops = contact_count(robot), most_rows(robot)
     rows = 2 * contacts + loops
     extents = model.extents | {
         "contacts": contacts, "components": 2, "rows": rows, "unknowns": model.nv + rows,

@@ -8,7 +8,7 @@ from heelstrike.sim.contacts.brakes import share_friction
 from heelstrike.sim.contacts.dry_friction import add_dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.loops import note_loops, rows_of
-from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, SECOND_FACE, STOP, Rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.continuous_extension import (
@@ -49,13 +49,15 @@ REPEATED, FAR = 3, 4.0
 
 
 @kernel
-def note_state(model: Model, row: int, state: Floats, record: Record) -> None:
+def note_state(model: Model, row: int, state: Floats, rows: Rows, record: Record) -> None:
     """Write a state to a row, where no force acts as yet."""
     for i in range(model.nv):
         record.position[row, i] = state[i]
         record.velocity[row, i] = state[model.nq + i]
         record.stop_torque[row, i] = 0.0
         record.friction_torque[row, i] = 0.0
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        record.constraint_force[row, rows.owner[entry], 0] = 0.0
     for contact in range(model.nc):
         record.contact_force[row, contact, 0] = 0.0
         record.contact_force[row, contact, 1] = 0.0
@@ -64,7 +66,7 @@ def note_state(model: Model, row: int, state: Floats, record: Record) -> None:
 
 @kernel
 def put_right(
-    scene: Scene, state: Floats, rows: Rows, step: Step, equations: Equations, contacts: Contacts,
+    scene: Scene, state: Floats, step: Step, rows: Rows, equations: Equations, contacts: Contacts,
     surface: Surface, assembly: Assembly, loops: Loops, seconds: Contacts, phase: Phase,
     output: Output,
 ) -> bool:  # fmt: skip
@@ -116,7 +118,7 @@ def write_row(
     Where no contact forces obey the laws there are none in the row, and none of loops.
     """
     put_right(
-        scene, state, memory.rows, step, memory.equations, memory.contacts, memory.surface,
+        scene, state, step, memory.rows, memory.equations, memory.contacts, memory.surface,
         memory.assembly, memory.loops, memory.seconds, phase, output,
     )  # fmt: skip
     write_right(scene, time, lawful, impact, control, memory, phase, output, record)
@@ -151,7 +153,7 @@ def write_right(
         note_loops(memory.rows, count + loop_rows, 1.0, impulse, memory.loops)
     row, friction_torque = record.rows, record.friction_torque[record.rows]
     note_row(time, memory, record)
-    note_state(model, row, trial, record)
+    note_state(model, row, trial, memory.rows, record)
     add_dry_force(modes.slide, modes.breakaway, memory.rows, friction_torque)
     deepest = memory.tally.penetration
     for contact in range(model.nc):
@@ -171,6 +173,8 @@ def write_right(
             friction_torque[owner] = tangent
         elif kind == STOP:
             record.stop_torque[row, owner] += memory.rows.side[contact] * normal
+        elif kind == CONSTRAINT:
+            record.constraint_force[row, owner, 0] = normal
         else:
             record.contact_force[row, contact, 0] = normal
             record.contact_force[row, contact, 1] = tangent
@@ -281,7 +285,7 @@ def write_rows_within(
             for i in range(state.shape[0]):
                 state[i] = step.end[i]
         fits = put_right(
-            scene, state, memory.rows, step, memory.equations, memory.contacts, memory.surface,
+            scene, state, step, memory.rows, memory.equations, memory.contacts, memory.surface,
             memory.assembly, memory.loops, memory.seconds, phase, output,
         )  # fmt: skip
         inside = is_inside(time, step.time, step.length)

@@ -143,7 +143,7 @@ def end_at_event(
         ):  # fmt: skip
             return length, True, False
         look(
-            scene.model, scene.ground, step.end, memory.rows, phase.modes, memory.equations.tree,
+            scene.model, scene.ground, step.end, phase.modes, memory.rows, memory.equations.tree,
             memory.contacts, memory.surface, memory.seconds, phase.faces, watch,
         )  # fmt: skip
         if has_corners(scene.ground):

@@ -10,8 +10,9 @@ import numpy as np
 from heelstrike.robot.model import SELDOM
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.constraint import constraint_names
 from heelstrike.sim.files.logs import DIMENSIONS, log_attribute, log_variables
-from heelstrike.sim.files.settings import settings
+from heelstrike.sim.files.settings import constraint_settings, settings, shape_settings
 from heelstrike.sim.files.variables import Variable
 from heelstrike.sim.push import numbers_of_pushes
 from heelstrike.sim.run import EVENT_MEMBERS, QUANTITIES, SOLVED, WORST, Run
@@ -66,7 +67,7 @@ PUSHES = {
 
 def _seldom(name: str) -> bool:
     """Whether a quantity is one of what most robots have nothing of, which need not be told."""
-    return any(extent in SELDOM for extent in QUANTITIES[name].shape)
+    return any(extent in (*SELDOM, "constraints") for extent in QUANTITIES[name].shape)
 
 
 def labels(robot: Robot) -> dict[str, list[str]]:
@@ -78,6 +79,7 @@ def labels(robot: Robot) -> dict[str, list[str]]:
         "loop": list(robot.loop_names),
         "coupling": list(robot.coupling_names),
         "brake": list(robot.brake_names),
+        "constraint": constraint_names(robot),
         "axis": ["x", "z"],
         "component": ["normal", "tangent"],
         "condition": ["complementarity", "cone", "non-penetration"],
@@ -140,6 +142,8 @@ def _attributes(run: Run) -> dict[str, Any]:
         "impulses_in_events": int(run.method.impulses_in_events),
         "ground_slope": float(run.ground.slope),
         "ground_has_profile": int(run.ground.profile is not None),
+        **shape_settings(run.ground),
+        **constraint_settings(run.robot),
         **{f"worst_{name}": getattr(run.certificates, name) for name in WORST},
         "solver_name": run.solver.name,
         **{f"solver_{name}": getattr(run.solver, name) for name in SOLVED},

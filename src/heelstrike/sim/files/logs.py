@@ -19,6 +19,7 @@ DIMENSIONS = {
     "nl": "coordinate", "nq": "coordinate", "nv": "coordinate", "nu": "actuator", "nc": "contact",
     "axes": "axis", "components": "component", "conditions": "condition",
     "loops": "loop", "couplings": "coupling", "brakes": "brake",
+    "constraints": "constraint",
 }  # fmt: skip
 """What datasets call the extents of a row. In the plane links and coordinates share one."""
 

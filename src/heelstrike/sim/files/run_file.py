@@ -72,11 +72,13 @@ def save(run: Run, path: str | os.PathLike[str]) -> Path:
         raise RunFileError(f"{error}; {KEPT}") from error
     if ending == TABLE:
         return _written(path, to_csv(run))
-    if reason := unreadable(run.method):
-        raise RunFileError(
-            f"cannot write {path}: a run by {type(run.method).__name__} could not be read again: "
-            f"{reason}; {KEPT}, as run.to_dataset() or array by array"
-        )
+    shapes = () if run.ground.shape is None else (run.ground.shape,)
+    for part in (run.method, *shapes, *run.robot.constraints):
+        if reason := unreadable(part):
+            raise RunFileError(
+                f"cannot write {path}: a run by {type(part).__name__} could not be read again: "
+                f"{reason}; {KEPT}, as run.to_dataset() or array by array"
+            )
     try:
         # HDF5 crashes on a disk that is full. In memory it never meets one.
         image = _image(run)
@@ -162,8 +164,9 @@ def load_run(
         Robot to attach to the run, instead of the one the file describes. Its coordinates,
         actuators and contact points must have the names of the file's.
     classes : sequence of type
-        Methods and contact laws from outside the package that the run may be made with. A method
-        that is not known is loaded as data, an :class:`~heelstrike.sim.method.UnknownMethod`.
+        Methods, contact laws, ground shapes and constraints from outside the package that the run
+        may be made with. A method that is not known is loaded as data, an
+        :class:`~heelstrike.sim.method.UnknownMethod`; shapes and constraints have to be known.
 
     Returns
     -------

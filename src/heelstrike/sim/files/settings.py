@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from heelstrike.contact.ground import Ground
+from heelstrike.contact.ground_shape import GroundShape
 from heelstrike.errors import HeelstrikeError
+from heelstrike.robot.robot import Robot
 from heelstrike.sim.compliant.contact_law import (
     BristleFriction,
     HuntCrossley,
@@ -17,6 +20,7 @@ from heelstrike.sim.compliant.contact_law import (
     RegularisedFriction,
 )
 from heelstrike.sim.compliant.method import Compliant
+from heelstrike.sim.contacts.constraint import Constraint, constrained
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.files.variables import DamageError, Stored
 from heelstrike.sim.method import Method, UnknownMethod
@@ -45,6 +49,68 @@ def settings(prefix: str, thing: Any) -> dict[str, str | int | float]:
         else:
             found[name] = _plain(value)
     return found
+
+
+def shape_settings(ground: Ground) -> dict[str, str | int | float]:
+    """Return name and settings of the shape of a smooth ground as attributes."""
+    if ground.shape is None:
+        return {}
+    return {"ground_shape": type(ground.shape).__name__, **settings("ground_shape", ground.shape)}
+
+
+def shaped(ground: Ground, stored: Stored, classes: Mapping[str, type]) -> Ground:
+    """Return the ground of a file with its shape, which is of a class from outside.
+
+    Raises
+    ------
+    DamageError
+        If the class is not given, or its settings are missing or cannot be.
+    """
+    if "@ground_shape" not in stored.contents:
+        return ground
+    name = stored.text("ground_shape")
+    kind = classes.get(name)
+    if kind is None or not issubclass(kind, GroundShape):
+        raise UnknownClassError("on ground of the shape", name)
+    return replace(ground, shape=_rebuilt(stored, "ground_shape", kind, classes))
+
+
+def constraint_settings(robot: Robot) -> dict[str, str | int | float]:
+    """Return names and settings of the constraints that hold a robot as attributes."""
+    found: dict[str, str | int | float] = {}
+    for i, each in enumerate(robot.constraints):
+        name = f"constraint_{i}"
+        found |= {name: type(each).__name__, **settings(name, each)}
+    return found
+
+
+def held(robot: Robot, stored: Stored, classes: Mapping[str, type]) -> Robot:
+    """Return the robot of a file with the constraints of its run, of classes from outside.
+
+    Raises
+    ------
+    DamageError
+        If a class is not given, or its settings are missing or cannot be.
+    """
+    found: list[Any] = []
+    while f"@constraint_{len(found)}" in stored.contents:
+        prefix = f"constraint_{len(found)}"
+        name = stored.text(prefix)
+        kind = classes.get(name)
+        if kind is None or not issubclass(kind, Constraint):
+            raise UnknownClassError("with the constraint", name)
+        found.append(_rebuilt(stored, prefix, kind, classes))
+    return constrained(robot, *found) if found else robot
+
+
+class UnknownClassError(HeelstrikeError):
+    """A run is one with something of a class that is not known here."""
+
+    def __init__(self, what: str, name: str) -> None:
+        super().__init__(
+            f"the run was made {what} {name[:60]!r}, a class of somebody's that is not known here: "
+            f"load_run(path, classes=[{name[:60]}])"
+        )
 
 
 def _plain(value: Any) -> str | int | float:

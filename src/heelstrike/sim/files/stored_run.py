@@ -25,7 +25,7 @@ from heelstrike.sim.files.dataset import (
 from heelstrike.sim.files.hdf5_contents import Contents
 from heelstrike.sim.files.logs import stored_log
 from heelstrike.sim.files.robot_dataset import stored_robot
-from heelstrike.sim.files.settings import stored_method
+from heelstrike.sim.files.settings import UnknownClassError, held, shaped, stored_method
 from heelstrike.sim.files.variables import DamageError, Stored
 from heelstrike.sim.push import Push, pushes_of_numbers
 from heelstrike.sim.run import (
@@ -87,6 +87,8 @@ def stored_run(
         return _run(stored, described if robot is None else robot, classes)
     except RunFileError:
         raise
+    except UnknownClassError as error:
+        raise RunFileError(f"{source}: {error}") from error
     except (DamageError, HeelstrikeError) as error:
         raise RunFileError(f"{source}: damaged: {error}") from error
 
@@ -118,6 +120,9 @@ def _check_same(source: Path, robot: Robot, stored: Robot) -> None:
 
 def _run(stored: Stored, robot: Robot, classes: Sequence[type]) -> Run:
     status = stored.member("status", {each.value: each for each in RunStatus})
+    known = {kind.__name__: kind for kind in classes}
+    if not robot.constraints:
+        robot = held(robot, stored, known)
     sizes = {dim: len(names) for dim, names in labels(robot).items()}
     (time,) = stored.arrays(TIME, sizes).values()
     if not np.all(np.diff(time) >= 0.0):
@@ -126,8 +131,8 @@ def _run(stored: Stored, robot: Robot, classes: Sequence[type]) -> Run:
     rows = {name: each._replace(allowed=allowed) for name, each in ROWS.items()}
     return Run(
         robot=robot,
-        ground=_ground(stored, sizes),
-        method=stored_method(stored, {kind.__name__: kind for kind in classes}),
+        ground=shaped(_ground(stored, sizes), stored, known),
+        method=stored_method(stored, known),
         status=status,
         message=stored.text("message"),
         time=time,
@@ -178,6 +183,8 @@ def _events(stored: Stored, robot: Robot, sizes: dict[str, int]) -> tuple[Event,
         # A bridge is one of the whole robot, but every robot has a joint.
         of_joint = EventKind(k).of_joint or k == EventKind.BRIDGE
         where, count = ("joint", robot.nv) if of_joint else ("contact point", robot.nc)
+        if EventKind(k).of_constraint:
+            where, count = "constraint", len(robot.constraints)
         if not 0 <= c < count:
             raise DamageError(f"an event names a {where} that is not there")
     return events_of(time, kind, contact, impulse)

@@ -38,8 +38,9 @@ class Record(Bundle):
 def allocate_record(robot: Robot, rows: int, events: int, words: int = 0) -> Record:
     """Allocate a record of `rows` instants, with so many words of a log, and `events` events."""
     extents = robot.model.extents | ROW_EXTENTS | {"words": words}
+    extents["constraints"] = len(robot.constraints)
     return Record.allocate(extents, nt=rows, ne=events)
 
 
-ROW_EXTENTS = {"components": 2, "conditions": 3}
-"""Extents of rows that are the same for all robots."""
+ROW_EXTENTS = {"components": 2, "conditions": 3, "constraints": 0}
+"""Extents of rows that no robot's model tells: so many constraints a robot has by itself."""

@@ -7,12 +7,13 @@ from typing import Any
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_height
+from heelstrike.contact.sets import INTERVAL
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.contacts.rows import DRY_JOINT
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT
 from heelstrike.sim.memory import Memory, Tally
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.run import QUANTITIES
@@ -25,6 +26,8 @@ STICK = int(EventKind.STICK)
 JOINT_STOP = int(EventKind.JOINT_STOP)
 JOINT_SLIP = int(EventKind.JOINT_SLIP)
 JOINT_STICK = int(EventKind.JOINT_STICK)
+CONSTRAINT_HOLDS = int(EventKind.CONSTRAINT_HOLDS)
+CONSTRAINT_LETS_GO = int(EventKind.CONSTRAINT_LETS_GO)
 
 # A contact point has left the ground when its gap exceeds this (m), and slips above this (m/s).
 LIFTOFF_GAP = 1e-7
@@ -95,6 +98,8 @@ def note_events(
         if memory.reaction.stop_torque[joint] != 0.0 or memory.reported.stopped[joint] != 0:
             note_stop(model, end, step, joint, memory, record)
     rows = memory.rows
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        note_constraint(time, end, step, entry, memory, record)
     for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
         joint = rows.owner[dry]
         if memory.breakaway[joint] == 0.0:
@@ -134,6 +139,25 @@ def note_events_of_contact(
         if slips != (slipping[contact] == 1):
             slipping[contact] = 1 if slips else 0
             note_event(end, SLIP if slips else STICK, contact, step, force, record)
+
+
+@kernel
+def note_constraint(
+    time: float, end: float, step: float, entry: int, memory: Memory, record: Record
+) -> None:
+    """Find whether a constraint from outside took hold in this step, or let go."""
+    rows, closed = memory.rows, memory.reported.closed
+    if rows.set[entry] == INTERVAL:
+        return
+    number, gap = rows.owner[entry], rows.gap[entry]
+    force = memory.loops.constraint_force[number]
+    if closed[entry] == 0 and force[0] > 0.0:
+        closed[entry] = 1
+        if memory.tally.steps > 0 or gap > LIFTOFF_GAP:
+            log_event(end, CONSTRAINT_HOLDS, number, step * force[0], step * force[1], record)
+    elif closed[entry] == 1 and force[0] == 0.0 and gap > LIFTOFF_GAP:
+        closed[entry] = 0
+        log_event(time, CONSTRAINT_LETS_GO, number, 0.0, 0.0, record)
 
 
 @kernel

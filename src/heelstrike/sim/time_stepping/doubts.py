@@ -5,6 +5,13 @@ Where a scheme takes springs and dampers as at the beginning of a step, a spring
 of A⁻¹ (h² K / 4 + h D / 2), as it moves freely: what the ground or loops hold can only swing more
 slowly (Rayleigh).
 
+Below that a spring makes no energy for ever, but the step swings with the energy of another one::
+
+    v²/2 + ω² q²/2 − h ω² q v/2    stays, so that the true energy is up to (1 + s) / (1 − s) times
+                                   what it was, with s = h ω / 2
+
+Whoever takes energy in or out on the way, as a stop does, keeps what it is off by.
+
 Contact impulses are found from G = J A⁻¹ Jᵀ. Where a point is so many times easier to move than the
 whole robot, because its link has next to no inertia, so many digits of what it takes to stop the
 robot are lost in G, and no solver can certify what is not there.
@@ -23,17 +30,23 @@ from heelstrike.robot.robot import Robot
 EASIEST = 3e7
 
 
+TOLD_WRONG = 2.0
+"""How many times the energy of a spring a step may tell of without being in doubt: where h ω is
+2/3, a tenth of a period."""
+
+
 class SimulationWarning(UserWarning):
     """A simulation begins, but what comes out of it may mean little."""
 
 
-def stiffest(robot: Robot, q: Floats, step: float) -> tuple[float, str]:
+def stiffest(robot: Robot, q: Floats, step: float, *, dampers: bool = True) -> tuple[float, str]:
     """Return how stiff the springs and dampers are for a step, and the joint that swings most.
 
-    Beyond one a link that is free to swing on them gains energy in each step.
+    Beyond one a link that is free to swing on them gains energy in each step. Of springs alone it
+    is the square of half the step times the highest frequency.
     """
     model = robot.model
-    pull = 0.25 * step**2 * model.stiffness + 0.5 * step * model.damping
+    pull = 0.25 * step**2 * model.stiffness + (0.5 * step * model.damping if dampers else 0.0)
     # A is more than what motors and reductions add to it.
     if not np.any(pull > model.armature) or not np.all(np.isfinite(q)):
         return 0.0, ""
@@ -48,14 +61,30 @@ def too_stiff(robot: Robot, q: Floats, step: float) -> str:
     value, joint = stiffest(robot, q, step)
     if value <= 1.0:
         return ""
-    shorter = step
-    while stiffest(robot, q, shorter)[0] > 0.25:
-        shorter *= 0.5
     return (
         f"the spring or damper of joint {joint!r} is too stiff for a step of {step:g} s: a link "
-        f"that is free to swing on it gains energy in each step. Use Scheme.LINEARLY_IMPLICIT, a "
-        f"step of at most {shorter:.2g} s, or EventDriven()"
+        f"that is free to swing on it gains energy in each step. {_cures(robot, q, step)}"
     )
+
+
+def hardly_told(robot: Robot, q: Floats, step: float) -> str:
+    """Say which spring swings too fast for a step to tell its energy; nothing if none does."""
+    squared, joint = stiffest(robot, q, step, dampers=False)
+    share = float(np.sqrt(squared))
+    times = (1.0 + share) / (1.0 - share) if share < 1.0 else 0.0
+    if times <= TOLD_WRONG:
+        return ""
+    return (
+        f"on the spring of joint {joint!r} a link may swing so fast that a step of {step:g} s "
+        f"tells up to {times:.2g} times its energy. {_cures(robot, q, step)}"
+    )
+
+
+def _cures(robot: Robot, q: Floats, step: float) -> str:
+    shorter, share = step, (TOLD_WRONG - 1.0) / (TOLD_WRONG + 1.0)
+    while stiffest(robot, q, shorter)[0] > share**2:
+        shorter *= 0.5
+    return f"Use Scheme.LINEARLY_IMPLICIT, a step of at most {shorter:.2g} s, or EventDriven()"
 
 
 def too_light(robot: Robot, q: Floats) -> str:

@@ -45,7 +45,14 @@ from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.contacts.rows import POINT, SECOND_FACE, STOP, lay_out_rows
+from heelstrike.sim.contacts.rows import (
+    CONSTRAINT,
+    POINT,
+    SECOND_FACE,
+    STOP,
+    lay_out_rows,
+)
+from heelstrike.sim.contacts.writers import rate_of
 from heelstrike.sim.memory import Assembly, Memory
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import log_event, note_event
@@ -104,7 +111,7 @@ class Impact(Bundle):
 
 def allocate_impact(robot: Robot, *, bounded: bool = False) -> Impact:
     """Allocate what the steps of a robot need, with nothing known yet."""
-    entries = len(lay_out_rows(robot.model).kind)
+    entries = len(lay_out_rows(robot).kind)
     return Impact.allocate(
         nv=robot.nv,
         capacity=entries,
@@ -170,10 +177,11 @@ def stays_wedged(steps: int, impact: Impact) -> bool:
 
 @kernel
 def modes_change(memory: Memory) -> bool:
-    """Whether a point or stop opens, closes or slides otherwise than in the step before."""
+    """Whether anything opens, closes or slides otherwise than in the step before."""
     return (
         changes(POINT, memory.assembly, memory.reaction.mode)
         or changes(STOP, memory.assembly, memory.reaction.mode)
+        or changes(CONSTRAINT, memory.assembly, memory.reaction.mode)
         or changes(SECOND_FACE, memory.assembly, memory.reaction.mode)
     )
 
@@ -268,7 +276,9 @@ def find_members(step: float, problem: ContactProblem, memory: Memory, impact: I
 
 @kernel
 def speed_before(model: Model, entry: int, memory: Memory) -> float:
-    """Normal velocity of a contact point, on either face, as the step begins."""
+    """Normal velocity of a contact point, on either face, or a constraint, as the step begins."""
+    if memory.rows.kind[entry] == CONSTRAINT:
+        return rate_of(memory.rows.owner[entry], 0, memory.v, memory.rows.outside)
     point, tree = memory.rows.owner[entry], memory.equations.tree
     if memory.rows.kind[entry] == POINT:
         normal, _ = contact_velocity(model, tree, memory.contacts, point)

@@ -27,6 +27,9 @@ the work K (q + Δq/2) Δq. The linearly implicit scheme has θ = 1.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import ClassVar
+
 import numpy as np
 
 from heelstrike.arguments import check_fields
@@ -36,6 +39,7 @@ from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.sets import INTERVAL, ImpulseSet
 from heelstrike.contact.workspace import ContactProblem
 from heelstrike.dynamics.kernels import integrate, passive_force
 from heelstrike.dynamics.workspace import Workspace
@@ -48,6 +52,7 @@ from heelstrike.sim.closed_sets import Scheme
 from heelstrike.sim.contacts.brakes import find_loops_of_step, note_brakes, share_friction
 from heelstrike.sim.contacts.candidates import (
     are_there,
+    find_constraints,
     hold_latched,
     list_candidate,
     list_dry_joints,
@@ -59,6 +64,7 @@ from heelstrike.sim.contacts.candidates import (
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
+    bend_acceleration,
     contact_rows,
     contact_velocity,
     evaluate_equations,
@@ -78,6 +84,7 @@ from heelstrike.sim.contacts.loops import (
 )
 from heelstrike.sim.contacts.points import point_velocities
 from heelstrike.sim.contacts.rows import (
+    CONSTRAINT,
     DRY_JOINT,
     LOOP,
     POINT,
@@ -87,6 +94,7 @@ from heelstrike.sim.contacts.rows import (
     lay_out_rows,
 )
 from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
+from heelstrike.sim.contacts.writers import Writers, rate_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.frame import DIVERGED, DONE, SOLVER_FAILED, Kernels, Scene
@@ -97,7 +105,7 @@ from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.corners import join_forces, locate_corners
-from heelstrike.sim.time_stepping.doubts import too_light, too_stiff
+from heelstrike.sim.time_stepping.doubts import hardly_told, too_light, too_stiff
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
     Impact,
@@ -170,6 +178,8 @@ class TimeStepping(Method):
     First order in the step, whatever the scheme.
     """
 
+    holds: ClassVar[frozenset[ImpulseSet]] = frozenset(ImpulseSet)
+
     step: float = 1e-3
     """Length of the step h in seconds."""
     scheme: Scheme = Scheme.IMPACT_RESOLVED
@@ -232,6 +242,7 @@ class TimeStepping(Method):
             + len(robot.joint_names)
             + robot.model.latches
             + robot.model.brakes
+            + 2 * len(robot.constraints)
             + 2
         )
         return 1, events
@@ -240,7 +251,7 @@ class TimeStepping(Method):
         self, robot: Robot, work: Stepping, clock: Clock, *, stops: bool = False
     ) -> None:
         """What touched other ground says nothing of this one."""
-        rows = lay_out_rows(robot.model)
+        rows = lay_out_rows(robot)
         stood = work.impact.touching[rows.first[STOP] : rows.end[STOP]].copy()
         work.impact.touching[:] = NEVER
         if stops:
@@ -274,14 +285,17 @@ class TimeStepping(Method):
             f"{self.step:g} s, or Scheme.IMPACT_RESOLVED"
         )
         found = (
-            self._too_stiff(robot, q), too_light(robot, q), deep if sunk > SUNK else "",
+            self._too_stiff(robot, q), self._too_stiff(robot, q, hardly_told),
+            too_light(robot, q), deep if sunk > SUNK else "",
             beyond if past > PAST else "",
         )  # fmt: skip
         return [doubt for doubt in found if doubt]
 
-    def _too_stiff(self, robot: Robot, q: Floats) -> str:
+    def _too_stiff(
+        self, robot: Robot, q: Floats, asked: Callable[[Robot, Floats, float], str] = too_stiff
+    ) -> str:
         implicit = self.scheme in (Scheme.MOREAU_JEAN, Scheme.LINEARLY_IMPLICIT)
-        return "" if implicit else too_stiff(robot, q, self.step)
+        return "" if implicit else asked(robot, q, self.step)
 
 
 @dissolved_kernel
@@ -322,6 +336,8 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
     if memory.loops.unknown.shape[0] > 0:
         find_loops_of_step(model, memory)
+    if memory.rows.outside.kernel.shape[0] > 0:
+        find_constraints(model, memory.q, memory.v, equations.tree, memory.rows)
     if ground.concave == 1:
         locate_corners(
             model, ground, equations.tree, memory.rows, memory.seconds, memory.surface,
@@ -388,8 +404,12 @@ def are_usual(candidate: Integers, near: int, program: int, usual: UsualPoints) 
 
 
 @dissolved_kernel
-def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
-    """List the contact points that could act in this step, with their free terms."""
+def select_candidates(model: Model, curved: bool, work: Stepping, memory: Memory) -> int:
+    """List the contact points that could act in this step, with their free terms.
+
+    On curved ground a gap is linearised along the chord of the step, as loops are: with half of
+    what turning normals add to its rate.
+    """
     contacts, assembly, step = memory.contacts, memory.assembly, work.step
     candidate, problem = assembly.candidate, assembly.problem
     linearised, calls = is_linearised(work.scheme), work.impact.calls
@@ -412,6 +432,9 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
         contact = candidate[place]
         gap = contacts.gap[contact]
         normal = velocity[contact, 0]
+        if curved and linearised:
+            bend = memory.surface.bend[contact]
+            normal += 0.5 * step * bend_acceleration(model, tree, contacts, contact, bend)
         if linearised:
             far = gap > step * max(CLOSING_SPEED, -2.0 * normal)
             if far and (calls == 0 or work.impact.called[contact] == 0):
@@ -424,7 +447,7 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
             if work.impact.relaxed == 0:
                 work.impact.bounce[count] = memory.surface.restitution[contact] * before
                 normal += work.impact.bounce[count]
-        list_candidate(POINT, contact, count, memory)
+        list_candidate(contact, count, memory)
         problem.free[2 * count] = normal
         problem.free[2 * count + 1] = velocity[contact, 1]
         count += 1
@@ -462,7 +485,7 @@ def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> in
                 continue
         elif not gap <= work.activation:
             continue
-        list_candidate(STOP, stop, count, memory)
+        list_candidate(stop, count, memory)
         problem.free[2 * count] = normal
         problem.free[2 * count + 1] = 0.0
         count += 1
@@ -493,10 +516,51 @@ def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> 
                 normal += work.impact.bounce[count]
         elif gap > work.activation:
             continue
-        list_candidate(SECOND_FACE, second, count, memory)
+        list_candidate(second, count, memory)
         problem.free[2 * count] = normal
         tangent = row_product(assembly.jacobian, 2 * count + 1, memory.next_v)
         problem.free[2 * count + 1] = tangent
+        count += 1
+    return count
+
+
+@kernel
+def select_constraints(count: int, work: Stepping, memory: Memory) -> int:
+    """Append the constraints from outside that could act in this step, and may let go.
+
+    As with loops, half of what turning rows add to a rate is in the free term: to second order that
+    is the chord of the step.
+    """
+    rows, problem, step = memory.rows, memory.assembly.problem, work.step
+    outside, calls = rows.outside, work.impact.calls
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        own = rows.owner[entry]
+        normal = rate_of(own, 0, memory.next_v, outside)
+        if rows.set[entry] == INTERVAL:
+            list_candidate(entry, count, memory)
+            problem.free[2 * count + 1] = normal
+            problem.bound[count] = step * rows.limit[entry]
+            count += 1
+            continue
+        gap = outside.gap[own, 0]
+        if is_linearised(work.scheme):
+            normal += 0.5 * step * outside.bias[own, 0]
+            far = gap > step * max(CLOSING_SPEED, -2.0 * normal)
+            if far and (calls == 0 or work.impact.called[entry] == 0):
+                continue
+            normal += gap / step
+        elif work.scheme == MOREAU_JEAN:
+            before = rate_of(own, 0, memory.v, outside)
+            if gap + 0.5 * step * before > work.activation:
+                continue
+            if work.impact.relaxed == 0:
+                work.impact.bounce[count] = memory.surface.restitution[entry] * before
+                normal += work.impact.bounce[count]
+        elif gap > work.activation:
+            continue
+        list_candidate(entry, count, memory)
+        problem.free[2 * count] = normal
+        problem.free[2 * count + 1] = rate_of(own, 1, memory.next_v, outside)
         count += 1
     return count
 
@@ -658,9 +722,8 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     assembly, contacts, rows = memory.assembly, memory.contacts, memory.rows
     equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
     impact, step = work.impact, work.step
-    straight = not are_there(SECOND_FACE, assembly) and are_usual(
-        assembly.candidate, near, DELASSUS, usual
-    )
+    others = are_there(SECOND_FACE, assembly) or are_there(CONSTRAINT, assembly)
+    straight = not others and are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
         gather_delassus(model, contacts, rows, near, count, equations, usual, assembly)
         loops = count - rows_of(memory.loops)
@@ -723,7 +786,7 @@ def may_go_through(
     thrown = 0
     for joint in range(model.nv):
         thrown += abs(v[joint]) > CLOSING_RATE
-    if thrown > 0:
+    if thrown > 0 or memory.rows.outside.kernel.shape[0] > 0:
         return True
     known = near == count and work.impact.happens == 0
     for contact in range(model.nc):
@@ -758,6 +821,12 @@ def stays_above(
     return gap + step * normal >= -0.5 * CLOSED_GAP
 
 
+@dissolved_kernel
+def far_beyond(step: float, own: int, outside: Writers) -> float:
+    """How far beyond its limit the tangent of a step may lead, whose chord does not."""
+    return CLOSED_GAP + max(0.5 * step * step * outside.bias[own, 0], 0.0)
+
+
 @kernel
 def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Impact) -> bool:
     """Call what would go through at the velocity that was found; return if any is new."""
@@ -773,11 +842,16 @@ def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Im
         joint, side = rows.owner[stop], rows.side[stop]
         if side * (memory.q[joint] + step * v[joint]) < side * rows.limit[stop] - CLOSED_GAP:
             call(stop, impact)
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        own = rows.owner[entry]
+        ahead = rows.outside.gap[own, 0] + step * rate_of(own, 0, v, rows.outside)
+        if rows.set[entry] != INTERVAL and ahead < -far_beyond(step, own, rows.outside):
+            call(entry, impact)
     return impact.calls > calls
 
 
 @dissolved_kernel
-def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> bool:
+def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: Memory) -> bool:
     """Find the velocity at the end of the step; return success.
 
     What an impulse elsewhere throws against the ground or a stop, though it was too far away to be
@@ -798,11 +872,14 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
             impact.bounce[place] = 0.0
         for i in range(3):
             assembly.answer.residual[i] = 0.0
-        near = select_candidates(model, work, memory)
+        near = select_candidates(model, curved, work, memory)
         note_group(POINT, 0, near, assembly)
         count = select_stops(model, work, near, memory)
         count = hold_latched(model, count, memory.next_v, memory)
         first = note_group(STOP, near, count, assembly)
+        if memory.rows.outside.kernel.shape[0] > 0:
+            count = select_constraints(count, work, memory)
+        first = note_group(CONSTRAINT, first, count, assembly)
         count = list_dry_joints(count, work.step, memory.next_v, memory)
         first = note_group(DRY_JOINT, first, count, assembly)
         if impact.corner.near > 0:
@@ -846,7 +923,7 @@ def decide(
 ) -> int:
     """Find the velocity at the end of the step, and note what happens in it."""
     model = scene.model
-    solved = solve_step(model, clock.time, work, memory)
+    solved = solve_step(model, scene.ground.curved == 1, clock.time, work, memory)
     note_extremes(model, memory)
     if work.impact.relaxed == 1:
         note_wedge(model, clock.time, memory, work.impact, record)

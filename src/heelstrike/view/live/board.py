@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
+
 Message = str | bytes
 Listener = Callable[[Message], None]
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.friction import friction_use
 from heelstrike.analysis.intervals import event_impulse, mean_over_intervals
@@ -17,21 +16,19 @@ from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.dynamics import center_of_mass, contact_positions, link_poses
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import QUANTITIES, Run
 from heelstrike.tolerances import SAME_ROW
 from heelstrike.view.drawing import legs
+from heelstrike.view.page.curves import DASHED, SIDES, Plot, Trace, alike, limits_in_words
 from heelstrike.view.page.motion import frames as drawn
 from heelstrike.view.style import in_words
 
-Floats = NDArray[np.float64]
-
 MOST_PUSHES = 4
 """Pushes that are drawn at once."""
-DASHED, DOTTED = 1, 2
-SIDES = ("left", "right")
 FARTHEST = 1.0
 """Metres that a slider moves a joint without ends at most, either way."""
 ROOM = 0.15
@@ -155,51 +152,43 @@ class Layout:
 
     def _panels(self) -> list[dict[str, Any]]:
         """Plots beside the picture, each curve with its place in a frame."""
-        robot = self.robot
-        found = [*self._of_joints("joint", "rad", "m", self.joints, robot.joint_names)]
-        driven = robot.model.actuator_joint
-        found += self._of_joints("torque", "N m", "N", driven, robot.actuator_names)
+        robot, model = self.robot, self.robot.model
+        names = [robot.joint_names[joint] for joint in self.joints]
+        found = [*self._of_joints("joint", self.joints, names)]
+        limits = np.column_stack((model.torque_lower, model.torque_upper))
+        found += self._of_joints("torque", model.actuator_joint, robot.actuator_names, limits)
         if robot.feet:
             heel, toe = zero_moment_point_limits(robot)
             room = ROOM * max(toe - heel, 1e-3)
-            span = {"span": [heel - room, toe + room]} if toe > heel else {}
             found += [
-                {
-                    "title": "zero moment point, from ankle", "unit": "m", "group": "feet",
-                    "curves": self._of_feet("ahead"), **span,
-                    "limits": [{"label": "heel", "level": heel}, {"label": "toe", "level": toe}],
-                },
-                {
-                    "title": "normal force", "unit": "N", "group": "feet",
-                    "curves": self._of_feet("pressing"), "usual": [0.0, 1.5 * robot.weight],
-                    "limits": [{"label": "weight", "level": robot.weight}],
-                },
-                {
-                    "title": "tangential force", "unit": "N", "group": "feet",
-                    "curves": self._of_feet("dragging"), "limits": [],
-                    "usual": [-0.5 * robot.weight, 0.5 * robot.weight],
-                },
-                {
-                    "title": "friction, share of cone", "unit": "1", "group": "feet",
-                    "curves": self._of_feet("used"), "span": [-0.05, 1.1],
-                    "limits": [{"label": "edge of the cone", "level": 1.0}],
-                },
+                self._of_feet(
+                    "ahead", "zero moment point, from ankle", "m", [("heel", heel), ("toe", toe)],
+                    span=(heel - room, toe + room) if toe > heel else None,
+                ),
+                self._of_feet(
+                    "pressing", "normal force", "N", [("weight", robot.weight)],
+                    usual=(0.0, 1.5 * robot.weight),
+                ),
+                self._of_feet(
+                    "dragging", "tangential force", "N",
+                    usual=(-0.5 * robot.weight, 0.5 * robot.weight),
+                ),
+                self._of_feet(
+                    "used", "friction, share of cone", "1", [("edge of the cone", 1.0)],
+                    span=(-0.05, 1.1),
+                ),
             ]  # fmt: skip
         begin = self.begin["energy"]
-        look = {"foot": -1, "dash": 0}
-        kinetic = [look | {"label": "", "color": 0, "at": begin}]
+        kinetic = [Trace(None, "", color=0, at=begin)]
         others = [
-            look | {"label": "potential", "dash": DASHED, "color": 1, "at": begin + 1},
-            look | {"label": "mechanical", "at": begin + 2},
+            Trace(None, "potential", dash=DASHED, color=1, at=begin + 1),
+            Trace(None, "mechanical", at=begin + 2),
         ]
         found += [
-            {"title": title, "unit": "J", "group": "energy", "curves": curves, "limits": []}
-            for title, curves in (
-                ("kinetic energy", kinetic),
-                ("potential and mechanical energy", others),
-            )
+            Plot("kinetic energy", "J", kinetic, group="energy"),
+            Plot("potential and mechanical energy", "J", others, group="energy"),
         ]
-        return found
+        return [plot.described() for plot in found]
 
     def _sliders(self) -> list[dict[str, Any]]:
         """Joints that a viewer can move, with the ends of their ranges."""
@@ -220,69 +209,50 @@ class Layout:
         return found
 
     def _of_joints(
-        self,
-        field: str,
-        angular: str,
-        linear: str,
-        joints: NDArray[np.int64],
-        named: Sequence[str],
-    ) -> list[dict[str, Any]]:
+        self, field: str, joints: Integers, names: Sequence[str], ends: Floats | None = None
+    ) -> Iterator[Plot]:
         """One panel for the joints that differ by their side only, such as both knees."""
-        robot, model = self.robot, self.robot.model
-        names = [named[j] for j in joints] if field == "joint" else named
-        leg = legs(robot)
-        panels: dict[tuple[str, str], dict[str, Any]] = {}
-        for i, joint in enumerate(int(j) for j in joints):
-            words = in_words(names[i]).split()
-            alike = " ".join(word for word in words if word.lower() not in SIDES)
-            side = " ".join(word for word in words if word.lower() in SIDES)
-            unit = angular if model.axis[joint, 0] != 0.0 else linear
-            effort = " torque" if unit == angular else " force"
-            panel = panels.setdefault(
-                (alike, unit),
-                {
-                    "title": f"{alike or names[i]}{effort if field == 'torque' else ''}",
-                    "unit": unit,
-                    "group": f"{'torques' if field == 'torque' else 'joints'}",
-                    "curves": [],
-                    "limits": [],
-                    "steps": field == "torque",
-                },
-            )
-            foot = int(leg[joint])
-            panel["curves"].append(
-                {
-                    "label": side or " ".join(words),
-                    "foot": foot,
-                    "dash": DASHED if foot > 0 else 0,
-                    "at": self.begin[field] + i,
-                }
-            )
-            if field == "torque":
-                levels = (float(model.torque_lower[i]), float(model.torque_upper[i]))
-                known = {limit["level"] for limit in panel["limits"]}
-                panel["limits"] += [
-                    {"label": "limit", "level": level}
-                    for level in levels
-                    if np.isfinite(level) and level not in known
-                ]
-        for panel in panels.values():
-            if panel["limits"]:
-                ends = " … ".join(f"{limit['level']:g}" for limit in panel["limits"])
-                panel["note"] = f"limits {ends}".replace("-", "−")
-        return list(panels.values())
+        leg, turns = legs(self.robot)[joints], self.robot.model.axis[joints, 0] != 0.0
+        for name, several in alike(names, np.arange(len(joints))).items():
+            for kind in dict.fromkeys(turns[several].tolist()):
+                which = [i for i in several if turns[i] == kind]
+                levels = [] if ends is None else dict.fromkeys(ends[which].ravel().tolist())
+                limits = [level for level in levels if np.isfinite(level)]
+                effort = "" if ends is None else " torque" if kind else " force"
+                units = ("rad", "m") if ends is None else ("N m", "N")
+                traces = [
+                    Trace(
+                        None, _side(names[i]), int(leg[i]), DASHED if leg[i] > 0 else 0,
+                        at=self.begin[field] + i,
+                    )
+                    for i in which
+                ]  # fmt: skip
+                yield Plot(
+                    name + effort, units[not kind], traces, [("limit", level) for level in limits],
+                    steps=ends is not None, note=limits_in_words(limits),
+                    group="joints" if ends is None else "torques",
+                )  # fmt: skip
 
-    def _of_feet(self, field: str) -> list[dict[str, Any]]:
-        return [
-            {
-                "label": in_words(foot.name).removesuffix(" foot"), "foot": i,
-                "dash": DASHED if i else 0, "at": self.begin[field] + i,
-            }
+    def _of_feet(
+        self, field: str, title: str, unit: str, limits: Sequence[tuple[str, float]] = (),
+        **ends: Any,
+    ) -> Plot:  # fmt: skip
+        traces = [
+            Trace(
+                None, in_words(foot.name).removesuffix(" foot"), i, DASHED if i else 0,
+                at=self.begin[field] + i,
+            )
             for i, foot in enumerate(self.robot.feet)
         ]  # fmt: skip
+        return Plot(title, unit, traces, limits, group="feet", **ends)
 
 
-def movable(robot: Robot) -> NDArray[np.int64]:
+def _side(name: str) -> str:
+    """The side of a joint; its name if it has none."""
+    return " ".join(w for w in in_words(name).split() if w.lower() in SIDES) or in_words(name)
+
+
+def movable(robot: Robot) -> Integers:
     """Joints of a robot but for those that carry all of it through the world."""
     model = robot.model
     slides = (model.axis[:, 0] == 0.0) & np.isneginf(model.lower) & np.isposinf(model.upper)
@@ -294,7 +264,7 @@ def movable(robot: Robot) -> NDArray[np.int64]:
     return np.flatnonzero(~carries)
 
 
-def mean_forces(run: Run, rows: NDArray[np.int64]) -> Floats:
+def mean_forces(run: Run, rows: Integers) -> Floats:
     """Contact forces (normal, tangent) since the row before, of all of `rows` but the first, in N.
 
     Where no time lies between two rows, those of the later one.
@@ -317,7 +287,7 @@ def mean_forces(run: Run, rows: NDArray[np.int64]) -> Floats:
     return found
 
 
-def _only(run: Run, rows: NDArray[np.int64], forces: Floats) -> Run:
+def _only(run: Run, rows: Integers, forces: Floats) -> Run:
     """Return a run of some rows, with forces (n, nc, 2) of its own."""
     kept = {name: getattr(run, name)[rows] for name in ("time", *QUANTITIES)}
     return replace(run, **kept | {"contact_force": forces}, pushes=())

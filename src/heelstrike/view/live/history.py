@@ -7,12 +7,10 @@ from itertools import takewhile
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from heelstrike.robot.model import Floats
 from heelstrike.sim.run import QUANTITIES, Event, Run
 from heelstrike.tolerances import SAME_ROW
-
-Floats = NDArray[np.float64]
 
 MOST_ROWS = 100_000
 """Rows that are kept; some 60 MB of bravo7."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -143,10 +144,7 @@ class GivenStage(Stage):
 
     def ground(self, values: Mapping[str, Any], simulation: Simulation) -> Ground:
         """Return its ground with another friction."""
-        numbers = simulation.ground.numbers()
-        return Ground.of_numbers(
-            numbers | {"friction": np.full_like(numbers["friction"], values["friction"])}
-        )
+        return replace(simulation.ground, friction=values["friction"])
 
 
 def snapshot_of(simulation: Simulation) -> Snapshot | None:

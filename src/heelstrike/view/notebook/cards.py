@@ -20,6 +20,7 @@ from heelstrike.view.page.page import page
 from heelstrike.view.page.provenance import ground_in_words
 from heelstrike.view.page.verdict import judge
 from heelstrike.view.style import in_words
+from heelstrike.wording import some_of
 
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle
@@ -159,5 +160,4 @@ def _card(title: str, content: str, drawn: str) -> str:
 
 
 def _names(names: tuple[str, ...]) -> str:
-    shown = ", ".join(map(in_words, names[:MOST_NAMES])) or "none"
-    return shown + (f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else "")
+    return some_of(list(map(in_words, names)), MOST_NAMES) or "none"

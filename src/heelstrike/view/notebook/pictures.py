@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import link_poses
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
-from heelstrike.view.drawing import Skeleton, body, extent, ground_outline
+from heelstrike.view.drawing import Skeleton, body, extent
 from heelstrike.view.style import FOOT_COLORS, GREY, INK, PALE
-
-Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT = 420.0, 190.0
 """Largest picture, in pixels."""
@@ -55,7 +54,7 @@ def poses_picture(robot: Robot, positions: Floats, ground: Ground, alt: str) -> 
     segments = np.nan_to_num(segments)
     low, high = extent(segments)
     size = max(float((high - low).max()), 1e-3)
-    surface = ground_outline(ground, float(low[0]) - 0.2 * size, float(high[0]) + 0.2 * size)
+    surface = ground.outline(float(low[0]) - 0.2 * size, float(high[0]) + 0.2 * size)
     box = np.array([low, high, *surface])
     room = np.array([0.0, 0.05 * size])
     view = _View(box.min(axis=0) - room, box.max(axis=0) + room)
@@ -74,9 +73,9 @@ def ground_picture(ground: Ground) -> tuple[str, float]:
     """Draw the profile of a ground; tell by what factor its heights are drawn larger."""
     corners = ground.model().vertices
     left, right = float(corners[0, 0]), float(corners[-1, 0])
-    if ground.profile is None:
+    if ground.profile is None:  # a smooth shape is drawn where robots begin
         left, right = -1.0, 1.0
-    surface = ground_outline(ground, left, right)
+    surface = ground.outline(left, right)
     surface = surface[:: max(1, len(surface) // POINTS)]
     low, high = surface.min(axis=0), surface.max(axis=0)
     length, height = (high - low).tolist()

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 STEPS = 2**20
 """Steps into which the range of a column is divided."""

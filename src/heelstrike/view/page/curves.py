@@ -7,7 +7,6 @@ from dataclasses import field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.energy import energy_balance
 from heelstrike.analysis.friction import friction_use
@@ -16,6 +15,7 @@ from heelstrike.analysis.tracking import reference_motion
 from heelstrike.analysis.zero_moment_point import ZeroMomentPoint, zero_moment_point_limits
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
 from heelstrike.view.contact_figures import ROOM_ABOUT_POINTS
 from heelstrike.view.drawing import legs
@@ -24,9 +24,8 @@ from heelstrike.view.page.rows import Rows, means
 from heelstrike.view.panels import impact_rows
 from heelstrike.view.style import in_words
 
-Floats = NDArray[np.float64]
-
 DASHED, DOTTED = 1, 2
+SIDES = ("left", "right")
 FLATTEST = 3.0
 """How much taller than its curves an axis may become to hold their limits."""
 ROOM = 0.08
@@ -37,8 +36,8 @@ ROOM = 0.08
 class Trace:
     """One curve: values in the rows shown, and its look."""
 
-    values: Floats
-    """(n,)"""
+    values: Floats | None
+    """(n,), None where the numbers come later."""
     label: str
     foot: int = -1
     """Whose colour it has, -1 for none."""
@@ -46,6 +45,15 @@ class Trace:
     """Kind of line, 0 for a whole one."""
     color: int | None = None
     """A colour of the palette instead of a foot's."""
+    at: int | None = None
+    """Where in a frame its numbers are, if they come later."""
+
+    def described(self) -> dict[str, Any]:
+        """Return all but the values, for JSON."""
+        known = {"color": self.color, "at": self.at}
+        return {"label": self.label, "foot": self.foot, "dash": self.dash} | {
+            name: each for name, each in known.items() if each is not None
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,27 +73,20 @@ class Plot:
     """What else there is to say."""
     group: str = field(default="", kw_only=True)
     """What it belongs to."""
+    usual: tuple[float, float] | None = field(default=None, kw_only=True)
+    """Values that are usual, where those that come later decide upon the y axis."""
 
     def described(self) -> dict[str, Any]:
         """Return all but the values, for JSON."""
-        curves = []
-        for trace in self.traces:
-            look = {"label": trace.label, "foot": trace.foot, "dash": trace.dash}
-            curves.append(look if trace.color is None else look | {"color": trace.color})
-        found: dict[str, Any] = {
+        known = {"span": self.span, "steps": self.steps, "note": self.note, "usual": self.usual}
+        return {
             "title": self.title,
             "unit": self.unit,
             "group": self.group,
-            "curves": curves,
+            "curves": [trace.described() for trace in self.traces],
+            "limits": [{"label": label, "level": level} for label, level in self.limits],
+            **{name: each for name, each in known.items() if each},
         }
-        found["limits"] = [{"label": label, "level": level} for label, level in self.limits]
-        if self.span is not None:
-            found["span"] = list(self.span)
-        return (
-            found
-            | ({"steps": True} if self.steps else {})
-            | ({"note": self.note} if self.note else {})
-        )
 
 
 def plots(run: Run, gait: Gait | None, rows: Rows, zmp: ZeroMomentPoint) -> list[Plot]:
@@ -108,7 +109,7 @@ def _joints(run: Run, gait: Gait | None, rows: Rows) -> list[Plot]:
     turns = robot.model.axis[joints, 0] != 0.0
     found = []
     for kind, unit, what in ((True, "rad", "angle"), (False, "m", "position")):
-        for name, several in _alike(names, np.flatnonzero(turns == kind)).items():
+        for name, several in alike(names, np.flatnonzero(turns == kind)).items():
             traces = []
             for place, i in enumerate(several):
                 side = in_words(names[i])
@@ -122,80 +123,61 @@ def _joints(run: Run, gait: Gait | None, rows: Rows) -> list[Plot]:
 
 
 def _torques(run: Run, rows: Rows) -> list[Plot]:
-    robot, model = run.robot, run.robot.model
-    joints = model.actuator_joint
-    leg = legs(robot)[joints] if robot.nu else np.zeros(0, dtype=np.int64)
-    found = []
-    for name, several in _alike(robot.actuator_names, np.arange(robot.nu)).items():
-        unit = "N m" if model.axis[joints[several[0]], 0] != 0.0 else "N"
-        limits = sorted(
-            {
-                float(end)
-                for i in several
-                for end in (model.torque_lower[i], model.torque_upper[i])
-                if np.isfinite(end)
-            }
-        )
-        traces = [
-            Trace(run.torque[rows, i], in_words(robot.actuator_names[i]), int(leg[i]), place)
-            for place, i in enumerate(several)
-        ]
-        found.append(
-            Plot(
-                f"{name} {'torque' if unit == 'N m' else 'force'}",
-                unit,
-                traces,
-                [("limit", level) for level in limits],
-                span=_usual_span(run, run.torque[:, several], limits),
-                steps=True,
-                note=_limits_in_words(limits, unit),
-                group="joint torques",
-            )
-        )
-    return found
+    """What motors do to their joints, with their limits."""
+    model = run.robot.model
+    ends = np.column_stack((model.torque_lower, model.torque_upper))
+    return _on_joints(run, rows, run.torque, model.actuator_joint, run.robot.actuator_names, ends)
 
 
 def _brakes(run: Run, rows: Rows) -> list[Plot]:
     """What brakes do to their joints, with the limits of those that slip."""
-    robot, model = run.robot, run.robot.model
-    leg = legs(robot)
+    model = run.robot.model
+    ends = np.column_stack((-model.brake_limit, model.brake_limit))
+    return _on_joints(
+        run, rows, run.brake_torque, model.brake_joint, run.robot.brake_names, ends, "brake"
+    )
+
+
+def _on_joints(
+    run: Run, rows: Rows, values: Floats, joints: Integers, names: Sequence[str], ends: Floats,
+    what: str = "",
+) -> list[Plot]:  # fmt: skip
+    """Torques (nt, n) on joints, with their limits (n, 2): a panel for those that are alike."""
+    leg = legs(run.robot)[joints]
     found = []
-    for name, several in _alike(robot.brake_names, np.arange(model.brakes)).items():
-        unit = "N m" if model.axis[model.brake_joint[several[0]], 0] != 0.0 else "N"
-        ends = {float(model.brake_limit[k]) for k in several if np.isfinite(model.brake_limit[k])}
-        limits = sorted({sign * end for end in ends for sign in (-1.0, 1.0)})
+    for name, several in alike(names, np.arange(len(names))).items():
+        unit = "N m" if run.robot.model.axis[joints[several[0]], 0] != 0.0 else "N"
+        limits = sorted({float(end) for end in ends[several].ravel() if np.isfinite(end)})
         traces = [
-            Trace(
-                run.brake_torque[rows, k], in_words(robot.brake_names[k]),
-                int(leg[model.brake_joint[k]]), place,
-            )
-            for place, k in enumerate(several)
-        ]  # fmt: skip
+            Trace(values[rows, i], in_words(names[i]), int(leg[i]), place)
+            for place, i in enumerate(several)
+        ]
         found.append(
             Plot(
-                f"{name} brake",
+                f"{name} {what or ('torque' if unit == 'N m' else 'force')}",
                 unit,
                 traces,
-                [("slips", level) for level in limits],
-                span=_usual_span(run, run.brake_torque[:, several], limits),
+                [("slips" if what else "limit", level) for level in limits],
+                span=_usual_span(run, values[:, several], limits),
                 steps=True,
-                note=_limits_in_words(limits, unit),
+                note=limits_in_words(limits, unit),
                 group="joint torques",
             )
         )
     return found
 
 
-def _limits_in_words(limits: Sequence[float], unit: str) -> str:
+def limits_in_words(limits: Sequence[float], unit: str = "") -> str:
+    """Say which limits there are."""
     text = " … ".join(f"{limit:g}" for limit in limits).replace("-", "−")
-    return f"limits {text} {unit}" if limits else ""
+    return f"limits {text} {unit}".rstrip() if limits else ""
 
 
-def _alike(names: Sequence[str], which: NDArray[np.int64]) -> dict[str, list[int]]:
+def alike(names: Sequence[str], which: Integers) -> dict[str, list[int]]:
     """Group indices of names that differ by their side only: one panel for both knees."""
     groups: dict[str, list[int]] = {}
     for i in which.tolist():
-        words = [w for w in in_words(names[i]).split() if w.lower() not in ("left", "right")]
+        words = [w for w in in_words(names[i]).split() if w.lower() not in SIDES]
         groups.setdefault(" ".join(words) or in_words(names[i]), []).append(i)
     return groups
 

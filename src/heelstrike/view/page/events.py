@@ -24,7 +24,8 @@ def kind_in_words(event: Event) -> str:
 
 def contact_of(event: Event) -> int:
     """Index of the contact point at which it happened, -1 if it was at none."""
-    return -1 if event.kind in NOWHERE or event.kind.of_joint else event.contact
+    kind = event.kind
+    return -1 if kind in NOWHERE or kind.of_joint or kind.of_constraint else event.contact
 
 
 def place_of(event: Event, robot: Robot) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.friction import friction_coefficient
 from heelstrike.analysis.motion import Motion, in_world
@@ -13,13 +12,12 @@ from heelstrike.analysis.support import pushing
 from heelstrike.analysis.zero_moment_point import ZeroMomentPoint
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import center_of_mass_velocity
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Run
 from heelstrike.tolerances import STANDING_GAP
 from heelstrike.view.page.rows import Rows, means
-
-Floats = NDArray[np.float64]
 
 
 def frames(run: Run, rows: Rows, motion: Motion, zmp: ZeroMomentPoint) -> dict[str, Floats]:

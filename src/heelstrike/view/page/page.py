@@ -141,6 +141,7 @@ def contents(run: Run, gait: Gait | None = None, *, shown: float | None = None) 
     columns = frames(run, rows, motion, zmp)
     for i, panel in enumerate(panels):
         for k, trace in enumerate(panel.traces):
+            assert trace.values is not None
             columns[f"curve {i} {k}"] = trace.values
     events = run.events[:MOST_EVENTS]
     phases = support_phases(run)[:MOST_PHASES]

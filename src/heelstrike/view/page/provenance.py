@@ -73,7 +73,9 @@ def command_line(words: Sequence[str]) -> str:
 def ground_in_words(ground: Ground) -> str:
     """Describe a ground: its shape, friction and restitution."""
     corners = ground.model().vertices
-    if ground.profile is None:
+    if ground.shape is not None:
+        shape = f"smooth, {ground.shape}"
+    elif ground.profile is None:
         degrees = math.degrees(ground.slope)
         shape = f"slope of {degrees:.4g}°" if degrees else "flat"
     else:

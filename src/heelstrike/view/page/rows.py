@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.intervals import mean_over_intervals
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Run
 
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
+Rows = Integers
 
 INTERVAL = 0.01
 """Time between two rows that are shown (s): a display shows some sixty a second."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import link_poses
@@ -48,8 +49,18 @@ def scene(robot: Robot, ground: Ground) -> dict[str, Any]:
         "feet": [{"name": in_words(foot.name)} for foot in robot.feet],
         "size": round(max(float((high - low).max()), 1e-3), DIGITS),
         "weight": float(robot.weight),
-        "ground": ground.model().vertices.ravel().tolist(),
+        "ground": _corners(ground).ravel().tolist(),
     }
+
+
+SMOOTH_UP_TO = 20.0
+"""How far (m) from the origin smooth ground is drawn as it is; beyond, it goes on straight."""
+
+
+def _corners(ground: Ground) -> NDArray[np.float64]:
+    if ground.shape is None:
+        return ground.model().vertices
+    return np.round(ground.outline(-SMOOTH_UP_TO, SMOOTH_UP_TO), DIGITS)
 
 
 def _shapes(shape: Skeleton) -> list[dict[str, Any]]:

@@ -16,7 +16,7 @@ from heelstrike.analysis.diagnosis.changes import Tried
 from heelstrike.analysis.diagnosis.limits import REACHED, Limit
 from heelstrike.analysis.diagnosis.measures import measures, motor_loads
 from heelstrike.analysis.summary import lines, summarize
-from heelstrike.analysis.support import walking_steps
+from heelstrike.analysis.support import step_times
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
 from heelstrike.robot.robot import Robot
@@ -202,7 +202,7 @@ def _shown(run: Run, verdict: Verdict) -> float:
     """When the first picture of a film is: before what went wrong, or in the middle of a step."""
     if verdict.fall is not None:
         return max(float(run.time[0]), verdict.fall.time - BEFORE)
-    landings = [float(run.time[0]), *(stance.touchdown for stance in walking_steps(run))]
+    landings = step_times(run)
     if len(landings) < 2:
         return float(0.5 * (run.time[0] + run.time[-1]))
     step = (len(landings) - 1) // 2

@@ -60,7 +60,7 @@ class Place:
     resolved paths."""
 
 
-def read_tree(source: Path | str, reading: Reading) -> tuple[Node, Place, str]:
+def read_tree(source: Path | str, reading: Reading) -> tuple[Node, Place]:
     """Read a file or text with what it includes.
 
     Returns
@@ -69,8 +69,6 @@ def read_tree(source: Path | str, reading: Reading) -> tuple[Node, Place, str]:
         The tree, included elements in the place of ``<include>``.
     Place
         Where it stands.
-    str
-        The text of the file itself.
 
     Raises
     ------
@@ -82,7 +80,7 @@ def read_tree(source: Path | str, reading: Reading) -> tuple[Node, Place, str]:
     else:
         place = Place(Path(), Path())
     text = plain(_read(source, reading.label) if isinstance(source, Path) else source)
-    return _tree(text, reading.label, place, reading), place, text
+    return _tree(text, reading.label, place, reading), place
 
 
 def plain(text: str) -> str:

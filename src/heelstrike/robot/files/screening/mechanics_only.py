@@ -22,62 +22,39 @@ _ACTUATOR_LAWS = frozenset(("dyntype", "gaintype", "biastype"))
 _TEXTURED = ("material", "light")
 
 
-def leave_mechanics(root: Element, tags: set[str], names: set[str]) -> bool:
-    """Take out of a tree what plays no part in motion; return whether there was any.
+def leave_mechanics(root: Element) -> None:
+    """Take out of a tree what plays no part in motion.
 
     Parameters
     ----------
     root : Element
         The tree, which is changed.
-    tags, names : set of str
-        All its elements and attributes, so that most trees need not be searched again.
     """
-    if root.tag != "mujoco":
-        return False
-    changed = False
-    if not _ELEMENTS.isdisjoint(tags):
-        for parent in list(root.iter()):
-            if any(child.tag in _ELEMENTS for child in parent):
-                parent[:] = [child for child in parent if child.tag not in _ELEMENTS]
-                changed = True
-    if not _ATTRIBUTES.isdisjoint(names):
-        for element in root.iter():
-            for name in _ATTRIBUTES.intersection(element.attrib):
-                del element.attrib[name]
-                changed = True
-    if "texture" in names:
-        for tag in _TEXTURED:
-            for element in root.iter(tag):
-                changed |= element.attrib.pop("texture", None) is not None
-    if "hfield" in tags:
-        for field in root.iter("hfield"):
-            _flatten(field)
-            changed = True
-    if "muscle" in tags or not _ACTUATOR_LAWS.isdisjoint(names):
-        changed |= _skip_muscles(root)
-    if "numeric" in tags:
-        for custom in root.iter("custom"):
-            for numeric in custom.findall("numeric"):
-                if numeric.get("data"):
-                    changed |= numeric.attrib.pop("size", None) is not None
-                else:  # an empty place for so many numbers
-                    custom.remove(numeric)
-                    changed = True
-    return changed
+    for element in list(root.iter()):
+        element[:] = [child for child in element if child.tag not in _ELEMENTS]
+        for name in _ATTRIBUTES:
+            element.attrib.pop(name, None)
+        if element.tag in _TEXTURED:
+            element.attrib.pop("texture", None)
+        elif element.tag == "hfield":
+            _flatten(element)
+        elif element.tag == "custom":
+            for numeric in element.findall("numeric"):
+                numeric.attrib.pop("size", None)
+                if not numeric.get("data"):  # an empty place for so many numbers
+                    element.remove(numeric)
+    _skip_muscles(root)
 
 
-def _skip_muscles(root: Element) -> bool:
+def _skip_muscles(root: Element) -> None:
     """Keep the parser from simulating muscles, for as long as a file likes, to learn their ranges.
 
     A robot with muscles is refused by the reader of actuators.
     """
-    muscles = any(
-        element.tag == "muscle" or "muscle" in map(element.get, _ACTUATOR_LAWS)
-        for element in root.iter()
-    )
-    if muscles:
+    if any(
+        each.tag == "muscle" or "muscle" in map(each.get, _ACTUATOR_LAWS) for each in root.iter()
+    ):
         SubElement(SubElement(root, "compiler"), "lengthrange", {"mode": "none"})
-    return muscles
 
 
 def _flatten(field: Element) -> None:

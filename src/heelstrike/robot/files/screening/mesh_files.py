@@ -10,6 +10,7 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.files.looks import is_file, is_there, will_read
 from heelstrike.robot.files.screening.inclusion import Place, resolved
 from heelstrike.robot.warning import warn
+from heelstrike.wording import some_of
 
 LARGEST_MESHES = 256 * 2**20
 """Bytes of all mesh files of a robot together."""
@@ -20,8 +21,8 @@ MOST_FACES = 200_000
 """Most faces of an .stl file that MuJoCo reads."""
 
 
-def name_mesh_files(root: Element, label: str, place: Place) -> bool:
-    """Give every mesh of a tree the whole path of its file; return whether one has a file.
+def name_mesh_files(root: Element, label: str, place: Place) -> None:
+    """Give every mesh of a tree the whole path of its file.
 
     The parser then opens these files and no others, wherever it runs.
 
@@ -34,7 +35,7 @@ def name_mesh_files(root: Element, label: str, place: Place) -> bool:
     meshes = [mesh for asset in root.iter("asset") for mesh in asset.iter("mesh")]
     meshes = [mesh for mesh in meshes if mesh.get("file")]
     if not meshes:
-        return False
+        return
     meshdir = assetdir = ""
     stripped = False
     for compiler in root.iter("compiler"):
@@ -61,7 +62,6 @@ def name_mesh_files(root: Element, label: str, place: Place) -> bool:
         _leave_out(root, missing)
     # One more compiler element: MuJoCo reads them all, the last one last.
     SubElement(root, "compiler", {"strippath": "false"})
-    return True
 
 
 def is_mesh(file: Path) -> bool:
@@ -117,11 +117,10 @@ def _leave_out(root: Element, missing: dict[str, str]) -> None:
             if name in missing:
                 asset.remove(mesh)
     if bare:
-        shown = ", ".join(bare[:SHOWN]) + (f" and {len(bare) - SHOWN} more" if bare[SHOWN:] else "")
         warn(
-            f"{first}, which is not there: {len(missing)} meshes are missing, and {shown} cannot "
-            "touch the ground with them. If one is a foot, give it a box, or spheres at heel and "
-            "toe."
+            f"{first}, which is not there: {len(missing)} meshes are missing, and "
+            f"{some_of(bare, SHOWN)} cannot touch the ground with them. If one is a foot, give it "
+            "a box, or spheres at heel and toe."
         )
 
 

@@ -9,16 +9,15 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
+from heelstrike.robot.model import Floats
 from heelstrike.robot.warning import warn
 
 RETIRED = {
     "flag": ("sensornoise",),
     "option": ("collision", "apirate"),
     "compiler": ("coordinate",),
-    "size": (),
 }
 """Attributes of elements that newer parsers do not know; what they did is no part of a robot, or,
 as of ``coordinate``, done here."""
@@ -26,18 +25,14 @@ as of ``coordinate``, done here."""
 PLACED = ("geom", "joint", "site", "inertial", "camera", "light")
 TURNED = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 
-Floats = NDArray[np.float64]
 
-
-def renew(root: Element, names: set[str], label: str) -> bool:
-    """Bring an old tree up to date; return whether it had to be changed.
+def renew(root: Element, label: str) -> None:
+    """Bring an old tree up to date.
 
     Parameters
     ----------
     root : Element
         The tree, which is changed.
-    names : set of str
-        All its attributes.
     label : str
         What to call it in messages.
 
@@ -46,35 +41,23 @@ def renew(root: Element, names: set[str], label: str) -> bool:
     RobotError
         If a place is no three numbers.
     """
-    if root.tag != "mujoco":
-        return False
-    world = [each for each in root.iter("compiler") if each.get("coordinate") == "global"]
-    if world:
+    compilers = list(root.iter("compiler"))
+    if any(each.get("coordinate") == "global" for each in compilers):
         for body in root.iterfind("worldbody/body"):
             _make_local(body, np.zeros(3), label)
-    changed = bool(world)
-    if any(each.get("inertiafromgeom") == "true" for each in root.iter("compiler")):
-        changed |= _forget_inertias(root)
-    for tag, retired in RETIRED.items():
-        if not names.isdisjoint(retired):
-            for element in root.iter(tag):
-                for name in retired:
-                    changed |= element.attrib.pop(name, None) is not None
-    if "material" in names:
-        for element in root.iter():
-            changed |= element.attrib.pop("material", None) is not None
-    return changed
+    if any(each.get("inertiafromgeom") == "true" for each in compilers):
+        _forget_inertias(root)
+    for element in root.iter():
+        for name in ("material", *RETIRED.get(element.tag, ())):
+            element.attrib.pop(name, None)
 
 
-def _forget_inertias(root: Element) -> bool:
+def _forget_inertias(root: Element) -> None:
     """Leave out ``<inertial>`` without a place, in files that weigh every body by its geoms."""
-    changed = False
     for body in root.iter("body"):
         for inertial in body.findall("inertial"):
             if inertial.get("pos") is None:
                 body.remove(inertial)
-                changed = True
-    return changed
 
 
 def _make_local(body: Element, above: Floats, label: str) -> None:

@@ -34,8 +34,6 @@ class Screened:
 
     xml: Node
     """Its tree, with what it includes in place, without what plays no part in motion."""
-    text: str
-    """The text of this tree; that of the file itself, where the two are the same."""
     models: dict[str, bytes]
     """Texts of the models that it joins to itself, by the names under which the text has them."""
     flexible: bool
@@ -67,45 +65,34 @@ def screen(source: Path | str, label: str, packages: Sequence[Path] = ()) -> Scr
         With the file and what to do about it.
     """
     reading = Reading(label, packages=packages)
-    root, place, text = read_tree(source, reading)
+    root, place = read_tree(source, reading)
     if root.tag not in ("mujoco", "robot", "sdf"):
         raise RobotError(
             f"{label}: it begins with <{root.tag[:60]}>; MJCF begins with <mujoco>, URDF with "
             "<robot>, SDF with <sdf>."
         )
-    tags: set[str] = set()
-    changed = _screen_tree(root, label, place, reading, tags)
-    if (changed or reading.elements or root.mended) and root.tag == "mujoco":
-        text = xml_text(root)
+    flexible = _screen_tree(root, label, place, reading)
     models = {name: xml_text(model).encode() for name, model in reading.models.items()}
-    return Screened(
-        root,
-        text,
-        models,
-        flexible=not tags.isdisjoint(("flex", "flexcomp")),
-    )
+    return Screened(root, models, flexible)
 
 
-def _screen_tree(root: Node, label: str, place: Place, reading: Reading, tags: set[str]) -> bool:
-    """Screen a tree and the models that it joins; return whether it had to be changed."""
-    names = _check_values(root, label, tags)
-    changed = False
-    if "model" in tags:
-        for element in [model for asset in root.iter("asset") for model in asset.iter("model")]:
-            name = f"model{len(reading.models)}.xml"
-            model, there = read_model(element, label, place, reading)
-            reading.models[name] = model
-            below = f"{reading.label}: model {there.above[-1]}"
-            _screen_tree(model, below, there, reading, tags)
-            element.set("file", name)
-            changed = True
-    if not tags.isdisjoint(_MULTIPLIERS):
-        _refuse_copies(root, label)
-    changed |= renew(root, names, label)
-    changed |= leave_mechanics(root, tags, names)
-    if "mesh" in tags and root.tag == "mujoco":
-        changed |= name_mesh_files(root, label, place)
-    return changed
+def _screen_tree(root: Node, label: str, place: Place, reading: Reading) -> bool:
+    """Screen a tree and the models that it joins; return whether they had flexible bodies."""
+    _check_values(root, label)
+    if root.tag != "mujoco":
+        return False
+    flexible = any(element.tag in ("flex", "flexcomp") for element in root.iter())
+    for element in [model for asset in root.iter("asset") for model in asset.iter("model")]:
+        name = f"model{len(reading.models)}.xml"
+        model, there = read_model(element, label, place, reading)
+        reading.models[name] = model
+        flexible |= _screen_tree(model, f"{reading.label}: model {there.above[-1]}", there, reading)
+        element.set("file", name)
+    _refuse_copies(root, label)
+    renew(root, label)
+    leave_mechanics(root)
+    name_mesh_files(root, label, place)
+    return flexible
 
 
 def _refuse_copies(root: Element, label: str) -> None:
@@ -128,19 +115,12 @@ def _refuse_copies(root: Element, label: str) -> None:
         stack.extend((child, copies) for child in reversed(element))
 
 
-def _check_values(root: Element, label: str, tags: set[str]) -> set[str]:
-    """Refuse values that no parser notices; return the names of attributes.
-
-    The tags are added to those of other files.
-    """
-    names: set[str] = set()
+def _check_values(root: Element, label: str) -> None:
+    """Refuse values that no parser notices."""
     for element in root.iter():
-        tags.add(element.tag)
-        names.update(element.attrib)
         for name, text in element.attrib.items():
             if name != "name" and not _LETTERS_OF_NO_NUMBER.isdisjoint(text):
                 _refuse_what_is_no_number(element, name, text, label)
-    return names
 
 
 _LETTERS_OF_NO_NUMBER = frozenset("neNE")  # of nan, inf and 1e999

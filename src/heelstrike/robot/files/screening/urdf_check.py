@@ -7,7 +7,6 @@ https://wiki.ros.org/urdf/XML.
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections import Counter
 from collections.abc import Iterator
@@ -16,6 +15,7 @@ from xml.etree.ElementTree import Element
 from heelstrike.errors import RobotError
 from heelstrike.robot.files.ros.drives import drives_of
 from heelstrike.robot.warning import warn
+from heelstrike.wording import meant, some_of
 
 # Attributes of each element, with how many numbers they hold (0: a word), and its children.
 _ORIGIN = {"xyz": 3, "rpy": 3}
@@ -73,7 +73,7 @@ DEEPEST_LINK = 1000
 """Most joints in a chain; MuJoCo's time grows with the square of their number."""
 
 SHOWN = 6  # how many oddities a message lists before it counts the rest
-LONGEST_GUESS = 40  # letters of a word that may be a misspelling
+GUESS = " (did you mean {}?)"
 _BOUNDED = ("revolute", "prismatic")
 
 
@@ -109,9 +109,8 @@ def check_urdf(root: Element, label: str) -> None:
         ):
             strange += _missing_limits(joint, joint.get("name", "") in driven)
     if strange:
-        shown = "; ".join(strange[:SHOWN])
-        more = f"; and {len(strange) - SHOWN} more" if len(strange) > SHOWN else ""
-        warn(f"{label}: this URDF may not say what is meant: {shown}{more}.")
+        shown = some_of(strange, SHOWN, "; ")
+        warn(f"{label}: this URDF may not say what is meant: {shown}.")
 
 
 def refuse_macros(root: Element, label: str) -> None:
@@ -200,7 +199,7 @@ def _check(element: Element, where: str, label: str, strange: list[str], joint: 
         elif ":" not in name and not name.startswith("xmlns"):
             strange.append(
                 f"<{tag}> of {where} has the unknown attribute {name[:60]!r}"
-                f"{_guess(name, attributes)}"
+                f"{meant(name, attributes, GUESS)}"
             )
     known = _CHILDREN.get(tag, set())
     other = _OTHER_MATTERS.get(tag, "").split()
@@ -213,7 +212,8 @@ def _check(element: Element, where: str, label: str, strange: list[str], joint: 
             _check(child, where, label, strange, joint)
         elif child.tag not in other and ":" not in child.tag:
             strange.append(
-                f"<{child.tag[:60]}> in <{tag}> of {where} is unknown{_guess(child.tag, known)}"
+                f"<{child.tag[:60]}> in <{tag}> of {where} is unknown"
+                f"{meant(child.tag, known, GUESS)}"
             )
     if tag == "inertial" and "mass" not in seen:
         raise RobotError(f"{_at(label, element)}: the <inertial> of {where} needs a <mass>.")
@@ -265,10 +265,3 @@ def _missing_limits(joint: Element, driven: bool) -> Iterator[str]:
         yield (
             f"the range of joint {name!r} is empty, from {lower:g} to {upper:g}: it counts as free"
         )
-
-
-def _guess(name: str, known: set[str] | dict[str, int]) -> str:
-    if len(name) > LONGEST_GUESS:
-        return ""
-    near = difflib.get_close_matches(name, sorted(known), n=1)
-    return f" (did you mean {near[0]!r}?)" if near else ""

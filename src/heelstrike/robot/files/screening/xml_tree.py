@@ -8,6 +8,7 @@ entities until the memory is full.
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -38,15 +39,12 @@ class Node(Element):
         Line of the main file on which it begins, or that of the ``<include>`` that brought it.
     folder : Path or None
         Folder of the file that it was included from, None if it is in the main file.
-    mended : bool
-        Whether the text had to be changed to be read.
     merged : bool
         Whether it is an SDF model that becomes a part of the one that includes it.
     """
 
     line = 0
     folder: Path | None = None
-    mended = False
     merged = False
 
 
@@ -69,14 +67,9 @@ def xml_tree(text: str, label: str) -> Node:
         bare = _COMMENT.sub(lambda found: "\n" * found.group().count("\n"), text)
         if bare == text:
             raise
-        try:
-            root = _tree(bare, label)
-        except RobotError:
-            root = None
-        if root is None:
-            raise
-    root.mended = True
-    return root
+        with suppress(RobotError):
+            return _tree(bare, label)
+        raise
 
 
 def _tree(text: str, label: str) -> Node:

@@ -6,19 +6,15 @@ a misspelt one would otherwise be another robot in silence.
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
-
-Floats = NDArray[np.float64]
-
-LONGEST_GUESS = 40  # letters of a word that may be a misspelling
+from heelstrike.robot.model import Floats
+from heelstrike.wording import meant
 
 # Elements that are read, and others of the format, which say nothing about mechanics.
 KNOWN = {
@@ -83,8 +79,7 @@ def check(element: Element, label: str) -> Iterator[str]:
             raise error(child, label, f"<{tag}> has two <{child.tag}>. Keep one.")
         seen.add(child.tag)
         if ":" not in child.tag and child.tag not in known:
-            near = difflib.get_close_matches(child.tag[:LONGEST_GUESS], sorted(known), n=1)
-            guess = f" (did you mean <{near[0]}>?)" if near else ""
+            guess = meant(child.tag, {tag: f"<{tag}>" for tag in known}, " (did you mean {}?)")
             yield f"<{child.tag[:60]}> in <{tag}>, line {getattr(child, 'line', 0)}{guess}"
         elif child.tag in read.split():
             yield from check(child, label)

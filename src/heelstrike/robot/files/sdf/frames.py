@@ -8,7 +8,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.files.sdf.elements import Floats, error, transform, word
+from heelstrike.robot.files.sdf.elements import error, transform, word
+from heelstrike.robot.model import Floats
 
 MODEL, WORLD = "__model__", "world"
 

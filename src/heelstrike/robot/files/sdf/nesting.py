@@ -12,8 +12,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from heelstrike.robot.files.screening.xml_tree import Node
-from heelstrike.robot.files.sdf.elements import Floats, error, inverse, transform, truth, word
+from heelstrike.robot.files.sdf.elements import error, inverse, transform, truth, word
 from heelstrike.robot.files.sdf.frames import MODEL, WORLD, frames_of
+from heelstrike.robot.model import Floats
 
 JOINTS = ("joint", "drake:joint")
 SCOPE = "::"

@@ -19,7 +19,6 @@ from heelstrike.robot.files.packages import find_file
 from heelstrike.robot.files.screening.mesh_files import is_mesh, refuse_large_meshes
 from heelstrike.robot.files.screening.xml_tree import Node
 from heelstrike.robot.files.sdf.elements import (
-    Floats,
     check,
     error,
     inverse,
@@ -31,7 +30,9 @@ from heelstrike.robot.files.sdf.elements import (
 )
 from heelstrike.robot.files.sdf.frames import MODEL, WORLD, Frames, frames_of
 from heelstrike.robot.files.sdf.nesting import JOINTS, flat
+from heelstrike.robot.model import Floats
 from heelstrike.robot.warning import warn
+from heelstrike.wording import some_of
 
 HINGES, SLIDES = ("revolute", "continuous"), ("prismatic",)
 TWO_HINGES = ("universal", "revolute2")
@@ -94,8 +95,7 @@ def as_mjcf(sdf: Node, directory: Path, packages: Sequence[Path], label: str) ->
     element = flat(_the_model(sdf, label), label)
     strange = list(check(element, label))
     if strange:
-        more = f"; and {len(strange) - SHOWN} more" if len(strange) > SHOWN else ""
-        warn(f"{label}: unknown and left out: {'; '.join(strange[:SHOWN])}{more}.")
+        warn(f"{label}: unknown and left out: {some_of(strange, SHOWN, '; ')}.")
     joints = [
         _of_drake(child) if child.tag == "drake:joint" else child
         for child in element
@@ -119,9 +119,7 @@ def as_mjcf(sdf: Node, directory: Path, packages: Sequence[Path], label: str) ->
     _write_tree(model, element, joints, world)
     refuse_large_meshes(model.mesh_size, label)
     for what, names in model.told.items():
-        shown = ", ".join(names[:SHOWN])
-        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-        warn(f"{label}: {what}: {shown}{more}.")
+        warn(f"{label}: {what}: {some_of(names, SHOWN)}.")
     return root
 
 

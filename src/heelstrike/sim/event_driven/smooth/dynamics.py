@@ -15,6 +15,7 @@ from heelstrike.dynamics.dense import raise_to_zero, shorten, solve_to_rank
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.candidates import find_constraints
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -258,22 +259,24 @@ def hold_closed(
 
 @kernel
 def observe_faces(
-    model: Model, ground: GroundModel, state: Floats, rows: Rows, modes: Modes, seconds: Contacts,
+    model: Model, ground: GroundModel, state: Floats, modes: Modes, rows: Rows, seconds: Contacts,
     faces: Faces, tree: Workspace, contacts: Contacts, surface: Surface,
 ) -> None:  # fmt: skip
     """Kinematics, velocities and contact points of a state (q, v)."""
     forward_kinematics(model, state[: model.nq], tree)
     link_velocities(model, state[model.nq :], tree)
+    if rows.outside.kernel.shape[0] > 0:
+        find_constraints(model, state[: model.nq], state[model.nq :], tree, rows)
     locate(model, ground, tree, rows, modes, seconds, faces, contacts, surface)
 
 
 @kernel
 def look(
-    model: Model, ground: GroundModel, state: Floats, rows: Rows, modes: Modes, tree: Workspace,
+    model: Model, ground: GroundModel, state: Floats, modes: Modes, rows: Rows, tree: Workspace,
     contacts: Contacts, surface: Surface, seconds: Contacts, faces: Faces, watch: Watch,
 ) -> None:  # fmt: skip
     """Pose, contact points, and the event functions that need no forces, of a state (q, v)."""
-    observe_faces(model, ground, state, rows, modes, seconds, faces, tree, contacts, surface)
+    observe_faces(model, ground, state, modes, rows, seconds, faces, tree, contacts, surface)
     watch_geometry(model, ground, tree, contacts, state, rows, seconds, modes, faces, watch)
 
 
@@ -293,6 +296,8 @@ def evaluate(
     equations, assembly, friction = memory.equations, memory.assembly, memory.surface.friction
     rate = equations.rate
     evaluate_equations(model, q, v, equations)
+    if memory.rows.outside.kernel.shape[0] > 0:
+        find_constraints(model, q, v, equations.tree, memory.rows)
     locate(
         model, scene.ground, equations.tree, memory.rows, phase.modes, memory.seconds, phase.faces,
         memory.contacts, memory.surface,

@@ -20,6 +20,7 @@ from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.faces import (
+    CURVE,
     NO_FACE,
     along_segment,
     center_of,
@@ -81,6 +82,9 @@ def locate(
 ) -> None:  # fmt: skip
     """Contact points, gaps, normals and ground coefficients of the state now."""
     locate_contacts(model, ground, tree, contacts, surface)
+    if ground.curved == 1:
+        for contact in range(model.nc):
+            faces.face[contact], faces.bend[contact] = CURVE, surface.bend[contact]
     if not has_corners(ground):
         return
     normals, normal = contacts.normal, ground.normal
@@ -330,4 +334,4 @@ def is_at_second(
 def face_curvature(contact: int, radius: float, faces: Faces) -> float:
     """Curvature (1/m) of the way of the centre of a disc on its face."""
     face = faces.face[contact]
-    return 1.0 / radius if face >= 0 and face % 2 == 1 else 0.0
+    return 1.0 / radius if face >= 0 and face % 2 == 1 else faces.bend[contact]

@@ -13,8 +13,10 @@ from heelstrike.dynamics.kernels import point_bias_acceleration
 from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.contacts.candidates import write_own_rows
 from heelstrike.sim.contacts.geometry import contact_rows, contact_velocity, write_unit_row
-from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, POINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.writers import rate_of
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.phase import Faces
 from heelstrike.sim.event_driven.smooth.faces import face_curvature
@@ -42,6 +44,8 @@ def gap_velocity(
         return contact_velocity(model, tree, contacts, owner)
     if kind == SECOND_FACE:
         return contact_velocity(model, tree, seconds, owner)
+    if kind == CONSTRAINT:
+        return rate_of(owner, 0, state[model.nq :], table.outside), 0.0
     return table.side[contact] * state[model.nq + owner], 0.0
 
 
@@ -59,6 +63,8 @@ def gap_rows(
         contact_rows(model, tree, seconds, owner, place, assembly)
     elif kind == STOP:
         write_unit_row(owner, 2 * place, table.side[contact], assembly)
+    elif kind == CONSTRAINT:
+        write_own_rows(contact, place, table, assembly)
     else:
         write_unit_row(owner, 2 * place + 1, 1.0, assembly)
 
@@ -95,6 +101,8 @@ def free_gap_acceleration(
             velocity = velocity_at(equations.tree.velocity, link, place_of(equations.tree, center))
             _, along = into_frame(normal, velocity)
             along_normal += curvature * along * along
+    elif kind == CONSTRAINT:
+        along_normal = rows.outside.bias[rows.owner[contact], 0]
     jacobian, rate = assembly.jacobian, equations.rate
     for j in range(model.nv):
         along_normal += jacobian[2 * place, j] * rate[j]

@@ -6,13 +6,22 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import (
+    CONSTRAINT,
+    DRY_JOINT,
+    SECOND_FACE,
+    STOP,
+    Rows,
+    is_of_ground,
+)
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.phase import Modes
 from heelstrike.sim.event_driven.smooth.projection import tangential_place
 from heelstrike.sim.memory import Assembly, Reported
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import (
+    CONSTRAINT_HOLDS,
+    CONSTRAINT_LETS_GO,
     JOINT_SLIP,
     JOINT_STICK,
     JOINT_STOP,
@@ -40,7 +49,7 @@ def adopt_modes(count: int, assembly: Assembly, rows: Rows, modes: Modes, mode: 
         if found == OPEN:
             modes.closed[contact] = 0
             modes.slide[contact] = 0
-        elif rows.kind[contact] == STOP:
+        elif rows.kind[contact] in (STOP, CONSTRAINT):
             continue
         elif found == SLIP_FORWARD:
             modes.slide[contact] = 1
@@ -58,7 +67,7 @@ def form_groups(
         modes.group[contact] = contact
         modes.carrier[contact] = 0
         modes.holder[contact] = 0
-        if rows.kind[contact] == STOP:
+        if rows.kind[contact] in (STOP, CONSTRAINT):
             modes.carrier[contact] = modes.closed[contact]
         elif rows.kind[contact] == DRY_JOINT:
             sticks = 1 if modes.closed[contact] == 1 and modes.slide[contact] == 0 else 0
@@ -70,14 +79,14 @@ def form_groups(
         elif modes.closed[contact] == 1:
             join_group(model, contacts, contact, rows, seconds, modes)
     for leader in range(modes.watched):
-        if rows.kind[leader] in (STOP, DRY_JOINT):
+        if not is_of_ground(leader, rows):
             continue
         if modes.closed[leader] == 1 and modes.group[leader] == leader:
             find_carriers(contacts, leader, rows, seconds, modes)
             if agree(leader, friction, modes) and modes.slide[leader] == 0:
                 modes.holder[leader] = 1
     for contact in range(modes.watched):
-        if rows.kind[contact] in (STOP, DRY_JOINT):
+        if not is_of_ground(contact, rows):
             continue
         sticks = modes.closed[contact] == 1 and modes.slide[contact] == 0
         if sticks and modes.stuck[contact] == 0:
@@ -118,7 +127,7 @@ def join_group(
     for other in range(contact):
         if modes.closed[other] == 0 or modes.group[other] != other:
             continue
-        if rows.kind[other] in (STOP, DRY_JOINT) or link_of(other, model, rows) != link:
+        if not is_of_ground(other, rows) or link_of(other, model, rows) != link:
             continue
         its_x, its_z = normal_of(other, contacts, rows, seconds)
         if abs(its_x * z - its_z * x) > PARALLEL or its_x * x + its_z * z < 0.0:
@@ -150,7 +159,7 @@ def find_carriers(
     low = place_along(leader, x, z, contacts, rows, seconds)
     high = low
     for contact in range(leader + 1, modes.watched):
-        if rows.kind[contact] in (STOP, DRY_JOINT):
+        if not is_of_ground(contact, rows):
             continue
         if modes.closed[contact] == 1 and modes.group[contact] == leader:
             along = place_along(contact, x, z, contacts, rows, seconds)
@@ -210,6 +219,12 @@ def report_modes(
             if landed and not starting:
                 joint = rows.owner[contact]
                 log_event(time, JOINT_STOP, joint, 0.0, 0.0, record)
+        elif kind == CONSTRAINT:
+            number = rows.owner[contact]
+            if landed and not starting:
+                log_event(time, CONSTRAINT_HOLDS, number, 0.0, 0.0, record)
+            elif closed[contact] == 0 and was_closed[contact] == 1:
+                log_event(time, CONSTRAINT_LETS_GO, number, 0.0, 0.0, record)
         elif closed[contact] == 0 and was_closed[contact] == 1:
             log_event(time, LIFTOFF, contact, 0.0, 0.0, record)
         elif closed[contact] == 1:

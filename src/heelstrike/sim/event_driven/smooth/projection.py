@@ -7,6 +7,7 @@ import math
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.faces import CURVE
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -14,7 +15,7 @@ from heelstrike.sim.contacts.geometry import (
     weigh,
 )
 from heelstrike.sim.contacts.loops import append_loops, find_loops, row_of, rows_of
-from heelstrike.sim.contacts.rows import DRY_JOINT, LOOP, POINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, LOOP, POINT, SECOND_FACE, Rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.phase import HeldRows, Modes, Phase, SaddlePoint, Step
 from heelstrike.sim.event_driven.smooth.dynamics import (
@@ -48,7 +49,12 @@ def tangential_place(
     model: Model, angle: Floats, contacts: Contacts, contact: int, rows: Rows, seconds: Contacts,
     face: Integers,
 ) -> float:  # fmt: skip
-    """Where a contact point is along the ground, less the length that its disc has rolled."""
+    """Where a contact point is along the ground, less the length that its disc has rolled.
+
+    On smooth ground nobody knows: there what sticks is held by its velocity alone.
+    """
+    if face[contact] == CURVE:
+        return 0.0
     point = rows.owner[contact]
     its = seconds if rows.kind[contact] == SECOND_FACE else contacts
     position, normal, radius = its.position[point], its.normal[point], model.contact_radius[point]
@@ -111,7 +117,7 @@ def gather_sunk(
     none of them: it is the instant that is corrected. Returns how many there are.
     """
     sunk = 0
-    for contact in range(rows.end[STOP]):
+    for contact in range(rows.end[CONSTRAINT]):
         if modes.closed[contact] == 1 or fired[2 * contact] == 1:
             continue
         if rows.kind[contact] == POINT and modes.passing[contact] == 1:
@@ -160,7 +166,7 @@ def project(
     strayed, fastest = 0.0, 0.0
     for attempt in range(5):
         observe_faces(
-            model, ground, state, rows, phase.modes, seconds, phase.faces, equations.tree, contacts,
+            model, ground, state, phase.modes, rows, seconds, phase.faces, equations.tree, contacts,
             surface,
         )  # fmt: skip
         weigh(model, equations)

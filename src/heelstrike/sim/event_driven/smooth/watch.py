@@ -11,7 +11,8 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.geometry import (
     contact_velocity,
 )
-from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, SECOND_FACE, STOP, Rows
+from heelstrike.sim.contacts.writers import rate_of
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.phase import Faces, Modes, Watch
 from heelstrike.sim.event_driven.smooth.faces import has_corners, watch_corners
@@ -77,6 +78,10 @@ def watch_geometry(
             joint, side = table.owner[contact], table.side[contact]
             value[2 * contact] = side * (state[joint] - table.limit[contact])
             rate[2 * contact] = side * state[model.nq + joint]
+    for contact in range(table.first[CONSTRAINT], table.end[CONSTRAINT]):
+        if modes.closed[contact] == 0:
+            value[2 * contact] = table.gap[contact]
+            rate[2 * contact] = rate_of(table.owner[contact], 0, state[model.nq :], table.outside)
     for contact in range(model.nc):
         normal, tangent = contact_velocity(model, tree, contacts, contact)
         value[2 * contact + 1] = 1.0
