@@ -103,9 +103,12 @@ if TYPE_CHECKING:
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.experiments.spring_mass import SpringMass as SpringMass
     from heelstrike.gait import Gait as Gait
+    from heelstrike.gait import GaitFamily as GaitFamily
     from heelstrike.gait import PhasedGait as PhasedGait
     from heelstrike.gait import StepFamily as StepFamily
+    from heelstrike.gait import gait_family as gait_family
     from heelstrike.gait import load_gait as load_gait
+    from heelstrike.gait import load_gait_family as load_gait_family
     from heelstrike.gait import make_invariant as make_invariant
     from heelstrike.gait import optimize_gait as optimize_gait
     from heelstrike.robot import Robot as Robot
@@ -179,6 +182,7 @@ _HOME = {
     "ForceDistribution": "heelstrike.contact",
     "Gait": "heelstrike.gait",
     "GaitError": "heelstrike.errors",
+    "GaitFamily": "heelstrike.gait",
     "GaitLQR": "heelstrike.control",
     "Gradient": "heelstrike.sim.linearized.derivatives",
     "Ground": "heelstrike.contact",
@@ -239,6 +243,7 @@ _HOME = {
     "disturbance_response": "heelstrike.analysis.stability.response",
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
     "floquet_multipliers": "heelstrike.analysis.stability.floquet",
+    "gait_family": "heelstrike.gait",
     "gait_sensitivity_norm": "heelstrike.analysis.stability.sensitivity",
     "human": "heelstrike.robot.human",
     "inspect_robot": "heelstrike.robot",
@@ -249,6 +254,7 @@ _HOME = {
     "linearize_contact": "heelstrike.contact",
     "linearize_impact": "heelstrike.contact",
     "load_gait": "heelstrike.gait",
+    "load_gait_family": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",
     "load_snapshot": "heelstrike.sim",

@@ -117,6 +117,7 @@ def reading_json(
     versions: tuple[int, ...],
     largest: float,
     error: type[HeelstrikeError],
+    largest_file: int = LARGEST_FILE,
 ) -> Iterator[Entries]:
     """Read a file; errors raised while its entries are looked at are told with its path.
 
@@ -132,9 +133,11 @@ def reading_json(
         Size that no number of it exceeds.
     error : type
         What to raise if it is another file, or its entries are not those that were saved.
+    largest_file : int
+        Bytes from which on a file is refused.
     """
     try:
-        data = _entries(path, kind, error)
+        data = _entries(path, kind, error, largest_file)
         version = data.get("version")
         if version not in versions or isinstance(version, bool):
             raise error(
@@ -151,7 +154,9 @@ def reading_json(
         raise error(f"{path}: {cause}") from cause.__cause__
 
 
-def _entries(path: str | PathLike[str], kind: str, error: type[HeelstrikeError]) -> dict[str, Any]:
+def _entries(
+    path: str | PathLike[str], kind: str, error: type[HeelstrikeError], largest_file: int
+) -> dict[str, Any]:
     def refuse(constant: str) -> NoReturn:
         raise error(f"contains {constant}; every number of a {kind} is finite.")
 
@@ -162,8 +167,8 @@ def _entries(path: str | PathLike[str], kind: str, error: type[HeelstrikeError])
         if not file.is_file():
             there = "is not a regular file" if file.exists() else "there is no such file"
             raise error(f"{there}.")
-        if file.stat().st_size > LARGEST_FILE:
-            raise error(f"larger than {LARGEST_FILE // 2**20} MB; is it a {kind}?")
+        if file.stat().st_size > largest_file:
+            raise error(f"larger than {largest_file // 2**20} MB; is it a {kind}?")
         data = json.loads(file.read_text(encoding="utf-8-sig"), parse_constant=refuse)
     except error:  # which may be a ValueError, too
         raise

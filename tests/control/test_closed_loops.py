@@ -82,20 +82,22 @@ def test_effort_and_constraints_are_those_of_motors_in_the_ankles() -> None:
     own, lever = asked_of(biped("own")), asked_of(biped("lever"))
     assert lever.size == own.size == 6
     q, v, a, after = 0.4 * np.random.default_rng(3).normal(size=(4, 6))
-    for function, arguments in (("motion", (q, v, a)), ("landing", (q, v, after))):
+    level = np.zeros(2)
+    along, landing = (q, v, a, 0.3, level), (q, v, after, level)
+    for function, arguments in (("motion", along), ("landing", landing)):
         found, expected = (getattr(each, function)(*arguments) for each in (lever, own))
         for k in range(3):
             np.testing.assert_allclose(
                 np.array(found[k]), np.array(expected[k]), rtol=1e-6, atol=1e-6
             )
-    effort = [float(each.path(q, v, a)[0]) for each in (lever, own)]
+    effort = [float(each.path(*along)[0]) for each in (lever, own)]
     assert effort[0] == pytest.approx(effort[1], rel=1e-6)
     names = [row.subject for row in own.path_rows]
     assert {row.subject for row in lever.path_rows} >= {n for n in names if "ankle" not in n}
-    touchdown = [np.array(each.touchdown(q, v, after, 0.6, 0.3)) for each in (lever, own)]
+    touchdown = [np.array(each.touchdown(q, v, after, 0.6, 0.3, level)) for each in (lever, own)]
     np.testing.assert_allclose(touchdown[0], touchdown[1], rtol=1e-6, atol=1e-6)
     robot = biped("lever")
-    position, velocity = (np.array(part).ravel() for part in lever.start(q, after))
+    position, velocity = (np.array(part).ravel() for part in lever.start(q, after, level))
     assert np.abs(dynamics.loop_displacement(robot, position)).max() < 1e-13
     assert np.abs(dynamics.loop_jacobian(robot, position) @ velocity).max() < 1e-13
 

@@ -31,8 +31,8 @@ def designs(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     made: list[object] = []
     gait = walking.gait()
 
-    def designed(transcription: Any, profile: object, report: Any) -> hs.Gait:
-        made.append(transcription.request)
+    def designed(request: object, profile: object, report: Any) -> hs.Gait:
+        made.append(request)
         return gait
 
     monkeypatch.setattr(design, "designed", designed)

@@ -17,6 +17,7 @@ from heelstrike.gait.request import Request
 from heelstrike.gait.transcription import Group, Transcription
 
 RADIUS = 0.02
+LEVEL = np.zeros(2)
 STEP = {"step_length": 0.25, "step_duration": 0.6}
 UNASKED: dict[str, Any] = {
     "speed": None, "clearance_profile": None, "zmp_margin": None, "force_margin": None,
@@ -46,7 +47,7 @@ def asked(robot: hs.Robot) -> Request:
 
 @pytest.fixture(scope="module")
 def program(asked: Request) -> Program:
-    return Program(Transcription(asked), asked.profiles[0], *first_instants(asked))
+    return Program(asked, Transcription(asked), asked.profiles[0], *first_instants(asked))
 
 
 def at_phase(phase: float) -> Instants:
@@ -111,7 +112,9 @@ def test_constraints_along_the_path(
     phase = 0.3 + 0.1 * seed
     now = instant(robot, gait, phase * 0.6)  # type: ignore[arg-type]
     motion = program.motion(unknowns, at_phase(phase))
-    effort, values = (np.array(part).ravel() for part in program.transcription.path(*motion))
+    effort, values = (
+        np.array(part).ravel() for part in program.transcription.path(*motion, 0.25, LEVEL)
+    )
     assert effort[0] == pytest.approx(now.torque @ now.torque, rel=1e-9)
     expected = path_values(robot, asked, now)
     rows = program.transcription.path_rows
@@ -130,7 +133,7 @@ def test_motion_that_is_reported(robot: hs.Robot, program: Program, seed: int) -
     now = instant(robot, gait, 0.4 * 0.6)  # type: ignore[arg-type]
     transcription, motion = program.transcription, program.motion(unknowns, at_phase(0.4))
     wrench, torque, heights, joints = (
-        np.array(part).ravel() for part in transcription.motion(*motion)
+        np.array(part).ravel() for part in transcription.motion(*motion, 0.25, LEVEL)
     )
     np.testing.assert_allclose(joints, now.q[3:], atol=1e-12)
     scale = np.abs(now.wrench).max()
@@ -140,7 +143,7 @@ def test_motion_that_is_reported(robot: hs.Robot, program: Program, seed: int) -
     np.testing.assert_allclose(motion[0].ravel(), now.q[3:], atol=1e-12)
     start = instant(robot, gait, 0.0)  # type: ignore[arg-type]
     end, _, start_velocity, _, _ = program.at_touchdown(unknowns)
-    q, v = (np.array(part).ravel() for part in transcription.start(end, start_velocity))
+    q, v = (np.array(part).ravel() for part in transcription.start(end, start_velocity, LEVEL))
     np.testing.assert_allclose(q, start.q, atol=1e-12)
     np.testing.assert_allclose(v, start.v, atol=1e-12)
 

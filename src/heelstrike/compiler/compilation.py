@@ -188,9 +188,7 @@ class AddressedLoop:
         As those of :func:`loop_for`.
     """
 
-    def __init__(
-        self, signature: Any, function: Callable[..., int], fixed: Fixed = ()
-    ) -> None:
+    def __init__(self, signature: Any, function: Callable[..., int], fixed: Fixed = ()) -> None:
         self.call, self._find = numba_in_use().loop(signature, function, fixed, addressed=True)
 
     @cached_property

@@ -93,9 +93,7 @@ class PrivateNumba(DocumentedNumba):
         Numba compares the types of all arguments with those it compiled for, at every call. What is
         `addressed` can be called by the C calling convention, too; returned is what finds it.
         """
-        compiled = _unfinished(
-            function, no_cpython_wrapper=False, no_cfunc_wrapper=not addressed
-        )
+        compiled = _unfinished(function, no_cpython_wrapper=False, no_cfunc_wrapper=not addressed)
         cache = _Cache(compiled, self.made_of(function), self.settings())
         result = self.compile(lambda: _loop(compiled, cache, signature, fixed))
         name = result.fndesc.llvm_cfunc_wrapper_name

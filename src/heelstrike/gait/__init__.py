@@ -1,6 +1,8 @@
 """Gaits: how they are represented, saved, and found by optimisation."""
 
 from heelstrike.gait.clearance import ClearanceProfile
+from heelstrike.gait.cost import Cost, Instant
+from heelstrike.gait.family import GaitFamily, gait_family, load_gait_family
 from heelstrike.gait.file import load_gait
 from heelstrike.gait.gait import Footing, Gait, Phase
 from heelstrike.gait.margins import Margins
@@ -11,14 +13,19 @@ from heelstrike.gait.phased.surface import Touchdown, make_invariant
 
 __all__ = [
     "ClearanceProfile",
+    "Cost",
     "Footing",
     "Gait",
+    "GaitFamily",
+    "Instant",
     "Margins",
     "Phase",
     "PhasedGait",
     "StepFamily",
     "Touchdown",
+    "gait_family",
     "load_gait",
+    "load_gait_family",
     "make_invariant",
     "optimize_gait",
 ]

@@ -3,39 +3,53 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
-from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Footing, Gait, Phase, actuated_joints, fingerprint
 from heelstrike.gait.infeasible import nearest_to_feasible
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.program import Program, Solution, first_instants
 from heelstrike.gait.refinement import checked_instants, held_between_nodes
+from heelstrike.gait.request import Request
 from heelstrike.gait.starts import starts
-from heelstrike.gait.transcription import Group, Transcription
+from heelstrike.gait.transcription import Group, transcribed
 from heelstrike.robot.model import Floats
 from heelstrike.robot.motors import torque_range
 from heelstrike.robot.state import State
 
 
-def designed(
-    transcription: Transcription, profile: ClearanceProfile, report: Callable[[float], None]
-) -> Gait:
+def designed(request: Request, profile: ClearanceProfile, report: Callable[[float], None]) -> Gait:
     """Design a gait whose swing foot keeps above a profile; `report` is told the share of it."""
-    program = Program(transcription, profile, *first_instants(transcription.request))
+    program = Program(request, transcribed(request), profile, *first_instants(request))
     report(0.05)
     best = _best_of_starts(program, report)
-    unknowns = held_between_nodes(program, best)
+    unknowns, optimal = held_between_nodes(program, best)
     report(1.0)
-    return designed_gait(program, unknowns)
+    return designed_gait(program, unknowns, optimal)
+
+
+def between(request: Request, corners: Sequence[tuple[Gait, float]]) -> Gait:
+    """Gait between others, whose motions count by weights: it satisfies all equations of a step."""
+    profiles = {gait.clearance_profile for gait, _ in corners}
+    profile = ClearanceProfile.SMOOTH if len(profiles) > 1 else profiles.pop()
+    program = Program(request, transcribed(request), profile, *first_instants(request))
+    mean = np.sum([weight * program.resampled(gait) for gait, weight in corners], axis=0)
+    return designed_gait(program, program.polished(program.in_bounds(mean)), optimal=False)
 
 
 def _best_of_starts(program: Program, report: Callable[[float], None]) -> Solution:
     request = program.request
+    if request.warm_start is not None:
+        near = replace(program, near=True)
+        solution = near.solve(near.resampled(request.warm_start))
+        report(0.8)
+        if solution.converged:
+            return solution
     guesses = [program.sampled(start) for start in islice(starts(request), request.starts)]
     solutions: list[Solution] = []
     while guesses:
@@ -43,29 +57,26 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
         if len(solutions) == 1 and not solutions[0].converged:
             # Perhaps no start can succeed, which ends here in an error that tells why. Otherwise
             # a point that satisfies all constraints is as good a start as can be.
-            guesses.insert(0, nearest_to_feasible(program))
+            feasible = nearest_to_feasible(program)
+            guesses.insert(0, feasible)
         report(0.05 + 0.75 * len(solutions) / (len(solutions) + len(guesses)))
-    converged = [solution for solution in solutions if solution.converged]
-    if not converged:
-        raise InfeasibleGaitError(
-            f"robot {request.robot.name!r}: gaits with {request} exist only just: points that "
-            f"satisfy all constraints were found, but no optimum ({solutions[-1].ended}). Ask "
-            "for a shorter or slower step or a lower clearance of the swing foot."
-        )
-    return min(converged, key=lambda solution: solution.objective)
+    good = [solution for solution in solutions if solution.converged]
+    # Without an optimum, the best of the points that satisfy all constraints is better than none.
+    good = good or [program.at(feasible), *filter(program.satisfied_by, solutions)]
+    return min(good, key=lambda solution: solution.objective)
 
 
-def designed_gait(program: Program, unknowns: Floats) -> Gait:
+def designed_gait(program: Program, unknowns: Floats, optimal: bool) -> Gait:
     """Gait with the given unknowns, its joints in the order of the actuators."""
     transcription, request = program.transcription, program.request
-    robot, stance = request.robot, request.stance
+    robot, stance, ground = request.robot, request.stance, request.under_foot
     joint = robot.model.actuator_joint
     pieces = program.pieces(unknowns)
     end, _, start_velocity, duration, length = touchdown = program.at_touchdown(unknowns)
     impulse = np.zeros(3)
     if request.impact:
-        impulse[: stance.held] = np.array(transcription.landing(*touchdown[:3])[0]).ravel()
-    state = (np.array(part).ravel() for part in transcription.start(end, start_velocity))
+        impulse[: stance.held] = np.array(transcription.landing(*touchdown[:3], ground)[0]).ravel()
+    state = (np.array(part).ravel() for part in transcription.start(end, start_velocity, ground))
     phase = Phase(
         contacts={stance.foot: Footing.FLAT if stance.flat else Footing.POINT},
         breakpoints=float(duration) * np.linspace(0.0, 1.0, len(pieces) + 1),
@@ -84,6 +95,10 @@ def designed_gait(program: Program, unknowns: Floats) -> Gait:
         mirror_offset=legs.offset,
         initial_state=State(*state),
         cost=program.effort(unknowns),
+        spent=program.cost(unknowns),
+        optimal=optimal,
+        slope=request.slope,
+        rise=request.rise,
         friction=request.friction,
         clearance=request.clearance,
         clearance_profile=program.profile,
@@ -95,11 +110,12 @@ def designed_gait(program: Program, unknowns: Floats) -> Gait:
 def margins_of(program: Program, unknowns: Floats) -> Margins:
     """Worst values at the instants at which a program was checked, from the motion itself."""
     transcription, request = program.transcription, program.request
-    model = request.robot.model
+    model, ground = request.robot.model, request.under_foot
     fine = checked_instants(program)
     motion = program.motion(unknowns, fine)
     wrench, torque, heights, position = (
-        np.array(part) for part in transcription.motion.map(fine.share.size)(*motion)
+        np.array(part)
+        for part in transcription.motion.map(fine.share.size)(*motion, unknowns[-1], ground)
     )
     half = request.stance.half_length
     actuator = np.argsort(model.actuator_joint)
@@ -109,8 +125,10 @@ def margins_of(program: Program, unknowns: Floats) -> Margins:
     limits = np.minimum(upper - torque, torque - lower)
     ranges = np.minimum(request.upper[3:, None] - position, position - request.lower[3:, None])
     end = program.at_touchdown(unknowns)
-    impulse, landing, lift = (np.array(part).ravel() for part in transcription.landing(*end[:3]))
-    touchdown = np.array(transcription.touchdown(*end)).ravel()
+    impulse, landing, lift = (
+        np.array(part).ravel() for part in transcription.landing(*end[:3], ground)
+    )
+    touchdown = np.array(transcription.touchdown(*end, ground)).ravel()
     groups = np.array([row.group for row in transcription.touchdown_rows])
     placed = (groups == Group.TOUCHDOWN_PLACE) | (groups == Group.TOUCHDOWN_ANGLE)
     periodic = (groups == Group.IMPACT) | (groups == Group.PERIODIC)

@@ -39,6 +39,8 @@ _NUMBERS: dict[str, tuple[str, tuple[int, ...]]] = {
     "mirror_joint": ("mirror_joint", (0,)),
     "touchdown_impulse_Ns": ("touchdown_impulse", (3,)),
 }
+_LATER = {"slope_rad": "slope", "rise_m": "rise", "spent": "spent"}
+"""Numbers that older files lack, of gaits that have their defaults."""
 """Entries of a file: the attribute of the gait, and the shape of its numbers; 0 is one a joint."""
 
 _MARGINS = {"_".join([each.name, *each.metadata.values()]): each.name for each in fields(Margins)}
@@ -47,9 +49,23 @@ _MARGINS = {"_".join([each.name, *each.metadata.values()]): each.name for each i
 
 def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
     """Write a gait to a JSON file, which appears whole or not at all."""
-    entries: dict[str, Any] = {
+    try:
+        write_whole(path, json_text("gait", VERSION, entries_of(gait)))
+    except WriteError as error:
+        raise GaitError(str(error)) from error
+
+
+def entries_of(gait: Gait) -> dict[str, Any]:
+    """Return what stands of a gait in a file."""
+    return {
         **{key: getattr(gait, name) for key, name in _TEXTS.items()},
         **{key: np.asarray(getattr(gait, name)).tolist() for key, (name, _) in _NUMBERS.items()},
+        **{
+            key: value
+            for key, name in _LATER.items()
+            if (value := getattr(gait, name)) not in (0.0, None)
+        },
+        **({} if gait.optimal else {"optimal": False}),
         "clearance_profile": gait.clearance_profile.value,
         "joints": list(gait.joint_names),
         "initial_position": gait.initial_state.q.tolist(),
@@ -61,10 +77,6 @@ def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
             for key, name in _MARGINS.items()
         },
     }
-    try:
-        write_whole(path, json_text("gait", VERSION, entries))
-    except WriteError as error:
-        raise GaitError(str(error)) from error
 
 
 def _of_phase(phase: Phase) -> dict[str, Any]:
@@ -101,13 +113,14 @@ def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:
         not finite or not those that were saved, or the gait belongs to another robot.
     """
     with reading_json(path, "gait", (1, VERSION), LARGEST_NUMBER, GaitError) as entries:
-        gait = _gait(entries)
+        gait = gait_of(entries, entries.data["version"])
         if robot is not None:
-            _check_robot(gait, robot)
+            check_robot(gait, robot)
         return gait
 
 
-def _gait(entries: Entries) -> Gait:
+def gait_of(entries: Entries, version: int = VERSION) -> Gait:
+    """Return the gait of which entries in a file tell."""
     joints = entries.names("joints")
     nu, given = len(joints), entries.data.get("initial_position")
     # More than trunk and motors where joints follow by closed loops.
@@ -117,13 +130,15 @@ def _gait(entries: Entries) -> Gait:
         for key, (name, shape) in _NUMBERS.items()
     }
     values |= {name: entries.text(key) for key, name in _TEXTS.items()}
-    if entries.data["version"] == 1:
+    if version == 1:
         phases = [_only_phase(entries, nu)]
     else:
         phases = [_phase(each, nu) for each in entries.objects("phases")]
+    values |= {name: entries.number(key) for key, name in _LATER.items() if key in entries.data}
     margins = entries.object("margins")
     return Gait(
         **values,
+        optimal=entries.data.get("optimal", True) is True,
         clearance_profile=entries.member("clearance_profile", ClearanceProfile),
         joint_names=joints,
         initial_state=State(
@@ -175,7 +190,8 @@ def _of_pieces(entries: Entries, contacts: dict[int, Footing], nu: int) -> Phase
     )
 
 
-def _check_robot(gait: Gait, robot: Robot) -> None:
+def check_robot(gait: Gait, robot: Robot) -> None:
+    """Raise a `GaitError` unless a gait was designed for a robot."""
     if gait.robot != robot.name:
         raise GaitError(
             f"is a gait of robot {shown(gait.robot)}, not of {robot.name!r}. Load that "

@@ -122,6 +122,16 @@ class Gait(ShownInNotebooks):
     tangential (N s), moment about +y (N m s). Zero for a gait without impact."""
     margins: Margins
     """How far the gait stays from its constraints."""
+    slope: float = 0.0
+    """Angle (rad) at which the ground it was designed for ascends ahead."""
+    spent: float | None = None
+    """What the optimiser was asked to make least, over one step, in its own unit; None in gaits of
+    which only the torque cost is known."""
+    optimal: bool = True
+    """Whether it is an optimum. A gait that is not satisfies all constraints nevertheless; a better
+    one may exist."""
+    rise: float = 0.0
+    """By how much (m) every foothold is higher than the one before, on level stairs."""
 
     def __post_init__(self) -> None:
         nu = len(self.joint_names)
@@ -400,7 +410,7 @@ class Gait(ShownInNotebooks):
     def __repr__(self) -> str:
         return (
             f"Gait({self.robot!r}: {self.step_length:g} m in {self.step_duration:g} s, "
-            f"cost {self.cost:.6g} N²m²s)"
+            f"cost {self.cost:.6g} N²m²s{'' if self.optimal else '; feasible, not optimal'})"
         )
 
 

@@ -8,14 +8,12 @@ from itertools import islice
 import numpy as np
 
 from heelstrike.errors import InfeasibleGaitError
-from heelstrike.gait.program import Program, Solution
+from heelstrike.gait.program import FEASIBLE, Program, Solution
 from heelstrike.gait.starts import starts
 from heelstrike.gait.transcription import Group
 from heelstrike.robot.model import Floats
 from heelstrike.wording import some_of
 
-FEASIBLE = 1e-7
-"""Scaled violations up to which a point satisfies all constraints."""
 TAKES_PART = 0.05
 """Multiplier from which a constraint takes part in a conflict; 1 for those that are violated."""
 ATTEMPTS = 2
@@ -32,7 +30,7 @@ def nearest_to_feasible(program: Program) -> Floats:
     InfeasibleGaitError
         If some violation always remains; the message names the constraints in conflict.
     """
-    elastic = replace(program, elastic=True)
+    elastic = replace(program, elastic=True, near=False)
     found = []
     for start in islice(starts(program.request), ATTEMPTS):
         found.append(elastic.solve(program.sampled(start)))
@@ -76,7 +74,8 @@ def _worst_violations(program: Program, unknowns: Floats) -> dict[Group, str]:
 def _binding_groups(program: Program, nearest: Solution, violated: set[Group]) -> list[str]:
     """Inequalities that hold, but only just, and keep the violated ones from holding."""
     strength: dict[Group, float] = {}
-    for (row, _), multiplier in zip(program.labelled_rows(), nearest.multipliers, strict=True):
+    rows = program.labelled_rows()
+    for (row, _), multiplier in zip(rows, nearest.multipliers[-len(rows) :], strict=True):
         if row.lower < row.upper:
             strength[row.group] = max(strength.get(row.group, 0.0), abs(float(multiplier)))
     ordered = sorted(strength, key=lambda group: -strength[group])

@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import hashlib
 from contextlib import suppress
-from dataclasses import fields
-
-import numpy as np
 
 from heelstrike.errors import GaitError
 from heelstrike.gait.file import load_gait, save_gait
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.request import Request
+from heelstrike.gait.request_digest import digest_of
 from heelstrike.kept_files import kept_file, make_room, program_digest
-from heelstrike.robot.robot import Robot
 
 _ROOMS = ("gait", "contact", "dynamics", "robot", "compiler", "tolerances")
 """Packages and modules whose text decides what gait is found."""
@@ -34,7 +31,9 @@ class KeptGait:
 
     def __init__(self, request: Request) -> None:
         self._robot = request.robot
-        self._file = kept_file("gaits", _fingerprint(request))
+        # A function has no fingerprint, and what was started near a gait hangs on that gait.
+        nameless = callable(request.cost) or request.warm_start is not None
+        self._file = None if nameless else kept_file("gaits", _fingerprint(request))
 
     def load(self) -> Gait | None:
         """Return the gait, or None if it is not there or its file is damaged."""
@@ -55,29 +54,5 @@ class KeptGait:
 
 def _fingerprint(request: Request) -> str:
     digest = hashlib.sha256(program_digest(_ROOMS, "casadi"))
-    _add_robot(digest, request.robot)
-    for field in fields(request):
-        if field.name != "robot":
-            value = getattr(request, field.name)
-            digest.update(f"{field.name} {_plain(value)!r};".encode())
+    digest.update(digest_of(request))
     return digest.hexdigest()[:32]
-
-
-def _add_robot(digest: hashlib._Hash, robot: Robot) -> None:
-    """Add every digit of a robot's numbers, and its names; pictures of it decide nothing."""
-    for name, value in robot.model.members().items():
-        numbers = np.ascontiguousarray(value)
-        digest.update(f"{name} {numbers.dtype} {numbers.shape}".encode() + numbers.tobytes())
-    names = (robot.name, robot.joint_names, robot.actuator_names, robot.contact_names)
-    mirror = robot.mirror
-    sides = mirror and [
-        part.tolist() for part in (mirror.joint, mirror.sign, mirror.contact, mirror.foot)
-    ]
-    digest.update(repr((names, robot.feet, sides, robot.floating)).encode())
-
-
-def _plain(value: object) -> object:
-    """Return a value whose ``repr`` tells all of it, the same for equal values."""
-    if hasattr(value, "items"):
-        return sorted((name, tuple(map(float, ends))) for name, ends in value.items())
-    return value

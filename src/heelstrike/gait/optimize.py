@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from typing import Any
 
 from heelstrike.arguments import takes
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
+from heelstrike.gait.cost import Cost, OwnCost
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.kept_gait import KeptGait
 from heelstrike.gait.request import JointRanges, Request
@@ -30,6 +33,10 @@ def optimize_gait(
     joint_speed_limit: float = math.inf,
     joint_ranges: JointRanges | None = None,
     impact: bool = True,
+    slope: float = 0.0,
+    rise: float = 0.0,
+    cost: Cost | str | Mapping[Cost | str, float] | OwnCost = "torque",
+    warm_start: Gait | None = None,
     intervals: int | None = None,
     starts: int = 3,
     progress: Callable[[float], None] | None = None,
@@ -92,6 +99,20 @@ def optimize_gait(
         Whether the swing foot may land with velocity: the landing is then a plastic impact, whose
         impulse is unilateral, inside the friction cone and the sole, and leaves the rear foot free
         to lift (eq. 20-22). Otherwise it must come to rest as it lands.
+    slope : float
+        Angle (rad) at which the ground ascends ahead; negative if it descends. `step_length` and
+        all heights are then measured along the ground and away from it.
+    rise : float
+        By how much (m) every foothold is higher than the one before, on level stairs whose treads
+        are `step_length` deep; negative downstairs.
+    cost : str, mapping or function
+        What is to be least over the step, or per metre where length or duration are free:
+        ``"torque"``, ``"mechanical_energy"``, ``"electrical_energy"`` (:class:`Cost`); several of
+        them with their weights; or a function of an :class:`Instant` that returns the rate as an
+        expression of CasADi.
+    warm_start : Gait, optional
+        A gait of the robot to start from, for instance one with nearly the same step. Other
+        starting points are tried only if this one leads nowhere.
     intervals : int, optional
         Intervals of the Gauss-Lobatto grid for quadrature and constraints, 26 by default; on point
         feet, intervals of the collocation mesh, 12 by default.
@@ -131,7 +152,6 @@ def optimize_gait(
         return gait
     # CasADi is loaded only now: importing heelstrike, or loading a saved gait, does without it.
     from heelstrike.gait.design import designed
-    from heelstrike.gait.transcription import Transcription
 
     furthest = 0.0
 
@@ -142,9 +162,16 @@ def optimize_gait(
         if progress is not None:
             progress(furthest)
 
-    transcription = Transcription(request)
     *others, last = request.profiles
     for profile in others:
         with suppress(InfeasibleGaitError):  # the last profile asks least of the swing foot
-            return kept.save(designed(transcription, profile, report))
-    return kept.save(designed(transcription, last, report))
+            return kept.save(designed(request, profile, report))
+    return kept.save(designed(request, last, report))
+
+
+def request_of(robot: Robot, **asked: Any) -> Request:
+    """Return a request in which what is not asked is as :func:`optimize_gait` has it by default."""
+    parameters = inspect.signature(optimize_gait).parameters
+    usual = {name: each.default for name, each in parameters.items() if name != "robot"}
+    del usual["progress"]
+    return Request(robot=robot, **{**usual, **asked})

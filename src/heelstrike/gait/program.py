@@ -8,18 +8,23 @@ from typing import Any
 
 import casadi
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from heelstrike.field_texts import dataclass
+from heelstrike.gait.blocks import BlockProgram, Copies
 from heelstrike.gait.clearance import ClearanceProfile
+from heelstrike.gait.gait import Gait
 from heelstrike.gait.polynomials import Instants, coefficients, gauss, lobatto
 from heelstrike.gait.request import Request
-from heelstrike.gait.starts import Start
+from heelstrike.gait.starts import Start, typical_step
 from heelstrike.gait.transcription import Group, Row, Transcription
 from heelstrike.interruption import deferred_interrupts
 from heelstrike.robot.model import Floats
 
 CONVERGED = 1e-8
 """Tolerance of IPOPT on scaled constraints and optimality."""
+FEASIBLE = 1e-7
+"""Scaled violations up to which a point satisfies all constraints."""
 MOST_ITERATIONS = 100
 """Iterations after which a start is given up; those that succeed take about 25."""
 POINTS = 4
@@ -32,18 +37,28 @@ SHIFT = 1e-12
 RESERVE = 1e-6
 """Scaled distance kept from every bound along the path, for the time between the instants."""
 
+CLOSE = 1e-4
+"""Barrier parameter and distance from bounds with which IPOPT begins near an optimum. From 1e-3 to
+1e-6, solving again takes 6 to 12 iterations; 16 to 20 from IPOPT's own 0.1."""
+
 SETTINGS = {
-    "print_time": False,
-    "error_on_fail": False,
-    "ipopt": {
-        "sb": "yes",
-        "print_level": 0,
-        "tol": CONVERGED,
-        "constr_viol_tol": CONVERGED,
-        "acceptable_iter": 0,
-        "max_iter": MOST_ITERATIONS,
-    },
+    "sb": "yes",
+    "print_level": 0,
+    "tol": CONVERGED,
+    "constr_viol_tol": CONVERGED,
+    "acceptable_iter": 0,
+    "max_iter": MOST_ITERATIONS,
 }
+NEAR = SETTINGS | {
+    "warm_start_init_point": "yes",
+    "mu_init": CLOSE,
+    **{
+        f"warm_start_{each}": CLOSE
+        for each in ("bound_push", "slack_bound_push", "mult_bound_push", "bound_frac",
+                     "slack_bound_frac")
+    },
+}  # fmt: skip
+"""Settings of IPOPT, and those for a start that is nearly an optimum."""
 
 
 def first_instants(request: Request) -> tuple[int, Instants]:
@@ -81,7 +96,8 @@ class Solution:
     ended: str
     """IPOPT's own word for how it did."""
     multipliers: Floats
-    """(m,) Multipliers of the scaled constraints, in the order of :meth:`Program.labelled_rows`."""
+    """Multipliers of the constraints: of the gaps between the pieces, then of the scaled ones in
+    the order of :meth:`Program.labelled_rows`."""
 
 
 @dataclass(eq=False)
@@ -89,11 +105,16 @@ class Program:
     """The program on a mesh of equal pieces.
 
     Unknowns are, of all free coordinates, the positions at the end and the velocities at the
-    beginning of every piece, and the parts of its acceleration; then the step's duration and
-    length. The positions at its beginning are the mirror image of those at its end. Where a piece
-    ends, the next one begins: those equations always hold, also in an elastic program.
+    beginning of every piece, and the parts of its acceleration, as they are if the step has its
+    usual duration, or the one that was asked for; then the step's duration and length. Over the
+    share of a piece that has gone by, the motion is affine in them whatever the duration, and the
+    program made of blocks. The positions at its beginning are the mirror image of those at its end.
+    Where a piece ends, the next one begins: those equations always hold, also in an elastic
+    program.
     """
 
+    request: Request
+    """What is asked."""
     transcription: Transcription
     """The functions."""
     profile: ClearanceProfile
@@ -103,13 +124,17 @@ class Program:
     instants: Instants
     """When the constraints along the path hold. Equations among them hold where the instants have a
     weight; the others only carry inequalities."""
+    near: bool = False
+    """Whether guesses are nearly optima."""
     elastic: bool = False
     """Let every constraint be violated and minimise the sum of the scaled violations instead of the
     effort: shows which constraints are in conflict when there is no solution."""
 
     def __post_init__(self) -> None:
-        self.request = self.transcription.request
         n, pieces = self.transcription.size, self.instants.pieces
+        _, usual = typical_step(self.request)
+        self._usual = usual / pieces
+        """Duration of a piece (s) with which velocities and accelerations are told."""
         self._ends = Instants(pieces, np.arange(pieces), np.ones(pieces), np.zeros(pieces))
         sizes = [n * pieces, n * pieces, n * pieces * (self.degree - 1), 1, 1]
         self._places = [0, *np.cumsum(sizes).tolist()]
@@ -160,108 +185,192 @@ class Program:
         )
 
     def _parts(self, unknowns: Any) -> tuple[Any, Any, Any, Any, Any]:
-        """Positions, velocities and parts of the acceleration, (n, ...); duration and length."""
+        """Positions, and derivatives by the share of a piece, (n, ...); duration and length."""
         if isinstance(unknowns, np.ndarray):
             unknowns = casadi.DM(unknowns)
         n = self.transcription.size
         q, v, a, duration, length = (unknowns[k:end] for k, end in pairwise(self._places))
         q, v, a = (casadi.reshape(part, n, -1) for part in (q, v, a))
         start = self.transcription.mirror.position(q[:, -1])
-        return casadi.horzcat(start, q), v, a, duration, length
+        rate = self._usual
+        return casadi.horzcat(start, q), rate * v, rate**2 * a, duration, length
 
-    def along(self, unknowns: Any, instants: Instants) -> tuple[Any, Any, Any]:
-        """Positions, velocities and accelerations at instants, (n, N) each."""
-        q, v, a, duration, _ = self._parts(unknowns)
-        h = duration / instants.pieces
-        values = casadi.horzcat(q[:, :-1], h * v, h**2 * a)
+    def _along(self, unknowns: Any, instants: Instants) -> tuple[Any, Any, Any]:
+        """Positions and their derivatives by the share of a piece at instants, (n, N) each."""
+        q, v, a, _, _ = self._parts(unknowns)
+        values = casadi.horzcat(q[:, :-1], v, a)
         position, velocity, acceleration = (
             values @ casadi.sparsify(casadi.DM(instants.matrix(self.degree, order)))
             for order in range(3)
         )
-        return position, velocity / h, acceleration / h**2
+        return position, velocity, acceleration
 
     def motion(self, unknowns: Floats, instants: Instants) -> list[Floats]:
-        """Return the numbers of :meth:`along`."""
-        return [np.array(part) for part in self.along(unknowns, instants)]
+        """Positions, velocities and accelerations at instants, (n, N) each."""
+        piece = self._piece(unknowns)
+        parts = self._along(unknowns, instants)
+        return [np.array(part) / piece**order for order, part in enumerate(parts)]
 
-    def at_touchdown(self, unknowns: Any) -> tuple[Any, Any, Any, Any, Any]:
+    def at_touchdown(self, unknowns: Floats) -> tuple[Any, Any, Any, Any, Any]:
         """Return q(T), v(T), v(0), duration and length, as the transcription takes them."""
         q, v, _, duration, length = self._parts(unknowns)
-        _, ends, _ = self.along(unknowns, self._ends)
-        return q[:, -1], ends[:, -1], v[:, 0], duration, length
+        _, ends, _ = self._along(unknowns, self._ends)
+        piece = self._piece(unknowns)
+        return q[:, -1], ends[:, -1] / piece, v[:, 0] / piece, duration, length
+
+    def _piece(self, unknowns: Floats) -> float:
+        """Duration of a piece (s)."""
+        return float(unknowns[-2]) / self.instants.pieces
 
     def effort(self, unknowns: Floats) -> float:
         """∫ΓᵀΓ dt over the step, in N²m²s."""
-        return float(self._evaluated(unknowns)[0])
+        return self._spent(self.transcription.effort, unknowns)
+
+    def cost(self, unknowns: Floats) -> float:
+        """What was asked to be least, over the step, in its own unit."""
+        return self._spent(self.transcription.path, unknowns)
+
+    def _spent(self, rate: Any, unknowns: Floats) -> float:
+        """Integral over the step of the first result of a function along the path."""
+        motion = self.motion(unknowns, self.instants)
+        values = rate.map(self.instants.share.size).call(
+            [*motion, unknowns[-1], self.request.under_foot]
+        )[0]
+        return float(unknowns[-2] * (np.array(values) @ self.instants.weight)[0])
 
     def pieces(self, unknowns: Floats) -> Floats:
         """Coefficients of the free coordinates in the time of each piece, (K, degree + 1, n)."""
-        n, count = self.transcription.size, self.instants.pieces
-        q, v, a, duration, _ = (np.array(part) for part in self._parts(unknowns))
-        values = np.concatenate([q[:, :-1], v, a], axis=1).reshape(n, self.degree + 1, count)
-        return coefficients(values.transpose(2, 1, 0), float(duration[0, 0]) / count)
+        n, count, piece = self.transcription.size, self.instants.pieces, self._piece(unknowns)
+        q, v, a, _, _ = (np.array(part) for part in self._parts(unknowns))
+        values = np.concatenate([q[:, :-1], v / piece, a / piece**2], axis=1)
+        return coefficients(values.reshape(n, self.degree + 1, count).transpose(2, 1, 0), piece)
 
     def _build(self) -> None:
-        gaps, total = self._gaps, self._lower.size - self._gaps
-        unknowns = casadi.MX.sym("unknowns", self.size + (2 * total if self.elastic else 0))
-        x = unknowns[: self.size]
-        f, g = self._evaluated(x)
-        if self.request.free_step:
-            f = f / x[-1]
+        x = casadi.MX.sym("x", self.size)
+        self._blocks = self._of_blocks(x)
+        f, g = self._blocks.value(x)
+        slope, slopes = self._blocks.gradient(x), self._blocks.jacobian(x)
+        price, prices = casadi.MX.sym("price"), casadi.MX.sym("prices", g.numel())
+        bend = self._blocks.hessian(x, price, prices)
+        self._slopes = casadi.Function("slopes", [x], [slopes])
         if self.elastic:
             # Each constraint may be exceeded upwards or downwards; the sum of that is minimised.
-            low, high = unknowns[self.size : -total], unknowns[-total:]
-            price = np.where(self._lower == self._upper, PRICE_OF_EQUATIONS, 1.0)[gaps:]
-            f = casadi.dot(price, low + high)
-            g = casadi.vertcat(g[:gaps], g[gaps:] + low - high)
-        self._solver = Ipopt({"x": unknowns, "f": f, "g": g}, SETTINGS)
+            gaps, total = self._gaps, self._lower.size - self._gaps
+            excess = casadi.MX.sym("excess", 2 * total)
+            cost = np.where(self._lower == self._upper, PRICE_OF_EQUATIONS, 1.0)[gaps:]
+            cost, both = casadi.DM(np.tile(cost, 2)), casadi.DM.eye(total)
+            taken = casadi.vertcat(casadi.DM(gaps, 2 * total), casadi.horzcat(both, -both))
+            f, slope = casadi.dot(cost, excess), casadi.vertcat(casadi.DM(self.size, 1), cost)
+            g, slopes = g + taken @ excess, casadi.horzcat(slopes, taken)
+            bend = casadi.diagcat(
+                self._blocks.hessian(x, 0.0, prices), casadi.DM(2 * total, 2 * total)
+            )
+            x = casadi.vertcat(x, excess)
+        self._solver = Ipopt(
+            x, f, g, gradient=slope, jacobian=slopes, hessian=(price, prices, bend),
+            settings=NEAR if self.near else SETTINGS,
+        )  # fmt: skip
 
-    def solve(self, guess: Floats) -> Solution:
-        """Solve from a guess of the unknowns.
+    def _of_blocks(self, x: Any) -> BlockProgram:
+        """Gaps between the pieces, then the blocks of touchdown and of the instants."""
+        q, v, _, duration, length = self._parts(x)
+        q_end, v_end, _ = self._along(x, self._ends)
+        gaps = casadi.veccat(q[:, 1:] - q_end, v[:, 1:] - v_end[:, :-1])
+        step = casadi.vertcat(duration, length)
+        count = self.instants.share.size
+        along = casadi.vertcat(*self._along(x, self.instants), casadi.repmat(step, 1, count))
+        landing = casadi.vertcat(q[:, -1], v_end[:, -1], v[:, 0], step)
+        path, touchdown = self.transcription.blocks(self.instants.pieces)
+        ground = self.request.under_foot
+        return BlockProgram(
+            x, gaps,
+            [
+                Copies.of(touchdown, np.zeros(1), x, landing, ground),
+                Copies.of(path, self.instants.weight, x, along, ground),
+            ],
+        )  # fmt: skip
 
-        An elastic program starts with the violations of the guess taken up by the excesses.
+    def solve(self, guess: Floats, multipliers: Floats | None = None) -> Solution:
+        """Solve from a guess of the unknowns and, near an optimum, of the multipliers.
+
+        Those of instants that are new are zero. An elastic program starts with the violations of
+        the guess taken up by the excesses.
         """
         size, more = self.size, 2 * (self._lower.size - self._gaps) if self.elastic else 0
         low, high = np.array([self.request.duration_bounds, self.request.length_bounds]).T
         lower = np.concatenate([np.full(size - 2, -np.inf), low, np.zeros(more)])
         upper = np.concatenate([np.full(size - 2, np.inf), high, np.full(more, np.inf)])
-        start = np.clip(guess, lower[:size], upper[:size])
+        start = self.in_bounds(guess)
         if self.elastic:
             missing = self.violations(start)
             start = np.concatenate([start, np.maximum(missing, 0.0), np.maximum(-missing, 0.0)])
+        priced = np.zeros(self._lower.size)
+        if multipliers is not None:
+            priced[: multipliers.size] = multipliers
         found, statistics = self._solver.solve(
-            x0=start, lbx=lower, ubx=upper, lbg=self._lower, ubg=self._upper
+            x0=start, lam_g0=priced, lbx=lower, ubx=upper, lbg=self._lower, ubg=self._upper
         )
         return Solution(
             unknowns=np.array(found["x"]).ravel()[:size],
             objective=float(found["f"]),
             converged=statistics["return_status"] == "Solve_Succeeded",
             ended=str(statistics["return_status"]).replace("_", " ").lower(),
-            multipliers=np.array(found["lam_g"]).ravel()[self._gaps :],
+            multipliers=np.array(found["lam_g"]).ravel(),
         )
+
+    def in_bounds(self, unknowns: Floats) -> Floats:
+        """Bring duration and length of the step within their bounds."""
+        low, high = np.array([self.request.duration_bounds, self.request.length_bounds]).T
+        return np.append(unknowns[:-2], np.clip(unknowns[-2:], low, high))
+
+    def at(self, unknowns: Floats) -> Solution:
+        """Return a point that is no optimum, as if IPOPT had stopped there."""
+        cost = float(self._blocks.value(unknowns)[0])
+        return Solution(unknowns, cost, False, "no optimum", np.zeros(self._lower.size))
+
+    def satisfied_by(self, solution: Solution) -> bool:
+        """Whether a point satisfies all constraints, optimum or not."""
+        return bool(np.abs(self.violations(solution.unknowns)).max() <= FEASIBLE)
 
     def sampled(self, start: Start) -> Floats:
         """Unknowns of a motion to start from."""
         q, v, a = start.motion(np.linspace(0.0, 1.0, self.instants.pieces + 1))
+        rate = start.duration / self.instants.pieces / self._usual
         rest = np.zeros(self._places[3] - self._places[2])
-        rest[: v[:, 1:].size] = a[:, 1:].ravel(order="F")
-        parts = [part.ravel(order="F") for part in (q[:, 1:], v[:, :-1], rest)]
+        rest[: v[:, 1:].size] = rate**2 * a[:, 1:].ravel(order="F")
+        parts = [q[:, 1:].ravel(order="F"), rate * v[:, :-1].ravel(order="F"), rest]
         return np.concatenate([*parts, [start.duration, start.length]])
 
-    def _evaluated(self, x: Any) -> tuple[Any, Any]:
-        """Effort, and gaps between the pieces followed by scaled values of the constraints."""
-        q, v, _, _, _ = self._parts(x)
-        q_end, v_end, _ = self.along(x, self._ends)
-        gaps = casadi.veccat(q[:, 1:] - q_end, v[:, 1:] - v_end[:, :-1])
-        count = self.instants.share.size
-        effort, along = self.transcription.path.map(count)(*self.along(x, self.instants))
-        touchdown = self.transcription.touchdown(*self.at_touchdown(x))
-        cost = x[-2] * (effort @ casadi.DM(self.instants.weight))
-        return cost, casadi.veccat(gaps, touchdown, along)
+    def resampled(self, gait: Gait) -> Floats:
+        """Unknowns of a motion that is nearly that of another gait, of the same joints."""
+        n, pieces, duration = self.transcription.size, self.instants.pieces, gait.step_duration
+        piece = duration / pieces
+        nodes, _ = gauss(self.degree - 1)
+        grid = np.linspace(0.0, duration, pieces + 1)
+        beginnings, ends = grid[:-1], grid[1:]
+        inner: Floats = (beginnings[:, None] + piece * nodes).ravel()
+        rate = piece / self._usual
+        q, v = self._of_gait(gait, ends, 0), rate * self._of_gait(gait, beginnings, 1)
+        a = rate**2 * self._of_gait(gait, inner, 2).reshape(n, pieces, nodes.size)
+        basis = legvander(2.0 * nodes - 1.0, nodes.size - 1)
+        parts = np.linalg.solve(basis, np.moveaxis(a, 2, 0).reshape(nodes.size, -1))
+        # All pieces of the first part come first.
+        rest = parts.reshape(nodes.size, n, pieces).transpose(0, 2, 1).ravel()
+        columns = [part.ravel(order="F") for part in (q, v)]
+        return np.concatenate([*columns, rest, [duration, gait.step_length]])
+
+    def _of_gait(self, gait: Gait, times: Floats, order: int) -> Floats:
+        """Free coordinates of a gait at times of its first step, or a derivative, (n, N)."""
+        joints = gait.in_step(times, order=order)
+        actuators = self.request.robot.model.actuator_joint.tolist()
+        pitched = 3 - self.transcription.held
+        driven = [actuators.index(j) for j in self.transcription.free[pitched:]]
+        pitch = [gait.pitch(times, order=order)] if pitched else []
+        return np.array([*pitch, *joints[:, driven].T])
 
     def violations(self, unknowns: Floats) -> Floats:
         """Scaled distances of the constraints outside of their bounds; positive if too low."""
-        values = np.array(self._evaluated(unknowns)[1]).ravel()
+        values = np.array(self._blocks.value(unknowns)[1]).ravel()
         missing = np.maximum(self._lower - values, 0.0) - np.maximum(values - self._upper, 0.0)
         return missing[self._gaps :]
 
@@ -269,21 +378,16 @@ class Program:
         """Satisfy the equations to rounding, by the least change of the unknowns."""
         import scipy.sparse.linalg
 
-        x = casadi.MX.sym("x", self.size)
-        exact = np.flatnonzero(self._lower == self._upper).tolist()
-        residual = self._evaluated(x)[1][exact] - casadi.DM(self._lower[exact])
-        equations = casadi.Function("equations", [x], [residual, casadi.jacobian(residual, x)])
+        exact = np.flatnonzero(self._lower == self._upper)
         step = np.ptp([self.request.duration_bounds, self.request.length_bounds], axis=1) > 0.0
         free = np.append(np.full(self.size - 2, True), step)
         polished = unknowns.copy()
         for _ in range(3):
-            missing, slope = equations(polished)
-            rows = slope.sparse()[:, free]
+            missing = np.array(self._blocks.value(polished)[1]).ravel()[exact] - self._lower[exact]
+            rows = self._slopes(polished).sparse().tocsr()[exact][:, free]
             # Equations may depend on each other: then, and only then, does the shift matter.
-            normal = rows @ rows.T + SHIFT * scipy.sparse.identity(residual.numel(), format="csc")
-            polished[free] -= rows.T @ scipy.sparse.linalg.spsolve(
-                normal, np.array(missing).ravel()
-            )
+            normal = rows @ rows.T + SHIFT * scipy.sparse.identity(exact.size)
+            polished[free] -= rows.T @ scipy.sparse.linalg.spsolve(normal.tocsc(), missing)
         return polished
 
 
@@ -296,16 +400,40 @@ class Ipopt:
 
     Parameters
     ----------
-    problem : mapping
-        CasADi expressions of the unknowns ``x``, the objective ``f`` and the constraints ``g``.
-    options : mapping
-        Options of ``casadi.nlpsol``.
+    unknowns : casadi.MX
+        (n,) The unknowns.
+    objective, constraints : casadi.MX
+        Expressions of them.
+    gradient, jacobian : casadi.MX
+        Their derivatives, (n,) and (m, n).
+    hessian : tuple of casadi.MX
+        Prices of the objective and of the constraints, (m,), and the Hessian of the priced sum.
+    settings : mapping
+        Options of IPOPT.
     """
 
-    def __init__(self, problem: Mapping[str, Any], options: Mapping[str, Any]) -> None:
-        self._watch = _Watch(problem["x"].numel(), problem["g"].numel())
+    def __init__(
+        self, unknowns: Any, objective: Any, constraints: Any, *, gradient: Any, jacobian: Any,
+        hessian: tuple[Any, Any, Any], settings: Mapping[str, Any],
+    ) -> None:  # fmt: skip
+        self._watch = _Watch(unknowns.numel(), constraints.numel())
+        given, (price, prices, bend) = [unknowns, casadi.MX.sym("none", 0, 0)], hessian
+        derivatives = {
+            "grad_f": casadi.Function("grad_f", given, [objective, casadi.densify(gradient)]),
+            "jac_g": casadi.Function("jac_g", given, [constraints, jacobian]),
+            "hess_lag": casadi.Function("hess_lag", [*given, price, prices], [casadi.triu(bend)]),
+        }
         self._solver = casadi.nlpsol(
-            "gait", "ipopt", dict(problem), {**options, "iteration_callback": self._watch}
+            "gait",
+            "ipopt",
+            {"x": unknowns, "f": objective, "g": constraints},
+            {
+                **derivatives,
+                "ipopt": dict(settings),
+                "iteration_callback": self._watch,
+                "print_time": False,
+                "error_on_fail": False,
+            },
         )
 
     def solve(self, **arguments: Any) -> tuple[Any, Any]:

@@ -22,7 +22,7 @@ ROUNDS = 8
 """Times that instants are added where a constraint is violated between those of the program."""
 
 
-def held_between_nodes(program: Program, solution: Solution) -> Floats:
+def held_between_nodes(program: Program, solution: Solution) -> tuple[Floats, bool]:
     """Add instants where constraints fail, until they hold everywhere.
 
     Parameters
@@ -30,12 +30,14 @@ def held_between_nodes(program: Program, solution: Solution) -> Floats:
     program : Program
         The program on its first instants.
     solution : Solution
-        Its optimum.
+        Its optimum, or a point that satisfies its constraints.
 
     Returns
     -------
-    (n,) float
-        Unknowns of the optimum that satisfies the constraints at all times.
+    unknowns : (n,) float
+        Unknowns of a motion that satisfies the constraints at all times.
+    optimal : bool
+        Whether it is an optimum.
 
     Raises
     ------
@@ -47,18 +49,19 @@ def held_between_nodes(program: Program, solution: Solution) -> Floats:
         unknowns = program.polished(solution.unknowns)
         missed = _missed(program, unknowns, fine)
         if not missed.share.size:
-            return unknowns
-        program = replace(program, instants=program.instants.joined(missed))
-        solution = program.solve(unknowns)
+            return unknowns, solution.converged
+        program = replace(program, instants=program.instants.joined(missed), near=True)
+        solution = program.solve(unknowns, solution.multipliers)
         if not solution.converged:
-            solution = program.solve(nearest_to_feasible(program))
-        if not solution.converged:
-            break
+            feasible = nearest_to_feasible(program)
+            solution = replace(program, near=False).solve(feasible)
+            if not program.satisfied_by(solution):
+                solution = program.at(feasible)
     request = program.request
     raise InfeasibleGaitError(
         f"robot {request.robot.name!r}: a gait with {request} satisfies the constraints at "
-        f"{np.count_nonzero(program.instants.weight)} phases of a step but not between them "
-        f"({solution.ended}). Try more intervals, or a slower step."
+        f"{np.count_nonzero(program.instants.weight)} phases of a step but not between them. Try "
+        "more intervals, or a slower step."
     )
 
 
@@ -110,7 +113,11 @@ def _missed(program: Program, unknowns: Floats, fine: Instants) -> Instants:
 def _excess(program: Program, unknowns: Floats, instants: Instants) -> Floats:
     """How far every constraint along the path is violated at instants, (rows, N), scaled."""
     motion = program.motion(unknowns, instants)
-    values = np.array(program.transcription.path.map(instants.share.size)(*motion)[1])
+    values = np.array(
+        program.transcription.path.map(instants.share.size)(
+            *motion, unknowns[-1], program.request.under_foot
+        )[1]
+    )
     lower, upper = program.path_bounds(instants)
     excess: Floats = np.maximum(lower - values, values - upper)
     return excess

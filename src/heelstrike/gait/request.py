@@ -12,6 +12,8 @@ import numpy as np
 from heelstrike.dynamics.queries.following import Drive, drive_of
 from heelstrike.errors import GaitError, InfeasibleGaitError, RobotError
 from heelstrike.gait.clearance import ClearanceProfile
+from heelstrike.gait.cost import costs_of
+from heelstrike.gait.gait import Gait
 from heelstrike.gait.sole import reach, sole, standing_height
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
@@ -37,6 +39,9 @@ NUMBERS = {
     "joint_speed_limit": "rad/s",
 }
 """Numbers that are asked for: the unit of one that must be positive; others are not negative."""
+
+STEEPEST = 1.0
+"""Slope (rad) from which on no gait is looked for."""
 
 SHORTEST_STEP, LONGEST_STEP = 0.2, 40.0
 """Step durations that are considered, in units of the pendulum time sqrt(height / gravity)."""
@@ -93,6 +98,10 @@ class Request:
     impact: bool
     intervals: int
     starts: int
+    slope: float = 0.0
+    rise: float = 0.0
+    cost: Any = "torque"
+    warm_start: Gait | None = None
 
     def __post_init__(self) -> None:
         robot = self.robot
@@ -125,6 +134,9 @@ class Request:
                 raise GaitError(f"{name} must be a whole number, got {value!r}")
             if not least <= value <= most:
                 raise GaitError(f"{name} must be between {least} and {most}, got {value}")
+        self._check_ground()
+        self._check_warm_start()
+        self.cost = costs_of(self.cost)
         self._check_step()
         if flat and self.zmp_margin >= self.stance.half_length:
             raise GaitError(
@@ -150,6 +162,35 @@ class Request:
             raise GaitError(f"{name} must be {what}, got {value!r}")
         setattr(self, name, float(value))
 
+    def _check_ground(self) -> None:
+        """Make slope and rise floats, once they are ground that can be walked upon."""
+        for name, unit, most in (("slope", "rad", STEEPEST), ("rise", "m", self.reach)):
+            value = getattr(self, name)
+            number = isinstance(value, int | float | np.integer | np.floating)
+            if isinstance(value, bool) or not number or not abs(value) < most:
+                raise GaitError(
+                    f"{name} must be a number between {-most:.3g} and {most:.3g} {unit}, positive "
+                    f"if the ground ascends ahead, got {value!r}"
+                )
+            setattr(self, name, float(value))
+        if self.slope and self.rise:
+            raise GaitError(
+                "slope and rise are both given. On a slope the feet are turned by it and rise is "
+                "zero; on stairs they are level and slope is zero. Leave one of them out."
+            )
+
+    def _check_warm_start(self) -> None:
+        """Refuse a gait of other joints, or on other feet, to start from."""
+        gait = self.warm_start
+        if gait is None:
+            return
+        gait.check_joints(self.robot)
+        if gait.point_feet == self.stance.flat or len(gait.phases) != 1:
+            raise GaitError(
+                f"warm_start: {gait!r} does not walk in single support on the feet of robot "
+                f"{self.robot.name!r}. Start from a gait that optimize_gait designed for it."
+            )
+
     def _check_step(self) -> None:
         """Fill in what two of length, duration and speed say of the third, and look at them."""
         length, duration, speed = self.step_length, self.step_duration, self.speed
@@ -163,7 +204,7 @@ class Request:
         elif speed is not None and length is not None:
             duration, self.speed = length / speed, None
         self.step_length, self.step_duration = length, duration
-        if length is not None and length >= self.reach:
+        if length is not None and np.hypot(length, self.rise) >= self.reach:
             raise InfeasibleGaitError(
                 f"robot {self.robot.name!r} cannot take a step of {length:g} m: stretched flat "
                 f"out, its legs put the feet less than {self.reach:.4g} m apart."
@@ -175,6 +216,11 @@ class Request:
                 f"trunk {self.height:.3g} m above the ground, steps between {shortest:.2g} s and "
                 f"{longest:.2g} s are considered."
             )
+
+    @property
+    def under_foot(self) -> Floats:
+        """(2,) Slope of the ground (rad), and rise of the next foothold over that plane (m)."""
+        return np.array([self.slope, self.rise])
 
     @property
     def cone(self) -> float:

@@ -60,13 +60,15 @@ def starts(request: Request) -> Iterator[Start]:
     length, duration = typical_step(request)
     free = [*range(request.stance.held, 3), *request.drive.driven]
     kinematics = _Kinematics(request)
+    cosine, sine = np.cos(request.slope), np.sin(request.slope)
     bends = (1.0, -1.0) if kinematics.bend_is_free else (1.0,)
     for bend, lean, height in product(bends, LEANS, HEIGHTS):
         legs = height * request.height
         low = float(np.sqrt(max(legs**2 - (0.5 * length) ** 2, (0.5 * legs) ** 2)))
         lift = request.clearance + 0.02 * request.height
-        end = kinematics.posture((length, 0.0), (0.5 * length, low, lean), bend)
-        middle = kinematics.posture((0.0, lift), (0.0, legs, lean), bend)
+        foot = (length * cosine, length * sine + request.rise)
+        end = kinematics.posture(foot, (0.5 * foot[0], low + 0.5 * foot[1], lean), bend)
+        middle = kinematics.posture((-lift * sine, lift * cosine), (0.0, legs, lean), bend)
         begin = request.mirror.position(end)
         yield Start(begin[free], middle[free], end[free], duration, length)
 
@@ -99,7 +101,8 @@ class _Kinematics:
         for foot in (request.stance, request.swing):
             x, z = dynamics.point_position(foot.link, foot.point)
             turned = dynamics.work.angle[foot.link] - foot.angle
-            places += [x, z - foot.radius, turned][: foot.held]
+            below = foot.radius * np.array([-np.sin(request.slope), np.cos(request.slope)])
+            places += [x - below[0], z - below[1], turned + request.slope][: foot.held]
         places += [*dynamics.work.origin[2], dynamics.work.angle[2]]
         places += [*dynamics.loop_displacement()]
         places_vector = casadi.vertcat(*places)

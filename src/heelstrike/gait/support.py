@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,6 +43,8 @@ class Support:
     position, velocity, acceleration : (n,) object arrays
         Symbolic motion of the n coordinates that foot and loops leave free: on a point foot the
         trunk's pitch, and the driven joints.
+    slope : float or symbol
+        Angle (rad) at which the ground ascends ahead.
 
     Attributes
     ----------
@@ -65,13 +68,19 @@ class Support:
         position: Symbols,
         velocity: Symbols,
         acceleration: Symbols | None = None,
+        *,
+        slope: Any = 0.0,
     ) -> None:
         self.robot = robot
         self.sole = sole
+        cosine, sine = casadi.cos(slope), casadi.sin(slope)
+        self.slope = slope
+        self.ahead: Symbols = np.array([cosine, sine], dtype=object)
+        self.up: Symbols = np.array([-sine, cosine], dtype=object)
         self._pitched = 3 - sole.held  # whether the pitch is one of the free coordinates
         self._joints = Joints(robot, drive, position[self._pitched :])
         posture = np.array([*position[: self._pitched], *self._joints.position], dtype=object)
-        self._dynamics = TracedDynamics(robot, _posture(robot, sole, posture))
+        self._dynamics = TracedDynamics(robot, _posture(robot, sole, slope, posture))
         self._origin: Symbols = np.zeros(2, dtype=object)
         self._origin = self.place(sole)
         self._held = self.held(sole)
@@ -120,9 +129,9 @@ class Support:
         return self.sole.radius * self.angle(self.sole)
 
     def place(self, sole: Sole) -> Symbols:
-        """World position of the middle of a level sole or of the lowest point of a disc."""
+        """World position of the middle of a flat sole or of a disc's point nearest the ground."""
         center = self._dynamics.point_position(sole.link, sole.point)
-        bottom: Symbols = center - np.array([0.0, sole.radius]) - self._origin
+        bottom: Symbols = center - sole.radius * self.up - self._origin
         return bottom
 
     def jacobian(self, sole: Sole) -> Symbols:
@@ -132,17 +141,22 @@ class Support:
         return rows
 
     def angle(self, sole: Sole) -> Any:
-        """Rotation of a foot about +y."""
-        return self._dynamics.work.angle[sole.link]
+        """Rotation of a foot about +y, from where its sole is along the ground."""
+        return self._dynamics.work.angle[sole.link] - sole.angle + self.slope
 
-    def height(self, contact: int) -> Any:
-        """Height of the lowest point of a contact disc."""
+    def place_of(self, contact: int) -> tuple[Any, Any]:
+        """Place of a contact disc along the plane of the ground, and its height over it."""
         _, center = self._disc(contact)
-        return center[1] - self._origin[1] - self.robot.model.contact_radius[contact]
+        place = center - self._origin
+        return self.ahead @ place, self.up @ place - self.robot.model.contact_radius[contact]
 
     def rise(self, contact: int, v: Symbols) -> Any:
-        """Vertical velocity of a contact disc when the robot moves with velocity `v`, (nv,)."""
-        return self._dynamics.point_jacobian(*self._disc(contact))[1] @ v
+        """Velocity of a contact disc away from the ground, of the robot's velocity `v`, (nv,)."""
+        return self.up @ (self._dynamics.point_jacobian(*self._disc(contact))[:2] @ v)
+
+    def along_ground(self, wrench: Symbols) -> Symbols:
+        """Force, or impulse, along the ground and away from it, of one in x and z; and moments."""
+        return np.array([self.ahead @ wrench[:2], self.up @ wrench[:2], *wrench[2:]], dtype=object)
 
     def _disc(self, contact: int) -> tuple[int, Symbols]:
         """Link of a contact disc, and its centre."""
@@ -197,11 +211,14 @@ def foot_angle(robot: Robot, sole: Sole, q: Symbols) -> Any:
     return sum(model.axis[link, 0] * (q[link] - model.reference[link]) for link in leg(robot, sole))
 
 
-def _posture(robot: Robot, sole: Sole, position: Symbols) -> Symbols:
-    """Coordinates with the trunk at its reference place, pitched so that a flat foot is flat."""
+def _posture(robot: Robot, sole: Sole, slope: Any, position: Symbols) -> Symbols:
+    """Coordinates with the trunk at its reference place, pitched so that a flat foot is flat.
+
+    Ground that ascends ahead turns it backwards, against the positive sense about +y.
+    """
     model = robot.model
     q = np.array([*model.reference[: sole.held], *position], dtype=object)
     if sole.held == 3:
-        missing = sole.angle - foot_angle(robot, sole, q)
+        missing = sole.angle - slope - foot_angle(robot, sole, q)
         q[2] = model.reference[2] + missing / model.axis[2, 0]
     return q

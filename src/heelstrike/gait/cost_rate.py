@@ -1,0 +1,104 @@
+"""The rate at which a gait spends what it is to spend least of, in symbols."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi
+
+from heelstrike.dynamics.queries.symbolic import expression
+from heelstrike.errors import GaitError
+from heelstrike.gait.cost import Cost, Instant, OwnCost
+from heelstrike.gait.support import Support, Symbols
+from heelstrike.robot.model import Floats
+
+ROUNDED = 1e-3
+"""Power, in units of weight times height over the pendulum time, below which |x| is rounded off to
+√(x² + ε²) − ε: IPOPT needs second derivatives everywhere. An integral of it is at most this
+power times the duration too small, for each motor."""
+
+
+def rate_of(
+    costs: dict[Cost, float] | OwnCost, now: Instant, heat: Floats | None,
+    unit_of_power: float,
+) -> Any:  # fmt: skip
+    """Return the rate of the costs at an instant, as an expression.
+
+    Parameters
+    ----------
+    costs : dict or function
+        What :func:`costs_of` returned.
+    now : Instant
+        The instant.
+    heat : (nu,) array, optional
+        ω₀/τ₀ of the motors (rad/s per N m): the heat of a unit of torque squared.
+    unit_of_power : float
+        Weight times height over the pendulum time (W).
+
+    Raises
+    ------
+    GaitError
+        If the motors have no such numbers, or a function returns no number.
+    """
+    if not isinstance(costs, dict):
+        return _own_rate(costs, now)
+    small = ROUNDED * unit_of_power
+    power = now.torque * now.motor_velocity
+    total = casadi.SX(0)
+    for cost, weight in costs.items():
+        if cost is Cost.TORQUE:
+            rate = casadi.sumsqr(now.torque)
+        elif cost is Cost.MECHANICAL_ENERGY:
+            rate = casadi.sum1(casadi.sqrt(power**2 + small**2) - small)
+        else:
+            if heat is None:
+                raise GaitError(
+                    "cost 'electrical_energy' needs motors: stall_torque and no_load_speed of "
+                    "every driven joint. Give them to the robot, or ask for 'mechanical_energy'."
+                )
+            spent = power + casadi.DM(heat) * now.torque**2
+            rate = 0.5 * casadi.sum1(spent + casadi.sqrt(spent**2 + small**2) - small)
+        total += weight * rate
+    return total
+
+
+def _own_rate(cost: OwnCost, now: Instant) -> Any:
+    try:
+        rate = casadi.SX(cost(now))
+    except Exception as error:
+        raise GaitError(f"the cost function failed: {type(error).__name__}: {error}") from error
+    if rate.numel() != 1:
+        raise GaitError(f"the cost function must return one number, got {rate.numel()}")
+    known = casadi.vertcat(now.position, now.velocity, now.torque, now.force)
+    unknown = {s.name() for s in casadi.symvar(rate)} - {s.name() for s in casadi.symvar(known)}
+    if unknown:
+        raise GaitError(
+            f"the cost function uses symbols that no instant has: {', '.join(sorted(unknown))}"
+        )
+    return rate
+
+
+def instant_of(
+    support: Support, pressure: Symbols, driven: list[int], actuators: list[int]
+) -> Instant:
+    """Return the instant of a robot on one foot.
+
+    Parameters
+    ----------
+    support : Support
+        The robot.
+    pressure : (2,) or (3,) object array
+        Force along the ground and away from it.
+    driven : list of int
+        The joints of `support.torque`, in that order.
+    actuators : list of int
+        The joints with motors, in the order of the actuators.
+    """
+    order = [driven.index(joint) for joint in actuators]
+    return Instant(
+        position=expression(support.q),
+        velocity=expression(support.v),
+        torque=expression(support.torque[order]),
+        motor_velocity=expression(support.v[actuators]),
+        force=expression(pressure[:2]),
+    )

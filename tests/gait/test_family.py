@@ -1,0 +1,100 @@
+"""Families of gaits: each is the optimum that is found alone, and those between walk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heelstrike as hs
+from heelstrike.errors import GaitError
+
+SLOPES = np.array([0.0, 0.03])
+SPEEDS = [0.40, 0.45]
+ASKED = {"step_duration": 0.70, "starts": 1}
+
+
+@pytest.fixture(scope="module")
+def family(bravo7: hs.Robot) -> hs.GaitFamily:
+    return hs.gait_family(bravo7, speed=SPEEDS, slope=SLOPES, **ASKED)
+
+
+def test_each_gait_is_the_one_that_is_found_alone(bravo7: hs.Robot, family: hs.GaitFamily) -> None:
+    assert len(family.gaits) == 4
+    assert not family.gaps
+    alone = hs.optimize_gait(bravo7, speed=0.45, slope=0.03, **ASKED)
+    found = family[1, 1]
+    assert found is not None
+    assert found.optimal
+    assert (found.slope, found.step_length) == (0.03, 0.45 * 0.70)
+    assert found.cost == pytest.approx(alone.cost, rel=1e-6)
+    assert family.at(speed=0.45, slope=0.03) is found
+
+
+def test_a_gait_between_lands_as_it_says(bravo7: hs.Robot, family: hs.GaitFamily) -> None:
+    """Equations hold to rounding, the cost is near the optimum, and it walks there."""
+    gait = family.at(speed=0.42, slope=0.02)
+    assert not gait.optimal
+    assert gait.margins.touchdown_error < 1e-10
+    assert gait.margins.impact_error < 1e-10
+    best = hs.optimize_gait(bravo7, speed=0.42, slope=0.02, **ASKED)
+    assert best.cost <= gait.cost < 1.02 * best.cost
+    run = hs.simulate(
+        bravo7, hs.ComputedTorque(bravo7, gait), state=gait.initial_state, duration=1.45,
+        method=hs.EventDriven(), ground=hs.Ground(friction=0.75, slope=0.02),
+    )  # fmt: skip
+    assert run.completed
+    landed = [event.time for event in run.events if event.kind.name == "TOUCHDOWN"]
+    np.testing.assert_allclose(landed[:2], 0.70, atol=1e-6)
+
+
+def test_what_was_interrupted_goes_on(bravo7: hs.Robot, tmp_path: Path) -> None:
+    file = tmp_path / "family.json"
+    told: list[float] = []
+
+    def interrupt(share: float) -> None:
+        told.append(share)
+        if share > 0.4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        hs.gait_family(bravo7, speed=SPEEDS, **ASKED, file=file, progress=interrupt)
+    begun = hs.load_gait_family(file, bravo7)
+    assert list(begun.gaits) == [(0,)]
+    whole = hs.gait_family(bravo7, speed=SPEEDS, **ASKED, file=file)
+    assert set(whole.gaits) == {(0,), (1,)}
+    first, kept = begun[0], whole[0]
+    assert first is not None
+    assert kept is not None
+    np.testing.assert_array_equal(first.pieces, kept.pieces)
+    with pytest.raises(GaitError, match="holds a family over other axes"):
+        hs.gait_family(bravo7, speed=[0.40, 0.46], **ASKED, file=file)
+
+
+def test_gaps_are_named(bravo7: hs.Robot) -> None:
+    family = hs.gait_family(bravo7, step_length=[0.30, 1.9], **ASKED)
+    assert list(family.gaits) == [(0,)]
+    assert "cannot take a step of 1.9 m" in family.gaps[1,]
+    with pytest.raises(GaitError, match=r"no gait at step_length = 1\.9"):
+        family.at(step_length=1.0)
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"speed": 0.4}, "give a sequence"),
+        ({"speed": [0.5, 0.4]}, "rising order"),
+        ({"slope": [0.0, "a"]}, "slope must be"),
+    ],
+)
+def test_grids_that_are_none(bravo7: hs.Robot, asked: dict, words: str) -> None:  # type: ignore[type-arg]
+    with pytest.raises(GaitError, match=words):
+        hs.gait_family(bravo7, step_duration=0.7, **asked)
+
+
+def test_places_outside(family: hs.GaitFamily) -> None:
+    with pytest.raises(GaitError, match=r"outside of the family, 0\.4 to 0\.45"):
+        family.at(speed=0.5, slope=0.0)
+    with pytest.raises(GaitError, match="give a value of each axis, speed, slope"):
+        family.at(speed=0.42)

@@ -1,0 +1,55 @@
+"""A gait that is started near another one is the one that is found from afar."""
+
+from __future__ import annotations
+
+import pytest
+
+import heelstrike as hs
+from heelstrike.errors import GaitError
+from heelstrike.gait import design
+from heelstrike.gait.program import Program, first_instants
+from heelstrike.gait.request import Request
+from heelstrike.gait.transcription import transcribed
+
+STEPS = {
+    "bravo7": {"step_length": 0.30, "step_duration": 0.70},
+    "rabbit": {"step_length": 0.25, "step_duration": 0.60},
+}
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_the_neighbour_of_a_gait(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No other start is tried, and the optimum is the same."""
+    robot, step = hs.load_robot(name), STEPS[name]
+    near = hs.optimize_gait(robot, **step, starts=1)
+    asked = step | {"step_length": 1.04 * step["step_length"], "slope": 0.01, "starts": 1}
+    afar = hs.optimize_gait(robot, **asked)
+    monkeypatch.setattr(design, "starts", None)
+    found = hs.optimize_gait(robot, **asked, warm_start=near)
+    assert found.cost == pytest.approx(afar.cost, rel=1e-6)
+    assert found.cost != pytest.approx(near.cost, rel=1e-2)
+    assert found.step_length == asked["step_length"]
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_a_gait_is_resampled_as_it_is(name: str) -> None:
+    """On its own mesh, a gait is a point that satisfies its own constraints."""
+    robot, step = hs.load_robot(name), STEPS[name]
+    gait = hs.optimize_gait(robot, **step, starts=1)
+    request = Request(
+        robot=robot, **step, speed=None, friction=0.75, clearance=0.03, zmp_margin=None,
+        clearance_profile=gait.clearance_profile, force_margin=None, impact=True, intervals=None,
+        joint_speed_limit=float("inf"), joint_ranges=None, starts=1,
+    )  # fmt: skip
+    program = Program(
+        request, transcribed(request), gait.clearance_profile, *first_instants(request)
+    )
+    unknowns = program.resampled(gait)
+    assert abs(program.violations(unknowns)).max() < 1e-6
+    assert program.effort(unknowns) == pytest.approx(gait.cost, rel=1e-9)
+
+
+def test_another_robots_gait_is_refused(bravo7: hs.Robot) -> None:
+    rabbit = hs.optimize_gait(hs.load_robot("rabbit"), **STEPS["rabbit"], starts=1)
+    with pytest.raises(GaitError, match="moves the joints"):
+        hs.optimize_gait(bravo7, **STEPS["bravo7"], warm_start=rabbit)
