@@ -190,6 +190,10 @@ def calls() -> dict[str, Callable[..., Any]]:
     trunk = based.floating_base("trunk", mass=1.0, inertia=1.0)
     bare = heelstrike.RobotBuilder("nothing yet")
     return {
+        "heelstrike.GaitFamily.at": heelstrike.GaitFamily(
+            robot, {"speed": np.array([0.4])}, {}, {}, {}
+        ).at,
+        "heelstrike.gait_family": partial(heelstrike.gait_family, robot, speed=[0.4]),
         "heelstrike.load_robot": partial(heelstrike.load_robot, "bravo7"),
         "heelstrike.inspect_robot": partial(heelstrike.inspect_robot, robot),
         "heelstrike.robot.read_mjcf": partial(read_mjcf, "<mujoco/>"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 from os import PathLike
@@ -203,6 +204,9 @@ def gait_family(
         "rise": rise,
     }
     axes = {name: _axis(name, value) for name, value in given.items() if np.ndim(value) > 0}
+    unknown = set(asked).difference(inspect.signature(optimize_gait).parameters)
+    if unknown:
+        raise GaitError(f"optimize_gait takes no {', '.join(sorted(unknown))}")
     if not axes:
         raise GaitError(f"give a sequence of values of at least one of {', '.join(AXES)}")
     fixed = {name: value for name, value in given.items() if np.ndim(value) == 0 and value}
@@ -232,6 +236,7 @@ def gait_family(
     return family
 
 
+@takes(GaitError)
 def load_gait_family(path: str | PathLike[str], robot: Robot) -> GaitFamily:
     """Read a family that :meth:`GaitFamily.save` wrote.
 
