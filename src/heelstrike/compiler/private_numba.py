@@ -269,7 +269,9 @@ def _finished(codegen: Any, parts: tuple[Any, ...], fixed: Fixed) -> tuple[Any, 
             function.name = f"{function.name}_{own}"
             names.append(function.name)
         elif not function.is_declaration:
-            function.linkage = "internal"
+            # Not "internal": the linker of object code in memory knows those by their names, and
+            # would take a function that was specialised here for the one that others call.
+            function.linkage = "private"
     about.mangled_name = f"{about.mangled_name}_{own}"
     library = codegen.create_library(f"{name}_{own}")
     library._final_module = module
