@@ -374,6 +374,7 @@ def test_a_failed_write_leaves_the_old_file(
 
 def test_an_event_of_every_kind(tmp_path: Path) -> None:
     robot: Robot = walking.bravo7()
-    events = [Event(0.1 * k, kind, k % 4, (1.5 * k, -0.5)) for k, kind in enumerate(EventKind)]
+    kinds = [kind for kind in EventKind if not kind.of_constraint]  # of which it has none
+    events = [Event(0.1 * k, kind, k % 4, (1.5 * k, -0.5)) for k, kind in enumerate(kinds)]
     run = make_run(robot, [0.0, 1.0], events=events)
     assert load_run(run.save(tmp_path / "run.nc")).events == run.events

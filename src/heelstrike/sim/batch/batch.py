@@ -508,10 +508,9 @@ class Batch:
     def _states(self, chosen: Integers, state: State | None) -> tuple[Floats, Floats]:
         """Return positions and velocities of the lanes that are reset."""
         if state is None:
-            states = [self._plans[i].setting.state for i in chosen.tolist()]
-            shape = len(chosen), -1
+            states = [plan.setting.state for plan in self._plans]
             q, v = (np.array([getattr(each, name) for each in states]) for name in "qv")
-            return q.reshape(shape), v.reshape(shape)
+            return q[chosen], v[chosen]
         if not isinstance(state, State):
             raise SimulationError(f"state must be a State, got {type(state).__name__}")
         found = []
