@@ -97,12 +97,12 @@ EVENT_KINDS = {
     "touchdown": 0, "liftoff": 1, "slip": 2, "stick": 3, "slip_reversal": 4, "impact": 5, "zeno": 6,
     "painleve": 7, "energy_gain": 8, "joint_stop": 9, "joint_slip": 10, "joint_stick": 11,
     "bridge": 12, "wedged": 13, "joint_release": 14,
-    "joint_brake": 15,
+    "joint_brake": 15, "constraint_holds": 16, "constraint_lets_go": 17,
 }  # fmt: skip
 
 ROWS = 3
 
-OF_LOOPS = ("loop_force", "coupling_force", "brake_torque")
+OF_LOOPS = ("loop_force", "coupling_force", "brake_torque", "constraint_force")
 """Quantities of which most robots have nothing: these are in datasets of robots with loops only."""
 
 
@@ -134,6 +134,7 @@ def run() -> hs.Run:
         "loop_force": (0, 2),
         "coupling_force": (0,),
         "brake_torque": (0,),
+        "constraint_force": (0, 2),
     }
     plain = make_run(robot, [0.0, 0.25, 0.5])
     rows = {name: recorded(name, *shape) for name, shape in shapes.items()}
