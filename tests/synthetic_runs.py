@@ -45,7 +45,7 @@ def make_run(
     normal = np.array([-np.sin(ground.slope), np.cos(ground.slope)])
     center = np.array([contact_positions(robot, row) for row in q]).reshape(rows, robot.nc, 2)
     radius = robot.model.contact_radius
-    extents = robot.model.extents | ROW_EXTENTS
+    extents = robot.model.extents | ROW_EXTENTS | {"constraints": len(robot.constraints)}
     given: dict[str, Any] = {
         "position": q,
         "velocity": velocity,

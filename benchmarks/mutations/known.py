@@ -36,13 +36,13 @@ KNOWN: tuple[tuple[str, str, str], ...] = (
     ("sim/contacts/candidates.py", "reaction.slip[contact] = answer.velocity[2 * place + 1]",
      "reaction.slip[contact] = -answer.velocity[2 * place + 1]"),
     ("sim/run.py", 'of="contacts.gap"', 'of="reaction.slip"'),
-    ("sim/event_driven/rows.py", "_, record.slip_velocity[row, contact] = contact_velocity(",
-     "record.slip_velocity[row, contact], _ = contact_velocity("),
+    ("sim/event_driven/rows.py", "            _, slip = gap_velocity(point,",
+     "            slip, _ = gap_velocity(point,"),
     ("sim/compliant/dynamics.py", "memory.reaction.slip[contact] = row_product(",
      "memory.reaction.slip[contact] = -row_product("),
     ("sim/controller/stance.py", "        force[j] -= robot.passive[j]\n", "        pass\n"),
     ("gait/support.py", " - self.robot.model.contact_radius[contact]", ""),
-    ("gait/support.py", "center - np.array([0.0, sole.radius])", "center"),
+    ("gait/support.py", "center - sole.radius * self.up", "center"),
 )  # fmt: skip
 
 

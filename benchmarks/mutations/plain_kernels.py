@@ -88,6 +88,19 @@ bundle_type.bundle_at = lambda _: lambda address: _by_address[int(address)]
 
 compilation.compiled_for = _compiled_for
 compilation.loop_for = _compiled_for  # type: ignore[assignment]
+
+
+class _AddressedLoop:
+    """A loop in Python; by its address it is called with the addresses of its bundles."""
+
+    def __init__(self, signature: Any, function: Any, fixed: Any = ()) -> None:
+        del signature, fixed
+        self.call = twin = _twin(function)
+        self.address = len(_by_number)
+        _by_number.append(lambda *places: twin(*(_by_address[int(place)] for place in places)))
+
+
+compilation.AddressedLoop = _AddressedLoop  # type: ignore[assignment,misc]
 compilation.Kernel.__call__ = lambda self, *arguments: _twin(self)(*arguments)  # type: ignore
 
 from heelstrike.compiler import mold, separate_kernel  # noqa: E402

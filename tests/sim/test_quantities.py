@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fresh_python import fresh_python
+from harness import Pin
 from mechanisms import braked, four_bar, geared
 from stored_files import run_file
 from synthetic_runs import box, make_run
@@ -87,9 +88,11 @@ def test_every_quantity_is_documented_and_has_its_dimensions(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in QUANTITIES if name != "torque"])
 def test_every_quantity_is_drawn_by_its_name(name: str) -> None:
-    robot = {"loop_force": four_bar, "coupling_force": geared, "brake_torque": braked}.get(
-        name, box
-    )()
+    of = {
+        "loop_force": four_bar, "coupling_force": geared, "brake_torque": braked,
+        "constraint_force": pinned,
+    }  # fmt: skip
+    robot = of.get(name, box)()
     run = make_run(robot, [0.0, 0.5, 1.0])
     getattr(run, name)[...] = np.arange(getattr(run, name).size).reshape(getattr(run, name).shape)
     figure = run.plot(name, span=(0.5, 1.0))
@@ -99,6 +102,10 @@ def test_every_quantity_is_drawn_by_its_name(name: str) -> None:
     values = getattr(run, name)[1:].reshape(2, shape[1], -1)
     np.testing.assert_array_equal(np.array(drawn), values.transpose(2, 1, 0))
     assert {axes.get_ylabel() for axes in figure.axes} == {QUANTITIES[name].unit}
+
+
+def pinned() -> hs.Robot:
+    return hs.constrained(box(), Pin())
 
 
 def test_a_quantity_of_nothing_is_not_drawn() -> None:

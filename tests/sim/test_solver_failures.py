@@ -10,7 +10,6 @@ from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.solvers import certified_solve
 from heelstrike.robot import read_mjcf
 from heelstrike.sim import EventKind, RunStatus, Scheme
-from heelstrike.sim.memory import allocate_memory
 from heelstrike.sim.time_stepping.impact import allocate_impact, relax
 
 SOLVERS = ("lemke", "fischer_burmeister", "gauss_seidel")
@@ -112,17 +111,14 @@ def test_wedge_deeper_than_turning_explains_is_no_wedge() -> None:
 def test_wedge_that_goes_on_may_be_deeper() -> None:
     """What lets nothing sink but by turning explains any depth in the step after."""
     robot = read_mjcf(PRESSED.replace("LIMIT", "-1e-10"), name="wedge")
-    memory, impact = allocate_memory(robot), allocate_impact(robot)
-    memory.contacts.gap[:] = -2e-4
-    memory.assembly.candidate[0] = 0
-    memory.tally.steps = 7
+    impact = allocate_impact(robot)
     left = uncompiled(relax)
     for wedged, bounds_gaps, leaves in ((5, True, False), (6, True, True), (6, False, False)):
         impact.wedged, impact.relaxed = wedged, 0
-        assert left(bounds_gaps, 1, memory, impact) == leaves
+        assert left(bounds_gaps, -2e-4, False, 7, impact) == leaves
         assert impact.relaxed == leaves
     impact.wedged, impact.relaxed = 6, 1  # nothing more can be left out
-    assert not left(True, 1, memory, impact)
+    assert not left(True, -2e-4, False, 7, impact)
 
 
 def test_wedge_that_friction_holds_does_not_bounce() -> None:

@@ -17,6 +17,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
+from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.fingerprint import fingerprint
 from heelstrike.compiler.machine_code import addresses
 from heelstrike.compiler.recordings.recording import CONSTANT, Program, Recording
@@ -54,7 +55,9 @@ def straight_line_code(
 
     described = [repr([(name, array.tolist()) for name, array in known.items()]).encode()]
     described += [program.description() for program in programs]
-    made_of = fingerprint(Recording, add_function, *(program.kernel for program in programs))
+    made_of = fingerprint(
+        Recording, Program, add_function, *(program.kernel for program in programs)
+    )
     names = [program.name for program in programs]
     return addresses(names, b"\0".join(described), made_of, write)
 
@@ -187,6 +190,12 @@ def _play(context: Any, address: Any, arguments: Any) -> Any:
         return context.get_dummy_value()
 
     return signature, generate
+
+
+@kernel
+def is_code(address: int) -> bool:
+    """Whether there is straight-line code at an address; there is none at zero."""
+    return address != 0
 
 
 play: Any = intrinsic(_play)

@@ -56,7 +56,9 @@ def test_delassus_matrix_and_what_impulses_do(
             contact_rows(robot.model, tree, memory.contacts, contact, contact, assembly)
         for place in range(2):  # a stop and a dry joint
             row = 2 * (robot.nc + place) + place
-            write_unit_row(int(draw.integers(robot.nv)), row, -1.0, assembly)
+            write_unit_row(
+                int(draw.integers(robot.nv)), row, -1.0, assembly.leaf, assembly.jacobian
+            )
         count = robot.nc + 2
         assemble_delassus(robot.model, count, equations, assembly)
         jacobian = assembly.jacobian[: 2 * count]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import walking
+from harness import Pin
 from synthetic_runs import box, make_run, pendulum
 
 import heelstrike as hs
@@ -282,6 +283,8 @@ def test_bad_requests(tmp_path: Path) -> None:
 def test_events_say_where_they_were_and_in_which_unit(kind: EventKind, tmp_path: Path) -> None:
     """Indices of joints are none of contact points, and a bridge has neither, nor an impulse."""
     robot = box()
+    if kind.of_constraint:
+        robot = hs.constrained(robot, Pin(), Pin())
     turns = robot.model.axis[:, 0] != 0.0
     at = (int(turns.argmax()), int(turns.argmin())) if kind.of_joint else (0, 1)
     events = [Event(0.05, kind, index, (0.5, 0.1)) for index in at]
@@ -293,6 +296,8 @@ def test_events_say_where_they_were_and_in_which_unit(kind: EventKind, tmp_path:
     ]
     if kind is EventKind.BRIDGE:
         assert told == [(-1, "", 0.0, "")] * 2
+    elif kind.of_constraint:
+        assert told == [(-1, name, 0.5, "N s") for name in ("Pin 1", "Pin 2")]
     elif kind.of_joint:
         names = [robot.joint_names[i].replace("_", " ") for i in at]
         assert told == [(-1, names[0], 0.5, "N m s"), (-1, names[1], 0.5, "N s")]

@@ -14,7 +14,7 @@ import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
-from heelstrike.compiler.straight_line import play
+from heelstrike.compiler.straight_line import is_code, play
 from heelstrike.dynamics.held import HeldRows, force_of_row, given, left_to_motors
 from heelstrike.dynamics.kernels import (
     bias_force,
@@ -62,7 +62,7 @@ def constrain(
     """Find what depends on the accelerations of the joints while a foot is held at its sole."""
     model, kinematics, held, rest = robot.model, state.kinematics, robot.held, robot.unactuated
     hold, passive = robot.flat_hold[foot], robot.passive
-    if programs[foot] != 0:
+    if is_code(programs[foot]):
         play(
             programs[foot],
             (model, hold, rest, sole, kinematics, state.q, state.v, held, passive, on),

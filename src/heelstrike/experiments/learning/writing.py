@@ -8,16 +8,14 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from heelstrike.contact.ground import Ground
 from heelstrike.control.policy.law import Policy
 from heelstrike.control.policy.network import Network
 from heelstrike.experiments.learning.tasks import RunningTask
 from heelstrike.experiments.learning.training import Curve, Trainer
 from heelstrike.sim import Run, TimeStepping, simulate
-from heelstrike.view.style import styled
-from heelstrike.whole_file import whole_file, write_whole
+from heelstrike.view.style import new_figure, save_figure, styled
+from heelstrike.whole_file import write_whole
 
 KEPT = "training.npz"
 """What is gone on from."""
@@ -71,14 +69,13 @@ def write_curve(curve: Curve, folder: Path) -> list[Path]:
     writer.writerow(columns)
     writer.writerows(zip(*columns.values(), strict=True))
     table = write_whole(folder / "curve.csv", text.getvalue().encode())
-    with styled(), whole_file(folder / "curve.svg") as beside:
-        figure = Figure(figsize=(6.0, 3.2), layout="constrained")
+    with styled():
+        figure = new_figure(6.0, 3.2)
         axes = figure.subplots()
         axes.plot([each / 1e6 for each in curve.decisions], curve.mean_return)
         axes.set_xlabel("decisions in millions")
         axes.set_ylabel("return, mean of 100 episodes")
-        figure.savefig(beside)
-    return [table, folder / "curve.svg"]
+    return [table, save_figure(figure, folder / "curve.svg")]
 
 
 def write_all(

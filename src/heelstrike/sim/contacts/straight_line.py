@@ -62,11 +62,16 @@ def straight_line_programs(model: Model, points: NDArray[np.int64]) -> NDArray[n
     return known[key].copy()
 
 
+def has_programs(nv: int) -> bool:
+    """Whether robots of so many coordinates get straight-line code."""
+    return 0 < nv <= MOST_COORDINATES
+
+
 def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
     nv, size = model.nv, len(points)
     count = len(KERNELS) if size > 0 else DELASSUS
     programs = np.zeros(len(KERNELS), dtype=np.int64)
-    if not 0 < nv <= MOST_COORDINATES:
+    if not has_programs(nv):
         return programs
     extents = {**model.extents, "components": 2}
     pairs = np.zeros((model.nc, 2))

@@ -18,6 +18,7 @@ import numpy as np
 
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.compilation import uncompiled
+from heelstrike.compiler.straight_line import is_code
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Integers
 from heelstrike.sim.controller.robot import ControlledRobot
@@ -117,7 +118,8 @@ class _Query:
 
     @cached_property
     def _python(self) -> Any:
-        return uncompiled(self._kernel)
+        # Straight-line code looks at no index: in its place the kernel does the same in Python.
+        return uncompiled(self._kernel, replace={is_code: lambda _: False})
 
     def __call__(self, *arguments: Any) -> Any:
         question = _what_indices_follow_from(arguments)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.compiler.straight_line import play
+from heelstrike.compiler.straight_line import is_code, play
 from heelstrike.dynamics.dense import solve_positive
 from heelstrike.dynamics.held import (
     FREE,
@@ -236,7 +236,7 @@ def flat_foot_torque(
     For robots whose coordinates without a motor follow from the others by the foot, closed loops
     and couplings; NaN for others. `torque` may be the array `acceleration`.
     """
-    if self.flat_foot[foot] != 0:
+    if is_code(self.flat_foot[foot]):
         play(
             self.flat_foot[foot],
             (

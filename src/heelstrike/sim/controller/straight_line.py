@@ -20,7 +20,7 @@ from heelstrike.dynamics.held import HeldRows
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.contacts.straight_line import MOST_COORDINATES
+from heelstrike.sim.contacts.straight_line import has_programs
 
 TRUNK = (0, 1, 2)
 """Coordinates of a floating trunk: x, z, and its rotation."""
@@ -63,7 +63,7 @@ def flat_foot_programs(
 
     Its argument ``hold`` is the foot's; nobody reads, besides scratch of laws, what is `unread`.
     """
-    if not (trunk_follows(robot) and robot.feet and robot.nv <= MOST_COORDINATES):
+    if not (trunk_follows(robot) and robot.feet and has_programs(robot.nv)):
         return (0,) * len(robot.feet)
     programs = []
     for foot, hold in enumerate(flat_foot_holds(robot)):

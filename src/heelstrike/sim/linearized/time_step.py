@@ -137,7 +137,7 @@ def differentiate_step(model: Model, work: Stepping, memory: Memory, slopes: Ste
         bounces = bounces or surface.restitution[assembly.candidate[place]] > 0.0
     if bounces:
         evaluate(model, slopes.v, slopes)
-        for row in range(2 * model.nc):
+        for row in range(slopes.bounce_by_q.shape[0]):
             for j in range(model.nq):
                 slopes.bounce_by_q[row, j] = slopes.partials.along_by_q[row, j]
     linearised = is_linearised(work.scheme)

@@ -199,7 +199,7 @@ def _check(element: Element, where: str, label: str, strange: list[str], joint: 
         elif ":" not in name and not name.startswith("xmlns"):
             strange.append(
                 f"<{tag}> of {where} has the unknown attribute {name[:60]!r}"
-                f"{meant(name, attributes, GUESS)}"
+                f"{meant(name, list(attributes), GUESS)}"
             )
     known = _CHILDREN.get(tag, set())
     other = _OTHER_MATTERS.get(tag, "").split()
