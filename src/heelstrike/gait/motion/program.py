@@ -1,0 +1,411 @@
+"""The nonlinear program of a motion of several phases (direct collocation)."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import casadi
+import numpy as np
+
+from heelstrike.field_texts import dataclass
+from heelstrike.gait.blocks import BlockProgram, Copies
+from heelstrike.gait.motion.instant import Instants
+from heelstrike.gait.motion.phases import Standing
+from heelstrike.gait.motion.request import MotionRequest, Repeat
+from heelstrike.gait.motion.rows import Kind, Row
+from heelstrike.gait.polynomials import Instants as Grid
+from heelstrike.gait.polynomials import coefficients, gauss
+from heelstrike.gait.program import NEAR, SETTINGS, Ipopt
+from heelstrike.robot.model import Floats
+
+STAGES = 4
+"""Gauss points of a piece, at which the equations of motion hold: positions at the ends of pieces
+are accurate to order 2 `STAGES`."""
+DEGREE = STAGES + 1
+"""Degree of the polynomials."""
+EQUATIONS = {Kind.MOTION, Kind.NORMAL_REST, Kind.TANGENT_REST}
+"""Kinds of constraint along the path that are equations."""
+MORE_ITERATIONS = {"max_iter": 300}
+BEGIN = {"mu_init": 1e-2}
+"""Settings of IPOPT: phases of free duration take more iterations than a step, and fewer from this
+barrier parameter than from IPOPT's own 0.1."""
+RESERVE = 1e-6
+"""Scaled distance kept from the bounds of inequalities along the path, for the time between."""
+
+
+def lagrange(share: Floats) -> Floats:
+    """Values at shares of a piece of the polynomials that are 1 at one Gauss point, (STAGES, N)."""
+    nodes, _ = gauss(STAGES)
+    others = [np.delete(nodes, k) for k in range(STAGES)]
+    return np.array(
+        [
+            np.prod((share[:, None] - rest) / (node - rest), axis=1)
+            for node, rest in zip(nodes, others, strict=True)
+        ]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseUnknowns:
+    """Expressions of the unknowns of a phase, affine in all unknowns."""
+
+    q: Any
+    """(nv, K + 1) Positions at the ends of its pieces, and where it begins."""
+    v: Any
+    """(nv, K) Velocities at the beginnings, by the share of a piece."""
+    a: Any
+    """(nv, (STAGES) K) Parts of the accelerations, all first parts first."""
+    force: Any
+    """(2 nc, STAGES K) Forces at the Gauss points."""
+    duration: Any
+    """Duration of a piece (s)."""
+
+    def along(self, grid: Grid) -> tuple[Any, Any, Any]:
+        """Positions and derivatives by the share of a piece at instants, (nv, N) each."""
+        values = casadi.horzcat(self.q[:, :-1], self.v, self.a)
+        first, second, third = (
+            values @ casadi.sparsify(casadi.DM(grid.matrix(DEGREE, order))) for order in range(3)
+        )
+        return first, second, third
+
+    def forces(self, grid: Grid) -> Any:
+        """Forces at instants, (2 nc, N)."""
+        values = np.zeros((self.force.shape[1], grid.share.size))
+        shares = lagrange(grid.share)
+        for k in range(STAGES):
+            values[STAGES * grid.piece + k, np.arange(grid.share.size)] = shares[k]
+        return self.force @ casadi.sparsify(casadi.DM(values))
+
+
+def gauss_points(pieces: int) -> Grid:
+    """Gauss points of all pieces of a phase."""
+    nodes, weights = gauss(STAGES)
+    return Grid(
+        pieces, np.repeat(np.arange(pieces), STAGES), np.tile(nodes, pieces),
+        np.tile(weights, pieces) / pieces,
+    )  # fmt: skip
+
+
+def beginnings(pieces: int) -> Grid:
+    """The beginning of every piece."""
+    return Grid(pieces, np.arange(pieces), np.zeros(pieces), np.zeros(pieces))
+
+
+def endings(pieces: int) -> Grid:
+    """The end of every piece."""
+    return Grid(pieces, np.arange(pieces), np.ones(pieces), np.zeros(pieces))
+
+
+@dataclass(eq=False)
+class MotionProgram:
+    """The program of a request.
+
+    Unknowns are, phase by phase: positions at the ends of the pieces, velocities at their
+    beginnings and parts of the accelerations (as they are in a phase of its usual duration), the
+    forces that the contact points may exert at the Gauss points, in units of the weight, and the
+    duration; then the impulses of every landing; then the distance.
+    """
+
+    request: MotionRequest
+    """What is asked."""
+    functions: Instants
+    """The robot at an instant, and at a landing."""
+    grids: tuple[Grid, ...]
+    """When the constraints of each phase hold; equations where there is a weight."""
+    near: bool = False
+    """Whether guesses are nearly optima."""
+
+    def __post_init__(self) -> None:
+        request = self.request
+        n = request.robot.nv
+        sizes: list[int] = []
+        for phase, stands in zip(request.phases, request.standing, strict=True):
+            pieces = phase.pieces
+            sizes += [n * pieces, n * pieces, STAGES * n * pieces]
+            sizes += [len(stands.forces) * STAGES * pieces, 1]
+        sizes += [len(each.forces) for each in self.landings]
+        self._ends = [0, *np.cumsum([*sizes, 1]).tolist()]
+        self._build()
+
+    @cached_property
+    def landings(self) -> list[Standing]:
+        """What holds the robot after each phase; nothing after the last of one that never repeats.
+
+        Where no point comes down there is no impulse.
+        """
+        request = self.request
+        after = [*request.standing[1:]]
+        if request.repeat is not Repeat.NEVER:
+            after.append(request.standing_after)
+        nothing = Standing(frozenset(), (), ())
+        return [
+            following if following.points - before.points else nothing
+            for before, following in zip(request.standing, after, strict=False)
+        ]
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self._ends[-1])
+
+    def parts(self, x: Any) -> tuple[list[PhaseUnknowns], list[Any], Any]:
+        """Return phases, impulses (2 nc,) and distance, of all unknowns."""
+        request, robot = self.request, self.request.robot
+        n = robot.nv
+        pieces_of = [x[k:end] for k, end in pairwise(self._ends)]
+        distance = pieces_of[-1]
+        count = len(request.phases)
+        own = [pieces_of[5 * p : 5 * p + 5] for p in range(count)]
+        last = casadi.reshape(own[-1][0], n, -1)[:, -1]
+        start = request.start_position(last, distance)
+        phases = []
+        for phase, stands, usual, mine in zip(
+            request.phases, request.standing, request.usual, own, strict=True
+        ):
+            pieces, piece = phase.pieces, usual / phase.pieces
+            q = casadi.horzcat(start, casadi.reshape(mine[0], n, pieces))
+            force = casadi.reshape(mine[3], len(stands.forces), STAGES * pieces)
+            phases.append(
+                PhaseUnknowns(
+                    q=q,
+                    v=piece * casadi.reshape(mine[1], n, pieces),
+                    a=piece**2 * casadi.reshape(mine[2], n, STAGES * pieces),
+                    force=self._spread(stands) @ force,
+                    duration=mine[4] / pieces,
+                )
+            )
+            start = q[:, -1]
+        impulses = [
+            self.functions.second * (self._spread(each) @ part)
+            for each, part in zip(self.landings, pieces_of[5 * count : -1], strict=True)
+        ]
+        return phases, impulses, distance
+
+    def _spread(self, stands: Standing) -> Any:
+        """Matrix that puts unknown forces in units of the weight where they belong."""
+        spread = np.zeros((2 * self.request.robot.nc, len(stands.forces)))
+        spread[stands.forces, np.arange(len(stands.forces))] = self.request.robot.weight
+        return casadi.sparsify(casadi.DM(spread))
+
+    def _build(self) -> None:
+        request, functions = self.request, self.functions
+        x = casadi.MX.sym("x", self.size)
+        phases, impulses, distance = self.parts(x)
+        linear = [*self._gaps(phases), *self._linear(phases, distance)]
+        numbers = np.array([request.slope, request.friction])
+        copies, lower, upper, kept = [], [], [], []
+        self.labels: list[tuple[Row, int, float]] = []
+        for p, (unknowns, grid) in enumerate(zip(phases, self.grids, strict=True)):
+            count = grid.share.size
+            step = casadi.repmat(casadi.vertcat(unknowns.duration, distance), 1, count)
+            y = casadi.vertcat(*unknowns.along(grid), unknowns.forces(grid), step)
+            weight = grid.weight * grid.pieces
+            copies.append(Copies.of(functions.path, weight, x, y, numbers))
+            low, high = self.path_bounds(p, grid)
+            used = np.isfinite(low) | np.isfinite(high)
+            lower.append(low.T[used.T])
+            upper.append(high.T[used.T])
+            kept.append(used.T.ravel())
+            for i, k in np.argwhere(used.T).tolist():
+                self.labels.append((functions.path_rows[k], p, float(grid.phases[i])))
+        for p, impulse in enumerate(impulses):
+            before = phases[p]
+            after, piece = self._after(phases, p)
+            _, arriving, _ = before.along(endings(request.phases[p].pieces))
+            y = casadi.vertcat(
+                before.q[:, -1], arriving[:, -1], after, impulse, before.duration, piece
+            )
+            copies.append(Copies.of(functions.landing, np.zeros(1), x, y, numbers))
+            low, high = self._landing_bounds(p)
+            used = np.isfinite(low) | np.isfinite(high)
+            lower.append(low[used])
+            upper.append(high[used])
+            kept.append(used)
+            self.labels += [(functions.landing_rows[k], p, 1.0) for k in np.flatnonzero(used)]
+        blocks = BlockProgram(x, casadi.vertcat(*linear), copies)
+        count = sum(each.numel() for each in linear)
+        self.linear = count
+        self._lower = np.concatenate([np.zeros(count), *lower])
+        self._upper = np.concatenate([np.zeros(count), *upper])
+        rows = np.flatnonzero(np.concatenate([np.ones(count, bool), *kept])).tolist()
+        total = count + sum(each.size for each in kept)
+        f, g = blocks.value(x)
+        price, prices = casadi.MX.sym("price"), casadi.MX.sym("prices", len(rows))
+        all_prices = casadi.MX(total, 1)
+        all_prices[rows] = prices
+        self.value = casadi.Function("value", [x], [f, g[rows]])
+        slopes = blocks.jacobian(x)[rows, :]
+        self.slopes = casadi.Function("slopes", [x], [slopes])
+        self._solver = Ipopt(
+            x, f, g[rows], gradient=blocks.gradient(x), jacobian=slopes,
+            hessian=(price, prices, blocks.hessian(x, price, all_prices)),
+            settings=NEAR | MORE_ITERATIONS if self.near else SETTINGS | MORE_ITERATIONS | BEGIN,
+        )  # fmt: skip
+
+    def _gaps(self, phases: list[PhaseUnknowns]) -> list[Any]:
+        """Pieces join within a phase; positions join everywhere."""
+        gaps = []
+        for unknowns in phases:
+            pieces = unknowns.q.shape[1] - 1
+            q_end, v_end, _ = unknowns.along(endings(pieces))
+            gaps += [
+                casadi.vec(unknowns.q[:, 1:] - q_end),
+                casadi.vec(unknowns.v[:, 1:] - v_end[:, :-1]),
+            ]
+        return gaps
+
+    def _linear(self, phases: list[PhaseUnknowns], distance: Any) -> list[Any]:
+        """What is asked of the whole motion, equations that are affine."""
+        request = self.request
+        total = sum(
+            each.duration * phase.pieces for each, phase in zip(phases, request.phases, strict=True)
+        )
+        rows = []
+        if request.repeat is not Repeat.NEVER:
+            rows.append(phases[0].q[0, 0])  # where it begins does not matter
+        if request.speed is not None:
+            rows.append(distance - request.speed * total)
+        if request.total is not None:
+            rows.append(total - request.total)
+        if request.start is not None:
+            rows.append(phases[0].v[:, 0] - phases[0].duration * casadi.DM(request.start.v))
+        if request.end is not None:
+            pieces = request.phases[-1].pieces
+            _, v_end, _ = phases[-1].along(endings(pieces))
+            rows.append(phases[-1].q[:, -1] - casadi.DM(request.end.q))
+            rows.append(v_end[:, -1] - phases[-1].duration * casadi.DM(request.end.v))
+        return rows
+
+    def _after(self, phases: list[PhaseUnknowns], p: int) -> tuple[Any, Any]:
+        """Velocity just after a phase by the share of a piece, and the duration of that piece."""
+        if p + 1 < len(phases):
+            return phases[p + 1].v[:, 0], phases[p + 1].duration
+        return self.request.wrapped_velocity(phases[0].v[:, 0]), phases[0].duration
+
+    def path_bounds(self, p: int, grid: Grid) -> tuple[Floats, Floats]:
+        """Scaled bounds of the constraints along a phase, (rows, N) each; infinite if unused."""
+        request, rows = self.request, self.functions.path_rows
+        stands, count = request.standing[p], grid.share.size
+        lower = np.repeat([[row.lower] for row in rows], count, axis=1)
+        upper = np.repeat([[row.upper] for row in rows], count, axis=1)
+        weighed = grid.weight > 0.0
+        for k, row in enumerate(rows):
+            used: Any = True
+            if row.kind is Kind.NORMAL_REST:
+                used = weighed & (row.of[0] in stands.normal)
+            elif row.kind is Kind.TANGENT_REST:
+                used = weighed & (row.of[0] in stands.tangent)
+            elif row.kind is Kind.MOTION:
+                used = weighed
+            elif row.kind is Kind.PUSH:
+                used = row.of[0] in stands.normal
+            elif row.kind is Kind.FRICTION:
+                used = not stands.points.isdisjoint(row.of)
+            elif row.kind is Kind.HEIGHT:
+                used = row.of[0] not in stands.points
+                lower[k] = request.clearance_of(p, row.of[0], grid.phases)
+            if row.kind not in EQUATIONS:
+                span = np.minimum(RESERVE, 0.5 * (upper[k] - lower[k]))
+                lower[k], upper[k] = lower[k] + span, upper[k] - span
+            lower[k] = np.where(used, lower[k], -np.inf)
+            upper[k] = np.where(used, upper[k], np.inf)
+        return lower, upper
+
+    def _landing_bounds(self, p: int) -> tuple[Floats, Floats]:
+        """Scaled bounds of the constraints where a phase ends, (rows,) each; infinite if unused."""
+        request, rows = self.request, self.functions.landing_rows
+        before = request.standing[p]
+        last = p + 1 == len(request.phases)
+        after = request.standing_after if last else request.standing[p + 1]
+        landing = self.landings[p]
+        fresh, gone = after.points - before.points, before.points - after.points
+        lower = np.array([row.lower for row in rows])
+        upper = np.array([row.upper for row in rows])
+        for k, row in enumerate(rows):
+            point = row.of[0] if row.of else -1
+            used = {
+                Kind.MOMENTUM: True,
+                Kind.TOUCH: point in fresh and point in after.normal,
+                Kind.ARRIVE: point in fresh,
+                Kind.NORMAL_STOP: point in landing.normal,
+                Kind.TANGENT_STOP: point in landing.tangent,
+                Kind.LEAVE: bool(fresh) and point in gone,
+                Kind.IMPULSE: point in landing.normal,
+                Kind.IMPULSE_FRICTION: not landing.points.isdisjoint(row.of),
+            }[row.kind]
+            if not used:
+                lower[k], upper[k] = -np.inf, np.inf
+        return lower, upper
+
+    def solve(self, guess: Floats, multipliers: Floats | None = None) -> tuple[Floats, Floats, Any]:
+        """Solve from a guess; return the unknowns, the multipliers and what IPOPT tells."""
+        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        for p, phase in enumerate(self.request.phases):
+            place = self._ends[5 * p + 4]
+            lower[place], upper[place] = phase.duration
+        lower[-1], upper[-1] = self.request.distance
+        more = {} if multipliers is None else {"lam_g0": multipliers}
+        found, told = self._solver.solve(
+            x0=np.clip(guess, lower, upper), lbx=lower, ubx=upper, lbg=self._lower,
+            ubg=self._upper, **more,
+        )  # fmt: skip
+        return np.array(found["x"]).ravel(), np.array(found["lam_g"]).ravel(), told
+
+    def violations(self, unknowns: Floats) -> Floats:
+        """Scaled distances of the constraints outside of their bounds; positive if too low."""
+        values = np.array(self.value(unknowns)[1]).ravel()
+        missing: Floats = np.maximum(self._lower - values, 0.0)
+        missing -= np.maximum(values - self._upper, 0.0)
+        return missing
+
+    def packed(
+        self, positions: list[Floats], velocities: list[Floats], accelerations: list[Floats],
+        forces: list[Floats], durations: Floats, distance: float,
+    ) -> Floats:  # fmt: skip
+        """Unknowns of a motion: at the ends of pieces, their beginnings and the Gauss points.
+
+        Parameters
+        ----------
+        positions, velocities : list of (nv, K) array
+            At the ends of the pieces, and at their beginnings.
+        accelerations : list of (nv, K, STAGES) array
+            At the Gauss points.
+        forces : list of (2 nc, STAGES K) array
+            At the Gauss points (N).
+        durations : (phases,) array
+            Durations (s).
+        distance : float
+            Distance (m).
+        """
+        nodes, _ = gauss(STAGES)
+        basis = np.polynomial.legendre.legvander(2.0 * nodes - 1.0, STAGES - 1)
+        request, found = self.request, []
+        for p in range(len(request.phases)):
+            rate = durations[p] / request.usual[p]
+            n, pieces, _ = accelerations[p].shape
+            values = np.moveaxis(accelerations[p], 2, 0).reshape(STAGES, -1)
+            parts = np.linalg.solve(basis, values).reshape(STAGES, n, pieces)
+            found += [
+                positions[p].ravel(order="F"), rate * velocities[p].ravel(order="F"),
+                rate**2 * parts.transpose(0, 2, 1).ravel(),
+                (forces[p][request.standing[p].forces] / request.robot.weight).ravel(order="F"),
+                durations[p : p + 1],
+            ]  # fmt: skip
+        found += [np.zeros(len(each.forces)) for each in self.landings]
+        return np.concatenate([*found, [distance]])
+
+    def pieces(self, unknowns: Floats) -> list[tuple[Floats, Floats, float]]:
+        """Coefficients (K, DEGREE + 1, nv), forces (STAGES K, nc, 2) and duration (s) of phases."""
+        phases, _, _ = self.parts(casadi.DM(unknowns))
+        n, found = self.request.robot.nv, []
+        for unknown in phases:
+            piece, pieces = float(unknown.duration), unknown.q.shape[1] - 1
+            values = np.array(
+                casadi.horzcat(unknown.q[:, :-1], unknown.v / piece, unknown.a / piece**2)
+            )
+            values = values.reshape(n, DEGREE + 1, pieces).transpose(2, 1, 0)
+            force = np.array(unknown.force).T.reshape(STAGES * pieces, -1, 2)
+            found.append((coefficients(values, piece), force, piece * pieces))
+        return found
