@@ -74,6 +74,10 @@ def usual() -> dict[str, dict[str, Any]]:
         "disturbance_response": {**walked, "disturbances": {}},
         "find_limit_cycle": walked,
         "floquet_multipliers": walked,
+        "ContactPhase": {},
+        "MotionTracking": {"robot": robot, "motion": None},
+        "load_motion": {"path": "motion.json"},
+        "optimize_motion": {"robot": robot, "phases": [hs.ContactPhase("right_foot")], "speed": 0.4},
         "gait_family": {"robot": robot, "speed": [0.4]},
         "gait_sensitivity_norm": dict.fromkeys("ABCD", 0.5 * ONE),
         "human": {},
@@ -105,7 +109,7 @@ def usual() -> dict[str, dict[str, Any]]:
 
 
 RESULTS = """ActiveContacts BatchResult DisturbanceResponse Floquet Gait GaitFamily Gradient Largest
-LimitCycle ModeChange Monodromy PhasedGait Robot Run RunDerivatives Snapshot StepDerivatives
+LimitCycle ModeChange Monodromy Motion PhasedGait Robot Run RunDerivatives Snapshot StepDerivatives
 StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
 TOLD_APART = """Bundle Constraint EndOfRun GaitLQR GroundShape SteppingConstraints

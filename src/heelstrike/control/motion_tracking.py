@@ -44,6 +44,8 @@ class Parameters(Bundle):
 
     duration: Floats = array("phases")
     """Duration of each phase (s)."""
+    begins: Floats = array("pieces")
+    """When each piece begins in its phase (s)."""
     first: Integers = array("phases + 1", of=int)
     """First piece of each phase."""
     pieces: Floats = array("pieces", "terms", "nv")
@@ -78,10 +80,10 @@ class Memory(Bundle):
     passive: Floats = array("nv")
     wanted: Floats = array("nv")
     """mass, bias, passive, wanted: A, H, forces of springs and dampers, v̇ᵈ."""
-    rows: Floats = array("rows", "nv")
+    jacobian: Floats = array("rows", "nv")
     moved: Floats = array("rows")
     reference: Floats = array("rows")
-    """rows, moved, reference: Jacobian of the contact points, J̇v, λᵈ."""
+    """jacobian, moved, reference: Jacobian of the contact points, J̇v, λᵈ."""
     system: Floats = array("unknowns", "unknowns + 1")
     unknown: Floats = array("unknowns")
     order: Integers = array("unknowns", of=int)
@@ -138,12 +140,12 @@ def solve_for_nearest(
         for i in range(n):
             system[row, i] = system[i, row] = memory.mass[j, i]
         for k in range(count):
-            system[row, n + k] = system[n + k, row] = -memory.rows[memory.held[k], j]
+            system[row, n + k] = system[n + k, row] = -memory.jacobian[memory.held[k], j]
         system[row, size] = memory.passive[j] - memory.bias[j]
     for k in range(count):
         row = n + count + free + k
         for i in range(n):
-            system[row, i] = system[i, row] = memory.rows[memory.held[k], i]
+            system[row, i] = system[i, row] = memory.jacobian[memory.held[k], i]
         system[row, size] = -memory.moved[memory.held[k]]
     solve_to_rank(size, system, memory.order, memory.unknown)
 
@@ -163,10 +165,10 @@ def motion_tracking(
     moves = 0.0 if gone > latest else 1.0
     gone = min(gone, latest)
     first, last = parameters.first[phase], parameters.first[phase + 1]
-    length = duration / (last - first)
-    piece = min(int(gone / length), last - first - 1)
-    inside = gone - piece * length
-    piece += first
+    piece = first
+    while piece < last - 1 and gone >= parameters.begins[piece + 1]:
+        piece += 1
+    inside = gone - parameters.begins[piece]
 
     for i in range(robot.nu):
         joint = robot.model.actuator_joint[i]
@@ -184,7 +186,7 @@ def motion_tracking(
     count = 0
     for i in range(robot.nc):
         if parameters.stands[phase, 2 * i] == 1 or parameters.stands[phase, 2 * i + 1] == 1:
-            robot.contact_jacobian(state, contacts, i, memory.rows[2 * i : 2 * i + 2])
+            robot.contact_jacobian(state, contacts, i, memory.jacobian[2 * i : 2 * i + 2])
             robot.contact_bias_acceleration(state, contacts, i, memory.moved[2 * i : 2 * i + 2])
         for row in range(2 * i, 2 * i + 2):
             if parameters.stands[phase, row] == 1:
@@ -202,7 +204,7 @@ def motion_tracking(
         for k in range(robot.nv):
             total += memory.mass[j, k] * memory.unknown[k]
         for k in range(count):
-            total -= memory.rows[memory.held[k], j] * memory.unknown[robot.nv + k]
+            total -= memory.jacobian[memory.held[k], j] * memory.unknown[robot.nv + k]
         torque[i] = total
 
 
@@ -247,6 +249,7 @@ class MotionTracking(Law):
                 fresh[p, robot.contact_names.index(name)] = following != p
         parameters = Parameters(
             duration=np.array([phase.duration for phase in cycle]),
+            begins=np.concatenate([phase.breakpoints[:-1] for phase in cycle]),
             first=np.cumsum([0, *(len(phase.pieces) for phase in cycle)]),
             pieces=np.concatenate([phase.pieces for phase in cycle]),
             force=np.concatenate([phase.force_pieces for phase in cycle]),
@@ -287,7 +290,7 @@ def mirrored_phase(robot: Robot, motion: Motion, phase: MotionPhase) -> MotionPh
     points = sorted(int(motion.mirror_contact[names.index(name)]) for name in phase.contacts)
     return MotionPhase(
         contacts=tuple(names[i] for i in points),
-        duration=phase.duration,
+        breakpoints=phase.breakpoints,
         pieces=pieces,
         force=phase.force[:, :, motion.mirror_contact],
         impulse=phase.impulse[motion.mirror_contact],

@@ -52,7 +52,7 @@ def save_motion(motion: Motion, path: str | PathLike[str]) -> None:
         "phases": [
             {
                 "contacts": list(phase.contacts),
-                "duration_s": phase.duration,
+                "breakpoints_s": phase.breakpoints.tolist(),
                 "pieces": phase.pieces.tolist(),
                 "force_N": phase.force.tolist(),
                 "impulse_Ns": phase.impulse.tolist(),
@@ -123,15 +123,16 @@ def _motion_of(entries: Entries) -> Motion:
 
 
 def _phase_of(entries: Entries, nv: int, nc: int) -> MotionPhase:
-    duration = entries.number("duration_s")
-    if not duration > 0.0:
-        raise GaitError('"duration_s" must be positive')
+    ends = entries.numbers("breakpoints_s", None)
+    pieces = entries.numbers("pieces", ends.size - 1, None, nv)
+    if ends[0] != 0.0 or np.any(np.diff(ends) <= 0.0):
+        raise GaitError('"breakpoints_s" must rise from 0')
     contacts = entries.data.get("contacts")
     names = entries.names("contacts") if contacts else ()
     return MotionPhase(
         contacts=names,
-        duration=duration,
-        pieces=entries.numbers("pieces", None, None, nv),
-        force=entries.numbers("force_N", None, None, nc, 2),
+        breakpoints=ends,
+        pieces=pieces,
+        force=entries.numbers("force_N", ends.size - 1, None, nc, 2),
         impulse=entries.numbers("impulse_Ns", nc, 2),
     )

@@ -8,7 +8,14 @@ from scipy.interpolate import CubicSpline
 from heelstrike.dynamics import contact_positions, inverse_kinematics
 from heelstrike.errors import RobotError
 from heelstrike.gait.motion.instant import size_of
-from heelstrike.gait.motion.program import STAGES, MotionProgram, beginnings, endings, gauss_points
+from heelstrike.gait.motion.program import (
+    STAGES,
+    MotionProgram,
+    beginnings,
+    endings,
+    gauss_points,
+    phases_of,
+)
 from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.robot.model import Floats
 
@@ -38,7 +45,7 @@ def guess_of(program: MotionProgram, *, lean: float = 0.0, lowered: float = LOWE
         fine = np.linspace(0.0, 1.0, 2 * pieces + 3)
         path = CubicSpline(fine, [drawn.at(start + durations[p] * share, p) for share in fine])
         at = {
-            grid: grid_of(pieces).phases
+            grid: phases_of(grid_of(pieces))
             for grid, grid_of in (("end", endings), ("begin", beginnings), ("gauss", gauss_points))
         }
         positions.append(path(at["end"]).T)

@@ -93,7 +93,7 @@ class Instants:
         heights, jacobian, bias = self._points(dynamics)
         pushes = symbols(force)
         needed = dynamics.inverse_dynamics(a) - dynamics.passive_force() - jacobian.T @ pushes
-        accelerations = jacobian @ a + bias
+        speeds, accelerations = jacobian @ dynamics.v, jacobian @ a + bias
         actuated = model.actuator_joint
         torque = needed[actuated]
         rows = Rows()
@@ -104,6 +104,8 @@ class Instants:
             for k, kind in enumerate((Kind.NORMAL_REST, Kind.TANGENT_REST)):
                 unit = self.gravity
                 rows.add(kind, accelerations[2 * i + k], subject=name, upper=0.0, unit=unit, of=i)
+            for k, kind in enumerate((Kind.NORMAL_STILL, Kind.TANGENT_STILL)):
+                rows.add(kind, speeds[2 * i + k], subject=name, upper=0.0, of=i)
         self._add_cones(rows, pushes, (Kind.PUSH, Kind.FRICTION), weight)
         for i, name in enumerate(robot.contact_names):
             rows.add(Kind.HEIGHT, heights[i], subject=name, of=i)

@@ -27,11 +27,11 @@ class MotionPhase:
 
     contacts: tuple[str, ...]
     """The contact points that stand; none in flight."""
-    duration: float
-    """Duration (s)."""
+    breakpoints: Floats
+    """(K + 1,) Times since the beginning of the phase between which one polynomial holds, in s."""
     pieces: Floats
     """(K, d + 1, nv) Coefficients of all coordinates, lowest first, in the time since the beginning
-    of each of K pieces of equal length."""
+    of each of K pieces."""
     force: Floats
     """(K, s, nc, 2) Forces of the ground on all contact points, away from it and along it (N), at
     the s Gauss points of each piece. Of a flat foot, only the first and the last point push, and
@@ -40,9 +40,9 @@ class MotionPhase:
     """(nc, 2) Impulses (N s) at the end of the phase, likewise; zero where no point comes down."""
 
     @property
-    def breakpoints(self) -> Floats:
-        """Times in the phase between which one polynomial holds, (K + 1,), in s."""
-        return self.duration * np.linspace(0.0, 1.0, len(self.pieces) + 1)
+    def duration(self) -> float:
+        """Duration (s)."""
+        return float(self.breakpoints[-1])
 
     def coordinates(self, t: ArrayLike, *, order: int = 0) -> Floats:
         """Coordinates at times in the phase, or a derivative, (..., nv).
@@ -85,7 +85,8 @@ class MotionPhase:
         """Coefficients of the forces, lowest first, in the time of each piece, (K, s, 2 nc)."""
         count, stages = self.force.shape[:2]
         nodes, _ = gauss(stages)
-        powers = (nodes[:, None] * self.duration / count) ** np.arange(stages)
+        times = np.diff(self.breakpoints)[:, None] * nodes
+        powers = times[..., None] ** np.arange(stages)
         return np.linalg.solve(powers, self.force.reshape(count, stages, -1))
 
 

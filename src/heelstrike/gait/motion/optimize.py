@@ -22,6 +22,7 @@ from heelstrike.gait.motion.program import (
     STAGES,
     MotionProgram,
     gauss_points,
+    looked_at,
 )
 from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.gait.polynomials import Instants as Grid
@@ -131,7 +132,7 @@ def optimize_motion(
     )
     functions = Instants(robot, request.cost, per_metre=free and request.repeat is not Repeat.NEVER)
     program = MotionProgram(
-        request, functions, tuple(gauss_points(phase.pieces) for phase in request.phases)
+        request, functions, tuple(looked_at(phase.pieces) for phase in request.phases)
     )
     report(0.1)
     unknowns, optimal = _solved(program, starts, report)
@@ -271,8 +272,9 @@ def _rows_at(program: MotionProgram, unknowns: Floats, p: int, grid: Grid) -> tu
     phases, _, distance = program.parts(casadi.DM(unknowns))
     own, count = phases[p], grid.share.size
     request = program.request
-    step = casadi.repmat(casadi.vertcat(own.duration, distance), 1, count)
-    y = casadi.vertcat(*own.along(grid), own.forces(grid), step)
+    step = casadi.DM(own.lengths[grid.piece]).T * own.duration
+    far = casadi.repmat(distance, 1, count)
+    y = casadi.vertcat(*own.along(grid), own.forces(grid), step, far)
     numbers = casadi.repmat(casadi.DM([request.slope, request.friction]), 1, count)
     cost, rows = program.functions.path.value.map(count)(y, numbers)
     return np.array(cost).ravel(), np.array(rows)
@@ -319,7 +321,7 @@ def _motion(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
     phases, margins = [], dict[str, float]()
     torque = Instants(robot, costs_of("torque"), per_metre=False)
     plain = replace(program, functions=torque)
-    for p, (pieces, force, duration) in enumerate(program.pieces(unknowns)):
+    for p, (pieces, force, ends) in enumerate(program.pieces(unknowns)):
         grid = gauss_points(len(pieces))
         rates, _ = _rows_at(plain, unknowns, p, grid)
         effort += float(rates @ grid.weight) * grid.pieces
@@ -331,7 +333,7 @@ def _motion(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
         phases.append(
             MotionPhase(
                 contacts=tuple(robot.contact_names[i] for i in sorted(standing)),
-                duration=duration,
+                breakpoints=ends,
                 pieces=pieces,
                 force=force.reshape(len(pieces), STAGES, robot.nc, 2),
                 impulse=impulse,
@@ -368,7 +370,7 @@ def _add_margins(
     _, rows = _rows_at(program, unknowns, p, grid)
     lower, upper = program.path_bounds(p, grid)
     for k, row in enumerate(program.functions.path_rows):
-        if row.kind in EQUATIONS:
+        if row.kind in EQUATIONS or not np.any(lower[k] < upper[k]):
             continue
         room = np.minimum(rows[k] - lower[k], upper[k] - rows[k])
         room = room[np.isfinite(room)]

@@ -25,12 +25,17 @@ STAGES = 4
 are accurate to order 2 `STAGES`."""
 DEGREE = STAGES + 1
 """Degree of the polynomials."""
-EQUATIONS = {Kind.MOTION, Kind.NORMAL_REST, Kind.TANGENT_REST}
+EQUATIONS = {
+    Kind.MOTION, Kind.NORMAL_REST, Kind.TANGENT_REST, Kind.NORMAL_STILL, Kind.TANGENT_STILL,
+}  # fmt: skip
 """Kinds of constraint along the path that are equations."""
 MORE_ITERATIONS = {"max_iter": 300}
 BEGIN = {"mu_init": 1e-2}
 """Settings of IPOPT: phases of free duration take more iterations than a step, and fewer from this
 barrier parameter than from IPOPT's own 0.1."""
+FROM_STOPS = 1e-3
+"""Distance (rad, m) that joints keep from their stops: one that follows a motion nearly is not to hit
+them."""
 RESERVE = 1e-6
 """Scaled distance kept from the bounds of inequalities along the path, for the time between."""
 
@@ -60,7 +65,12 @@ class PhaseUnknowns:
     force: Any
     """(2 nc, STAGES K) Forces at the Gauss points."""
     duration: Any
-    """Duration of a piece (s)."""
+    """Duration of the phase (s)."""
+
+    @property
+    def lengths(self) -> Floats:
+        """Shares of the phase that its pieces last, (K,)."""
+        return np.diff(breakpoints(self.v.shape[1]))
 
     def along(self, grid: Grid) -> tuple[Any, Any, Any]:
         """Positions and derivatives by the share of a piece at instants, (nv, N) each."""
@@ -79,6 +89,21 @@ class PhaseUnknowns:
         return self.force @ casadi.sparsify(casadi.DM(values))
 
 
+def breakpoints(pieces: int) -> Floats:
+    """Shares of a phase between which one polynomial holds, (K + 1,): closer near both ends.
+
+    Motions change fastest after a landing and before a foot leaves.
+    """
+    return np.asarray(0.5 * (1.0 - np.cos(np.pi * np.arange(pieces + 1) / pieces)))
+
+
+def phases_of(grid: Grid) -> Floats:
+    """Share of the phase that has gone by at instants, (N,)."""
+    ends = breakpoints(grid.pieces)
+    shares: Floats = ends[grid.piece] + np.diff(ends)[grid.piece] * grid.share
+    return shares
+
+
 def gauss_points(pieces: int) -> Grid:
     """Gauss points of all pieces of a phase."""
     nodes, weights = gauss(STAGES)
@@ -86,6 +111,11 @@ def gauss_points(pieces: int) -> Grid:
         pieces, np.repeat(np.arange(pieces), STAGES), np.tile(nodes, pieces),
         np.tile(weights, pieces) / pieces,
     )  # fmt: skip
+
+
+def looked_at(pieces: int) -> Grid:
+    """Gauss points of all pieces of a phase, and where the pieces end."""
+    return gauss_points(pieces).joined(endings(pieces))
 
 
 def beginnings(pieces: int) -> Grid:
@@ -164,16 +194,18 @@ class MotionProgram:
         for phase, stands, usual, mine in zip(
             request.phases, request.standing, request.usual, own, strict=True
         ):
-            pieces, piece = phase.pieces, usual / phase.pieces
+            pieces, piece = phase.pieces, usual * np.diff(breakpoints(phase.pieces))
+            rate, bend = (np.diag(x) for x in (piece, np.tile(piece**2, STAGES)))
             q = casadi.horzcat(start, casadi.reshape(mine[0], n, pieces))
             force = casadi.reshape(mine[3], len(stands.forces), STAGES * pieces)
             phases.append(
                 PhaseUnknowns(
                     q=q,
-                    v=piece * casadi.reshape(mine[1], n, pieces),
-                    a=piece**2 * casadi.reshape(mine[2], n, STAGES * pieces),
+                    v=casadi.reshape(mine[1], n, pieces) @ casadi.sparsify(casadi.DM(rate)),
+                    a=casadi.reshape(mine[2], n, STAGES * pieces)
+                    @ casadi.sparsify(casadi.DM(bend)),
                     force=self._spread(stands) @ force,
-                    duration=mine[4] / pieces,
+                    duration=mine[4],
                 )
             )
             start = q[:, -1]
@@ -199,8 +231,9 @@ class MotionProgram:
         self.labels: list[tuple[Row, int, float]] = []
         for p, (unknowns, grid) in enumerate(zip(phases, self.grids, strict=True)):
             count = grid.share.size
-            step = casadi.repmat(casadi.vertcat(unknowns.duration, distance), 1, count)
-            y = casadi.vertcat(*unknowns.along(grid), unknowns.forces(grid), step)
+            step = casadi.DM(unknowns.lengths[grid.piece]).T * unknowns.duration
+            far = casadi.repmat(distance, 1, count)
+            y = casadi.vertcat(*unknowns.along(grid), unknowns.forces(grid), step, far)
             weight = grid.weight * grid.pieces
             copies.append(Copies.of(functions.path, weight, x, y, numbers))
             low, high = self.path_bounds(p, grid)
@@ -209,14 +242,13 @@ class MotionProgram:
             upper.append(high.T[used.T])
             kept.append(used.T.ravel())
             for i, k in np.argwhere(used.T).tolist():
-                self.labels.append((functions.path_rows[k], p, float(grid.phases[i])))
+                self.labels.append((functions.path_rows[k], p, float(phases_of(grid)[i])))
         for p, impulse in enumerate(impulses):
             before = phases[p]
             after, piece = self._after(phases, p)
             _, arriving, _ = before.along(endings(request.phases[p].pieces))
-            y = casadi.vertcat(
-                before.q[:, -1], arriving[:, -1], after, impulse, before.duration, piece
-            )
+            own = before.lengths[-1] * before.duration
+            y = casadi.vertcat(before.q[:, -1], arriving[:, -1], after, impulse, own, piece)
             copies.append(Copies.of(functions.landing, np.zeros(1), x, y, numbers))
             low, high = self._landing_bounds(p)
             used = np.isfinite(low) | np.isfinite(high)
@@ -250,18 +282,15 @@ class MotionProgram:
         for unknowns in phases:
             pieces = unknowns.q.shape[1] - 1
             q_end, v_end, _ = unknowns.along(endings(pieces))
-            gaps += [
-                casadi.vec(unknowns.q[:, 1:] - q_end),
-                casadi.vec(unknowns.v[:, 1:] - v_end[:, :-1]),
-            ]
+            ratio = casadi.sparsify(casadi.DM(np.diag(1.0 / (pieces * unknowns.lengths))))
+            begin, end = unknowns.v @ ratio, v_end @ ratio
+            gaps += [casadi.vec(unknowns.q[:, 1:] - q_end), casadi.vec(begin[:, 1:] - end[:, :-1])]
         return gaps
 
     def _linear(self, phases: list[PhaseUnknowns], distance: Any) -> list[Any]:
         """What is asked of the whole motion, equations that are affine."""
         request = self.request
-        total = sum(
-            each.duration * phase.pieces for each, phase in zip(phases, request.phases, strict=True)
-        )
+        total = sum(each.duration for each in phases)
         rows = []
         if request.repeat is not Repeat.NEVER:
             rows.append(phases[0].q[0, 0])  # where it begins does not matter
@@ -270,19 +299,22 @@ class MotionProgram:
         if request.total is not None:
             rows.append(total - request.total)
         if request.start is not None:
-            rows.append(phases[0].v[:, 0] - phases[0].duration * casadi.DM(request.start.v))
+            piece = phases[0].lengths[0] * phases[0].duration
+            rows.append(phases[0].v[:, 0] - piece * casadi.DM(request.start.v))
         if request.end is not None:
             pieces = request.phases[-1].pieces
             _, v_end, _ = phases[-1].along(endings(pieces))
             rows.append(phases[-1].q[:, -1] - casadi.DM(request.end.q))
-            rows.append(v_end[:, -1] - phases[-1].duration * casadi.DM(request.end.v))
+            piece = phases[-1].lengths[-1] * phases[-1].duration
+            rows.append(v_end[:, -1] - piece * casadi.DM(request.end.v))
         return rows
 
     def _after(self, phases: list[PhaseUnknowns], p: int) -> tuple[Any, Any]:
         """Velocity just after a phase by the share of a piece, and the duration of that piece."""
-        if p + 1 < len(phases):
-            return phases[p + 1].v[:, 0], phases[p + 1].duration
-        return self.request.wrapped_velocity(phases[0].v[:, 0]), phases[0].duration
+        following = phases[(p + 1) % len(phases)]
+        piece, start = following.lengths[0] * following.duration, following.v[:, 0]
+        last = p + 1 == len(phases)
+        return self.request.wrapped_velocity(start) if last else start, piece
 
     def path_bounds(self, p: int, grid: Grid) -> tuple[Floats, Floats]:
         """Scaled bounds of the constraints along a phase, (rows, N) each; infinite if unused."""
@@ -290,13 +322,25 @@ class MotionProgram:
         stands, count = request.standing[p], grid.share.size
         lower = np.repeat([[row.lower] for row in rows], count, axis=1)
         upper = np.repeat([[row.upper] for row in rows], count, axis=1)
-        weighed = grid.weight > 0.0
+        weighed, ends = grid.weight > 0.0, grid.share == 1.0
+        stage = np.where(weighed, np.arange(count) % STAGES, -1)
+        free = np.full(count, True)  # whether the end of the piece is not given
+        if request.end is not None and p + 1 == len(request.phases):
+            free = grid.piece < grid.pieces - 1
         for k, row in enumerate(rows):
             used: Any = True
+            # A point that stands has no acceleration. Where a piece ends it is on the ground and at
+            # rest, in the place of two of four accelerations: nothing drifts.
             if row.kind is Kind.NORMAL_REST:
-                used = weighed & (row.of[0] in stands.normal)
+                inner = np.where(free, (stage == 1) | (stage == 2), weighed)
+                used = inner & (row.of[0] in stands.normal)
             elif row.kind is Kind.TANGENT_REST:
-                used = weighed & (row.of[0] in stands.tangent)
+                inner = np.where(free, (stage >= 0) & (stage < STAGES - 1), weighed)
+                used = inner & (row.of[0] in stands.tangent)
+            elif row.kind is Kind.NORMAL_STILL:
+                used = ends & free & (row.of[0] in stands.normal)
+            elif row.kind is Kind.TANGENT_STILL:
+                used = ends & free & (row.of[0] in stands.tangent)
             elif row.kind is Kind.MOTION:
                 used = weighed
             elif row.kind is Kind.PUSH:
@@ -305,9 +349,13 @@ class MotionProgram:
                 used = not stands.points.isdisjoint(row.of)
             elif row.kind is Kind.HEIGHT:
                 used = row.of[0] not in stands.points
-                lower[k] = request.clearance_of(p, row.of[0], grid.phases)
-            if row.kind not in EQUATIONS:
-                span = np.minimum(RESERVE, 0.5 * (upper[k] - lower[k]))
+                lower[k] = request.clearance_of(p, row.of[0], phases_of(grid))
+                if row.of[0] in stands.normal:
+                    used = ends & free
+                    lower[k] = upper[k] = 0.0
+            if not np.all(lower[k] == upper[k]):
+                kept = FROM_STOPS if row.kind is Kind.RANGE else RESERVE
+                span = np.minimum(kept, 0.5 * (upper[k] - lower[k]))
                 lower[k], upper[k] = lower[k] + span, upper[k] - span
             lower[k] = np.where(used, lower[k], -np.inf)
             upper[k] = np.where(used, upper[k], np.inf)
@@ -396,16 +444,18 @@ class MotionProgram:
         found += [np.zeros(len(each.forces)) for each in self.landings]
         return np.concatenate([*found, [distance]])
 
-    def pieces(self, unknowns: Floats) -> list[tuple[Floats, Floats, float]]:
-        """Coefficients (K, DEGREE + 1, nv), forces (STAGES K, nc, 2) and duration (s) of phases."""
+    def pieces(self, unknowns: Floats) -> list[tuple[Floats, Floats, Floats]]:
+        """Coefficients (K, DEGREE + 1, nv), forces (STAGES K, nc, 2) and breakpoints (s)."""
         phases, _, _ = self.parts(casadi.DM(unknowns))
         n, found = self.request.robot.nv, []
         for unknown in phases:
-            piece, pieces = float(unknown.duration), unknown.q.shape[1] - 1
-            values = np.array(
-                casadi.horzcat(unknown.q[:, :-1], unknown.v / piece, unknown.a / piece**2)
-            )
+            pieces = unknown.v.shape[1]
+            ends = float(unknown.duration) * breakpoints(pieces)
+            q, v, a = (np.array(part) for part in (unknown.q[:, :-1], unknown.v, unknown.a))
+            own = np.diff(ends)
+            values = np.concatenate([q, v / own, a / np.tile(own, STAGES) ** 2], axis=1)
             values = values.reshape(n, DEGREE + 1, pieces).transpose(2, 1, 0)
+            terms = [coefficients(each, length) for each, length in zip(values, own, strict=True)]
             force = np.array(unknown.force).T.reshape(STAGES * pieces, -1, 2)
-            found.append((coefficients(values, piece), force, piece * pieces))
+            found.append((np.array(terms), force, ends))
         return found

@@ -16,6 +16,8 @@ class Kind(enum.Enum):
     MOTION = ("equation of motion", "N or N m")
     NORMAL_REST = ("contact point that stays on the ground", "m/s²")
     TANGENT_REST = ("contact point that does not slide", "m/s²")
+    NORMAL_STILL = ("contact point that stays on the ground", "m/s")
+    TANGENT_STILL = ("contact point that does not slide ", "m/s")
     PUSH = ("contact point that pushes", "N")
     FRICTION = ("friction cone", "N")
     HEIGHT = ("contact point above the ground", "m")
