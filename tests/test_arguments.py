@@ -77,7 +77,11 @@ def usual() -> dict[str, dict[str, Any]]:
         "ContactPhase": {},
         "MotionTracking": {"robot": robot, "motion": None},
         "load_motion": {"path": "motion.json"},
-        "optimize_motion": {"robot": robot, "phases": [hs.ContactPhase("right_foot")], "speed": 0.4},
+        "optimize_motion": {
+            "robot": robot,
+            "phases": [hs.ContactPhase("right_foot")],
+            "speed": 0.4,
+        },
         "gait_family": {"robot": robot, "speed": [0.4]},
         "gait_sensitivity_norm": dict.fromkeys("ABCD", 0.5 * ONE),
         "human": {},

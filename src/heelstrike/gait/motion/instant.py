@@ -43,8 +43,8 @@ class Instants:
     ----------
     path : Block
         Variables are positions and two of their derivatives by the share of a piece, (nv,) each,
-        forces of all contact points, (2 nc,), duration of a piece (s), distance (m). The cost is
-        its rate times the duration of a piece.
+        forces of all contact points, (2 nc,), places where they stand, (nc,), duration of a piece
+        (s), distance (m). The cost is its rate times the duration of a piece.
     path_rows : list of Row
         What its constraints mean.
     landing : Block
@@ -82,11 +82,20 @@ class Instants:
             bias += [self.up @ moved, self.along @ moved]
         return np.array(heights, dtype=object), rows, np.array(bias, dtype=object)
 
+    def place(self, dynamics: TracedDynamics, contact: int) -> Any:
+        """Where a point stands along the ground (m): a disc rolls, and where it began to counts."""
+        ((_, link, center),) = dynamics.contact_centers([contact])
+        turned = dynamics.work.angle[link]
+        return self.along @ center - self.robot.model.contact_radius[contact] * turned
+
     def _build_path(self) -> None:
         robot, model = self.robot, self.robot.model
         n, weight = robot.nv, robot.weight
-        y = casadi.SX.sym("y", 3 * n + 2 * robot.nc + 2)
-        q, first, second, force = casadi.vertsplit(y[:-2], [0, n, 2 * n, 3 * n, y.numel() - 2])
+        y = casadi.SX.sym("y", 3 * (n + robot.nc) + 2)
+        places = y[-2 - robot.nc : -2]
+        q, first, second, force = casadi.vertsplit(
+            y[: -2 - robot.nc], [0, n, 2 * n, 3 * n, 3 * n + 2 * robot.nc]
+        )
         duration, distance = y[-2], y[-1]
         v, a = first / duration, symbols(second / duration**2)
         dynamics = TracedDynamics(robot, symbols(q), symbols(v))
@@ -106,6 +115,8 @@ class Instants:
                 rows.add(kind, accelerations[2 * i + k], subject=name, upper=0.0, unit=unit, of=i)
             for k, kind in enumerate((Kind.NORMAL_STILL, Kind.TANGENT_STILL)):
                 rows.add(kind, speeds[2 * i + k], subject=name, upper=0.0, of=i)
+            away = self.place(dynamics, i) - places[i]
+            rows.add(Kind.PLACE, away, subject=name, upper=0.0, of=i)
         self._add_cones(rows, pushes, (Kind.PUSH, Kind.FRICTION), weight)
         for i, name in enumerate(robot.contact_names):
             rows.add(Kind.HEIGHT, heights[i], subject=name, of=i)

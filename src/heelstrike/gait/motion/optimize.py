@@ -10,6 +10,7 @@ import casadi
 import numpy as np
 
 from heelstrike.arguments import takes
+from heelstrike.dynamics import contact_positions
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.cost import Cost, OwnCost, costs_of
 from heelstrike.gait.gait import fingerprint
@@ -21,10 +22,14 @@ from heelstrike.gait.motion.program import (
     EQUATIONS,
     STAGES,
     MotionProgram,
+    beginnings,
+    endings,
     gauss_points,
     looked_at,
+    phases_of,
 )
 from heelstrike.gait.motion.request import MotionRequest, Repeat
+from heelstrike.gait.motion.rows import Kind
 from heelstrike.gait.polynomials import Instants as Grid
 from heelstrike.gait.program import FEASIBLE
 from heelstrike.robot.loops import refuse_loops
@@ -136,6 +141,8 @@ def optimize_motion(
     )
     report(0.1)
     unknowns, optimal = _solved(program, starts, report)
+    program, unknowns, optimal = _refined(program, unknowns, optimal)
+    report(0.9)
     program, unknowns, optimal = _held_between(program, unknowns, optimal)
     report(1.0)
     return _motion(program, unknowns, optimal)
@@ -190,11 +197,44 @@ def _checked(
         robot=robot, phases=tuple(phases), repeat=goes_on, cost=costs_of(cost), speed=speed,
         total=duration, distance=(low, high), **others,
     )  # fmt: skip
+    _check_states(request)
     if goes_on is not Repeat.NEVER and not any(each.points for each in request.standing):
         raise GaitError("a motion that repeats needs a phase in which something stands")
     return request
 
 
+def _check_states(request: MotionRequest) -> None:
+    """Refuse given states in which what stands is not on the ground, or not where it was."""
+    robot, told = request.robot, {}
+    along = np.array([np.cos(request.slope), np.sin(request.slope)])
+    up = np.array([-along[1], along[0]])
+    for name, state, stands in (
+        ("start", request.start, request.standing[0]),
+        ("end", request.end, request.standing[-1]),
+    ):
+        if state is None:
+            continue
+        centers = contact_positions(robot, state.q)
+        heights = centers @ up - robot.model.contact_radius
+        for i in sorted(stands.points):
+            if abs(heights[i]) > ON_THE_GROUND:
+                raise GaitError(
+                    f"{robot.contact_names[i]!r} stands, but at the {name} it is "
+                    f"{heights[i]:.3g} m away from the ground. Give a state in which it touches."
+                )
+        told[name] = centers @ along
+    if len(told) == 2:
+        for i in frozenset.intersection(*(each.points for each in request.standing)):
+            moved = told["end"][i] - told["start"][i]
+            if robot.model.contact_radius[i] == 0.0 and abs(moved) > ON_THE_GROUND:
+                raise GaitError(
+                    f"{robot.contact_names[i]!r} stands all the time, but from start to end it "
+                    f"would have to move by {moved:.3g} m. Move one of the states."
+                )
+
+
+ON_THE_GROUND = 1e-6
+"""Distance (m) within which a point touches, or is where it was."""
 STEEPEST = 1.0
 """Slope (rad) from which on no motion is looked for."""
 FARTHEST = 5.0
@@ -257,6 +297,69 @@ def _not_found(program: MotionProgram, unknowns: Floats) -> str:
     )
 
 
+def _refined(
+    program: MotionProgram, unknowns: Floats, optimal: bool
+) -> tuple[MotionProgram, Floats, bool]:
+    """Double the pieces of phases in which points that stand move between the ends of pieces."""
+    while True:
+        request, phases = program.request, []
+        for p, phase in enumerate(request.phases):
+            moves = _slip(program, unknowns, p) > STILL
+            more = min(2 * phase.pieces, MOST_PIECES) if moves else phase.pieces
+            phases.append(ContactPhase(*phase.contacts, duration=phase.duration, pieces=more))
+        if [each.pieces for each in phases] == [each.pieces for each in request.phases]:
+            return program, unknowns, optimal
+        finer = replace(
+            program, request=replace(request, phases=tuple(phases)),
+            grids=tuple(looked_at(phase.pieces) for phase in phases), near=True,
+        )  # fmt: skip
+        found, _, told = finer.solve(_resampled(program, unknowns, finer))
+        if np.abs(finer.violations(found)).max() > FEASIBLE:
+            raise InfeasibleGaitError(_not_found(finer, found))
+        program, unknowns, optimal = finer, found, told["return_status"] == "Solve_Succeeded"
+
+
+def _slip(program: MotionProgram, unknowns: Floats, p: int) -> float:
+    """Largest velocity (m/s) of a point that stands, anywhere in a phase."""
+    stands = program.request.standing[p]
+    _, rows = _rows_at(program, unknowns, p, _fine(program.request.phases[p].pieces))
+    still = [
+        k
+        for k, row in enumerate(program.functions.path_rows)
+        if (row.kind is Kind.NORMAL_STILL and row.of[0] in stands.normal)
+        or (row.kind is Kind.TANGENT_STILL and row.of[0] in stands.tangent)
+    ]
+    return float(np.abs(rows[still]).max(initial=0.0))
+
+
+def _resampled(program: MotionProgram, unknowns: Floats, finer: MotionProgram) -> Floats:
+    """Unknowns of a finer program for the same motion."""
+    _, impulses, distance = program.parts(casadi.DM(unknowns))
+    motion = _phases(program, unknowns)
+    positions, velocities, accelerations, forces = [], [], [], []
+    for own, phase in zip(motion, finer.request.phases, strict=True):
+        at = [
+            own.duration * phases_of(grid_of(phase.pieces))
+            for grid_of in (endings, beginnings, gauss_points)
+        ]
+        positions.append(own.coordinates(at[0]).T)
+        velocities.append(own.coordinates(at[1], order=1).T)
+        bend = own.coordinates(at[2], order=2).T
+        accelerations.append(bend.reshape(-1, phase.pieces, STAGES))
+        forces.append(own.forces(at[2]).reshape(at[2].size, -1).T)
+    durations = np.array([own.duration for own in motion])
+    return finer.packed(
+        positions, velocities, accelerations, forces, durations, float(distance),
+        [np.array(each).ravel() for each in impulses],
+    )  # fmt: skip
+
+
+STILL = 3e-4
+"""Velocity (m/s) that a point that stands may have between the ends of pieces."""
+MOST_PIECES = 48
+"""Pieces of a phase beyond which the mesh is not refined."""
+
+
 def _fine(pieces: int) -> Grid:
     """Instants at which limits are checked."""
     count = FINER * STAGES
@@ -274,7 +377,8 @@ def _rows_at(program: MotionProgram, unknowns: Floats, p: int, grid: Grid) -> tu
     request = program.request
     step = casadi.DM(own.lengths[grid.piece]).T * own.duration
     far = casadi.repmat(distance, 1, count)
-    y = casadi.vertcat(*own.along(grid), own.forces(grid), step, far)
+    places = casadi.repmat(own.places, 1, count)
+    y = casadi.vertcat(*own.along(grid), own.forces(grid), places, step, far)
     numbers = casadi.repmat(casadi.DM([request.slope, request.friction]), 1, count)
     cost, rows = program.functions.path.value.map(count)(y, numbers)
     return np.array(cost).ravel(), np.array(rows)
@@ -314,31 +418,19 @@ ALLOWED = 1e-5
 
 def _motion(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
     request, robot = program.request, program.request.robot
-    _, impulses, distance = program.parts(casadi.DM(unknowns))
+    _, _, distance = program.parts(casadi.DM(unknowns))
     effort, spent = 0.0, float(program.value(unknowns)[0])
     if program.functions.per_metre:
         spent *= float(distance)
-    phases, margins = [], dict[str, float]()
+    margins = dict[str, float]()
     torque = Instants(robot, costs_of("torque"), per_metre=False)
     plain = replace(program, functions=torque)
-    for p, (pieces, force, ends) in enumerate(program.pieces(unknowns)):
-        grid = gauss_points(len(pieces))
+    phases = _phases(program, unknowns)
+    for p, phase in enumerate(phases):
+        grid = gauss_points(len(phase.pieces))
         rates, _ = _rows_at(plain, unknowns, p, grid)
         effort += float(rates @ grid.weight) * grid.pieces
         _add_margins(program, unknowns, p, margins)
-        standing = request.standing[p].points
-        impulse = np.zeros((robot.nc, 2))
-        if p < len(impulses):
-            impulse = np.array(impulses[p]).reshape(robot.nc, 2)
-        phases.append(
-            MotionPhase(
-                contacts=tuple(robot.contact_names[i] for i in sorted(standing)),
-                breakpoints=ends,
-                pieces=pieces,
-                force=force.reshape(len(pieces), STAGES, robot.nc, 2),
-                impulse=impulse,
-            )
-        )
     mirror = robot.mirror
     n, own = robot.nv, mirror is not None
     first = phases[0].pieces[0]
@@ -362,6 +454,27 @@ def _motion(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
     )
 
 
+def _phases(program: MotionProgram, unknowns: Floats) -> list[MotionPhase]:
+    """Return the phases of a motion with the given unknowns."""
+    request, robot = program.request, program.request.robot
+    _, impulses, _ = program.parts(casadi.DM(unknowns))
+    phases = []
+    for p, (pieces, force, ends) in enumerate(program.pieces(unknowns)):
+        impulse = np.zeros((robot.nc, 2))
+        if p < len(impulses):
+            impulse = np.array(impulses[p]).reshape(robot.nc, 2)
+        phases.append(
+            MotionPhase(
+                contacts=tuple(robot.contact_names[i] for i in sorted(request.standing[p].points)),
+                breakpoints=ends,
+                pieces=pieces,
+                force=force.reshape(len(pieces), STAGES, robot.nc, 2),
+                impulse=impulse,
+            )
+        )
+    return phases
+
+
 def _add_margins(
     program: MotionProgram, unknowns: Floats, p: int, margins: dict[str, float]
 ) -> None:
@@ -372,9 +485,9 @@ def _add_margins(
     for k, row in enumerate(program.functions.path_rows):
         if row.kind in EQUATIONS or not np.any(lower[k] < upper[k]):
             continue
-        room = np.minimum(rows[k] - lower[k], upper[k] - rows[k])
-        room = room[np.isfinite(room)]
+        used = np.isfinite(lower[k]) | np.isfinite(upper[k])
+        least = lower[k] if row.kind is Kind.HEIGHT else row.lower
+        room = np.minimum(rows[k] - least, row.upper - rows[k])[used]
         if room.size:
             name = row.kind.name.lower()
-            least = float(room.min()) * row.unit
-            margins[name] = min(margins.get(name, np.inf), least)
+            margins[name] = min(margins.get(name, np.inf), float(room.min()) * row.unit)

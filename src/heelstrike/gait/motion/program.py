@@ -9,6 +9,7 @@ from typing import Any
 import casadi
 import numpy as np
 
+from heelstrike.dynamics import contact_positions, link_poses
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.blocks import BlockProgram, Copies
 from heelstrike.gait.motion.instant import Instants
@@ -27,6 +28,7 @@ DEGREE = STAGES + 1
 """Degree of the polynomials."""
 EQUATIONS = {
     Kind.MOTION, Kind.NORMAL_REST, Kind.TANGENT_REST, Kind.NORMAL_STILL, Kind.TANGENT_STILL,
+    Kind.PLACE,
 }  # fmt: skip
 """Kinds of constraint along the path that are equations."""
 MORE_ITERATIONS = {"max_iter": 300}
@@ -34,8 +36,10 @@ BEGIN = {"mu_init": 1e-2}
 """Settings of IPOPT: phases of free duration take more iterations than a step, and fewer from this
 barrier parameter than from IPOPT's own 0.1."""
 FROM_STOPS = 1e-3
-"""Distance (rad, m) that joints keep from their stops: one that follows a motion nearly is not to hit
-them."""
+"""Distance (rad, m) that joints keep from their stops: a robot that follows a motion nearly is not
+to hit them."""
+PARTS = 6
+"""Kinds of unknowns of a phase."""
 RESERVE = 1e-6
 """Scaled distance kept from the bounds of inequalities along the path, for the time between."""
 
@@ -64,6 +68,8 @@ class PhaseUnknowns:
     """(nv, (STAGES) K) Parts of the accelerations, all first parts first."""
     force: Any
     """(2 nc, STAGES K) Forces at the Gauss points."""
+    places: Any
+    """(nc,) Where the points stand along the ground (m); of the others nothing is meant."""
     duration: Any
     """Duration of the phase (s)."""
 
@@ -114,8 +120,9 @@ def gauss_points(pieces: int) -> Grid:
 
 
 def looked_at(pieces: int) -> Grid:
-    """Gauss points of all pieces of a phase, and where the pieces end."""
-    return gauss_points(pieces).joined(endings(pieces))
+    """Gauss points of all pieces of a phase, where the pieces end, and where the first begins."""
+    begin = Grid(pieces, np.zeros(1, np.int64), np.zeros(1), np.zeros(1))
+    return gauss_points(pieces).joined(endings(pieces)).joined(begin)
 
 
 def beginnings(pieces: int) -> Grid:
@@ -134,8 +141,8 @@ class MotionProgram:
 
     Unknowns are, phase by phase: positions at the ends of the pieces, velocities at their
     beginnings and parts of the accelerations (as they are in a phase of its usual duration), the
-    forces that the contact points may exert at the Gauss points, in units of the weight, and the
-    duration; then the impulses of every landing; then the distance.
+    forces that the contact points may exert at the Gauss points, in units of the weight, the places
+    where they stand, and the duration; then the impulses of every landing; then the distance.
     """
 
     request: MotionRequest
@@ -154,7 +161,7 @@ class MotionProgram:
         for phase, stands in zip(request.phases, request.standing, strict=True):
             pieces = phase.pieces
             sizes += [n * pieces, n * pieces, STAGES * n * pieces]
-            sizes += [len(stands.forces) * STAGES * pieces, 1]
+            sizes += [len(stands.forces) * STAGES * pieces, len(stands.tangent), 1]
         sizes += [len(each.forces) for each in self.landings]
         self._ends = [0, *np.cumsum([*sizes, 1]).tolist()]
         self._build()
@@ -187,7 +194,7 @@ class MotionProgram:
         pieces_of = [x[k:end] for k, end in pairwise(self._ends)]
         distance = pieces_of[-1]
         count = len(request.phases)
-        own = [pieces_of[5 * p : 5 * p + 5] for p in range(count)]
+        own = [pieces_of[PARTS * p : PARTS * (p + 1)] for p in range(count)]
         last = casadi.reshape(own[-1][0], n, -1)[:, -1]
         start = request.start_position(last, distance)
         phases = []
@@ -205,13 +212,14 @@ class MotionProgram:
                     a=casadi.reshape(mine[2], n, STAGES * pieces)
                     @ casadi.sparsify(casadi.DM(bend)),
                     force=self._spread(stands) @ force,
-                    duration=mine[4],
+                    places=self._placed(stands) @ mine[4],
+                    duration=mine[5],
                 )
             )
             start = q[:, -1]
         impulses = [
             self.functions.second * (self._spread(each) @ part)
-            for each, part in zip(self.landings, pieces_of[5 * count : -1], strict=True)
+            for each, part in zip(self.landings, pieces_of[PARTS * count : -1], strict=True)
         ]
         return phases, impulses, distance
 
@@ -220,6 +228,12 @@ class MotionProgram:
         spread = np.zeros((2 * self.request.robot.nc, len(stands.forces)))
         spread[stands.forces, np.arange(len(stands.forces))] = self.request.robot.weight
         return casadi.sparsify(casadi.DM(spread))
+
+    def _placed(self, stands: Standing) -> Any:
+        """Matrix that puts unknown places where they belong."""
+        placed = np.zeros((self.request.robot.nc, len(stands.tangent)))
+        placed[list(stands.tangent), np.arange(len(stands.tangent))] = 1.0
+        return casadi.sparsify(casadi.DM(placed))
 
     def _build(self) -> None:
         request, functions = self.request, self.functions
@@ -233,7 +247,8 @@ class MotionProgram:
             count = grid.share.size
             step = casadi.DM(unknowns.lengths[grid.piece]).T * unknowns.duration
             far = casadi.repmat(distance, 1, count)
-            y = casadi.vertcat(*unknowns.along(grid), unknowns.forces(grid), step, far)
+            places = casadi.repmat(unknowns.places, 1, count)
+            y = casadi.vertcat(*unknowns.along(grid), unknowns.forces(grid), places, step, far)
             weight = grid.weight * grid.pieces
             copies.append(Copies.of(functions.path, weight, x, y, numbers))
             low, high = self.path_bounds(p, grid)
@@ -330,13 +345,15 @@ class MotionProgram:
         for k, row in enumerate(rows):
             used: Any = True
             # A point that stands has no acceleration. Where a piece ends it is on the ground and at
-            # rest, in the place of two of four accelerations: nothing drifts.
+            # rest, in the place of two of four accelerations: nothing drifts. A given state at the
+            # end says the same.
             if row.kind is Kind.NORMAL_REST:
-                inner = np.where(free, (stage == 1) | (stage == 2), weighed)
-                used = inner & (row.of[0] in stands.normal)
+                used = ((stage == 1) | (stage == 2)) & (row.of[0] in stands.normal)
             elif row.kind is Kind.TANGENT_REST:
-                inner = np.where(free, (stage >= 0) & (stage < STAGES - 1), weighed)
-                used = inner & (row.of[0] in stands.tangent)
+                used = ((stage == 1) | (stage == 2)) & (row.of[0] in stands.tangent)
+            elif row.kind is Kind.PLACE:
+                begins = (grid.piece == 0) & (grid.share == 0.0)
+                used = (begins | (ends & free)) & (row.of[0] in stands.tangent)
             elif row.kind is Kind.NORMAL_STILL:
                 used = ends & free & (row.of[0] in stands.normal)
             elif row.kind is Kind.TANGENT_STILL:
@@ -391,7 +408,7 @@ class MotionProgram:
         """Solve from a guess; return the unknowns, the multipliers and what IPOPT tells."""
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         for p, phase in enumerate(self.request.phases):
-            place = self._ends[5 * p + 4]
+            place = self._ends[PARTS * (p + 1) - 1]
             lower[place], upper[place] = phase.duration
         lower[-1], upper[-1] = self.request.distance
         more = {} if multipliers is None else {"lam_g0": multipliers}
@@ -411,6 +428,7 @@ class MotionProgram:
     def packed(
         self, positions: list[Floats], velocities: list[Floats], accelerations: list[Floats],
         forces: list[Floats], durations: Floats, distance: float,
+        impulses: list[Floats] | None = None,
     ) -> Floats:  # fmt: skip
         """Unknowns of a motion: at the ends of pieces, their beginnings and the Gauss points.
 
@@ -426,6 +444,8 @@ class MotionProgram:
             Durations (s).
         distance : float
             Distance (m).
+        impulses : list of (2 nc,) array, optional
+            Impulses of every landing (N s).
         """
         nodes, _ = gauss(STAGES)
         basis = np.polynomial.legendre.legvander(2.0 * nodes - 1.0, STAGES - 1)
@@ -439,10 +459,24 @@ class MotionProgram:
                 positions[p].ravel(order="F"), rate * velocities[p].ravel(order="F"),
                 rate**2 * parts.transpose(0, 2, 1).ravel(),
                 (forces[p][request.standing[p].forces] / request.robot.weight).ravel(order="F"),
-                durations[p : p + 1],
+                self._places_at(positions[p][:, 0], request.standing[p]), durations[p : p + 1],
             ]  # fmt: skip
-        found += [np.zeros(len(each.forces)) for each in self.landings]
+        unit = request.robot.weight * self.functions.second
+        given = impulses or [np.zeros(2 * request.robot.nc)] * len(self.landings)
+        found += [
+            np.asarray(impulse)[each.forces] / unit
+            for each, impulse in zip(self.landings, given, strict=True)
+        ]
         return np.concatenate([*found, [distance]])
+
+    def _places_at(self, q: Floats, stands: Standing) -> Floats:
+        """Where the points that stand are along the ground."""
+        robot = self.request.robot
+        along = np.array([np.cos(self.request.slope), np.sin(self.request.slope)])
+        centers, angles = contact_positions(robot, q), link_poses(robot, q).angle
+        rolled = robot.model.contact_radius * angles[robot.model.contact_link]
+        places: Floats = (centers @ along - rolled)[list(stands.tangent)]
+        return places
 
     def pieces(self, unknowns: Floats) -> list[tuple[Floats, Floats, Floats]]:
         """Coefficients (K, DEGREE + 1, nv), forces (STAGES K, nc, 2) and breakpoints (s)."""
