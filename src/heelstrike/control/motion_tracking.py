@@ -61,8 +61,8 @@ class Parameters(Bundle):
     kp: Floats = array("nu")
     kd: Floats = array("nu")
     """kp, kd: Gains (1/s², 1/s)."""
-    price: float = number(float)
-    """ε, of forces in N."""
+    weight: float = number(float)
+    """Of the robot (N)."""
     earliest: float = number(float)
     latest: float = number(float)
     """earliest, latest: Shares of a phase, see :data:`EARLIEST` and :data:`LATEST`."""
@@ -119,12 +119,12 @@ def solve_for_nearest(
 ) -> None:
     """Find v̇ and λ nearest to what is wanted, the first unknowns.
 
-    Unknowns are v̇ (nv,), the `count` forces along the rows that hold, and multipliers of the
-    equations of motion and of the rows.
+    Unknowns are v̇ (nv,), the `count` forces along the rows that hold in units of the weight, and
+    multipliers of the equations of motion and of the rows.
     """
     n, free = robot.nv, robot.unactuated.shape[0]
     size = n + count + free + count
-    system = memory.system
+    system, weight = memory.system, parameters.weight
     for i in range(size):
         for j in range(size + 1):
             system[i, j] = 0.0
@@ -133,15 +133,15 @@ def solve_for_nearest(
         system[joint, joint] = 1.0
         system[joint, size] = memory.wanted[joint]
     for k in range(count):
-        system[n + k, n + k] = parameters.price
-        system[n + k, size] = parameters.price * memory.reference[memory.held[k]]
+        system[n + k, n + k] = PRICE_OF_FORCES
+        system[n + k, size] = PRICE_OF_FORCES * memory.reference[memory.held[k]] / weight
     for f in range(free):
         j, row = robot.unactuated[f], n + count + f
         for i in range(n):
-            system[row, i] = system[i, row] = memory.mass[j, i]
+            system[row, i] = system[i, row] = memory.mass[j, i] / weight
         for k in range(count):
             system[row, n + k] = system[n + k, row] = -memory.jacobian[memory.held[k], j]
-        system[row, size] = memory.passive[j] - memory.bias[j]
+        system[row, size] = (memory.passive[j] - memory.bias[j]) / weight
     for k in range(count):
         row = n + count + free + k
         for i in range(n):
@@ -192,11 +192,11 @@ def motion_tracking(
             if parameters.stands[phase, row] == 1:
                 memory.held[count] = row
                 count += 1
-    force, reference = parameters.force[piece], memory.reference
-    for row in range(force.shape[1]):
+    terms, reference = parameters.force[piece], memory.reference
+    for row in range(terms.shape[1]):
         reference[row] = 0.0
-        for k in range(force.shape[0] - 1, -1, -1):
-            reference[row] = reference[row] * inside + force[k, row]
+        for k in range(terms.shape[0] - 1, -1, -1):
+            reference[row] = reference[row] * inside + terms[k, row]
     solve_for_nearest(count, robot, parameters, memory)
     for i in range(robot.nu):
         j = robot.model.actuator_joint[i]
@@ -204,7 +204,8 @@ def motion_tracking(
         for k in range(robot.nv):
             total += memory.mass[j, k] * memory.unknown[k]
         for k in range(count):
-            total -= memory.jacobian[memory.held[k], j] * memory.unknown[robot.nv + k]
+            force = parameters.weight * memory.unknown[robot.nv + k]
+            total -= memory.jacobian[memory.held[k], j] * force
         torque[i] = total
 
 
@@ -258,7 +259,7 @@ class MotionTracking(Law):
             following=np.array(starts),
             kp=gains_of("kp", kp, robot),
             kd=gains_of("kd", kd, robot),
-            price=PRICE_OF_FORCES / robot.weight**2,
+            weight=robot.weight,
             earliest=EARLIEST,
             latest=LATEST,
         )

@@ -265,3 +265,91 @@ def test_what_is_not_found_names_its_constraints(rabbit: hs.Robot) -> None:
     with pytest.raises(hs.InfeasibleGaitError, match="does not mean that there is none") as caught:
         hs.optimize_motion(rabbit, phases, distance=2.0, starts=1)
     assert "in phase 1" in str(caught.value)
+
+
+# Followed by MotionTracking
+
+
+def followed(
+    robot: hs.Robot, motion: hs.Motion, method: object, cycles: float = 1.0, **gains: float
+) -> hs.Run:
+    run = hs.simulate(
+        robot,
+        hs.MotionTracking(robot, motion, **gains),
+        state=motion.initial_state,
+        duration=cycles * motion.duration,
+        method=method,
+        ground=hs.Ground(friction=motion.friction, slope=motion.slope),
+    )
+    assert run.completed, run.message
+    return run
+
+
+def largest_error(run: hs.Run, motion: hs.Motion) -> float:
+    """Of a coordinate, at rows that are not just at a touchdown."""
+    apart = np.abs(run.time % motion.duration - motion.duration) > 1e-4
+    return float(np.abs(run.position - motion.position(run.time))[apart].max())
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_event_driven_it_moves_as_designed(name: str, request: pytest.FixtureRequest) -> None:
+    """In each phase what is to stand stands, and phases end when they are to end."""
+    motion, robot = request.getfixturevalue(name), robot_of(name, request)
+    run = followed(robot, motion, hs.EventDriven(rtol=1e-9, atol=1e-11))
+    assert largest_error(run, motion) < 3e-5
+    down = [e.time for e in run.events if e.kind is hs.sim.EventKind.TOUCHDOWN]
+    planned = [
+        end
+        for end, phase in zip(motion.ends, motion.phases, strict=True)
+        if phase.impulse.any() and end < run.time[-1] - 1e-9
+    ]
+    for end in planned:
+        assert min(abs(t - end) for t in down) < 1e-5
+    for end, phase in zip(motion.ends, motion.phases, strict=True):
+        row = np.searchsorted(run.time, end - 0.5 * phase.duration)
+        touching = {robot.contact_names[i] for i in np.flatnonzero(run.contact_force[row, :, 0])}
+        assert touching == set(phase.contacts)
+
+
+def test_time_stepping_comes_near(limping: hs.Motion, rabbit: hs.Robot) -> None:
+    """The difference falls with the step."""
+    errors = [
+        largest_error(followed(rabbit, limping, hs.TimeStepping(step=step), 0.95), limping)
+        for step in (1e-3, 2.5e-4)
+    ]
+    assert errors[0] < 0.02
+    assert errors[1] < 0.4 * errors[0]
+
+
+def test_two_feet_share_the_load_as_the_motion_says(bravo7: hs.Robot, rising: hs.Motion) -> None:
+    """Normal forces of each foot follow the motion's, though the feet could share otherwise."""
+    run = followed(bravo7, rising, hs.EventDriven(), 0.99)
+    rows = np.flatnonzero((run.time > 0.05) & (run.time < 0.95 * rising.duration))[::5]
+    wanted = rising.phases[0].forces(run.time[rows])
+    for foot in bravo7.feet:
+        points = list(foot.contacts)
+        found = run.contact_force[rows][:, points, 0].sum(axis=1)
+        np.testing.assert_allclose(found, wanted[:, points, 0].sum(axis=1), atol=1.0)
+
+
+def test_feedback_brings_joints_back(bravo7: hs.Robot, uphill: hs.Motion) -> None:
+    """Joints of a flat foot obey ë + kd ė + kp e = 0, whatever the motion."""
+    state = uphill.initial_state
+    knee = int(bravo7.model.actuator_joint[-2])  # of the leg in the air
+    v = state.v.copy()
+    rises = dynamics.contact_jacobian(bravo7, state.q)[-1, 0, knee]
+    faster = 0.2 * float(np.sign(rises))
+    v[knee] += faster
+    law = hs.MotionTracking(bravo7, uphill, kp=400.0, kd=40.0)
+    ground = hs.Ground(friction=uphill.friction, slope=uphill.slope)
+    start, method = hs.State(state.q, v), hs.EventDriven()
+    run = hs.simulate(bravo7, law, state=start, duration=0.2, method=method, ground=ground)
+    gone = run.position[:, knee] - uphill.position(run.time)[:, knee]
+    critical = faster * run.time * np.exp(-20.0 * run.time)
+    assert np.abs(critical).max() > 3e-3
+    np.testing.assert_allclose(gone, critical, atol=1e-5)
+
+
+def test_a_motion_of_another_robot_is_refused(running: hs.Motion, bravo7: hs.Robot) -> None:
+    with pytest.raises(hs.GaitError, match="designed for robot 'rabbit'"):
+        hs.MotionTracking(bravo7, running)

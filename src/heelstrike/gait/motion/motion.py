@@ -87,7 +87,8 @@ class MotionPhase:
         nodes, _ = gauss(stages)
         times = np.diff(self.breakpoints)[:, None] * nodes
         powers = times[..., None] ** np.arange(stages)
-        return np.linalg.solve(powers, self.force.reshape(count, stages, -1))
+        terms: Floats = np.linalg.solve(powers, self.force.reshape(count, stages, -1))
+        return terms
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -35,6 +35,7 @@ from heelstrike.gait.program import FEASIBLE
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.robot.state import State
 
 STARTS = ((0.0, 0.95), (0.1, 0.9), (0.0, 0.85))
@@ -284,7 +285,7 @@ def _solved(
 def _not_found(program: MotionProgram, unknowns: Floats) -> str:
     """Say which constraints are violated most where the optimiser came nearest."""
     missing = np.abs(program.violations(unknowns))[program.linear :]
-    lines = []
+    lines: list[str] = []
     for k in np.argsort(-missing)[:50]:
         row, phase, _ = program.labels[k]
         text = f"{row.kind.text} ({row.subject}) in phase {phase + 1}"
@@ -431,8 +432,7 @@ def _motion(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
         rates, _ = _rows_at(plain, unknowns, p, grid)
         effort += float(rates @ grid.weight) * grid.pieces
         _add_margins(program, unknowns, p, margins)
-    mirror = robot.mirror
-    n, own = robot.nv, mirror is not None
+    mirror = robot.mirror or _itself(robot)
     first = phases[0].pieces[0]
     return Motion(
         robot=robot.name,
@@ -442,16 +442,22 @@ def _motion(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
         distance=float(distance),
         slope=request.slope,
         friction=request.friction,
-        mirror_joint=mirror.joint if own else np.arange(n),
-        mirror_sign=mirror.sign if own else np.ones(n),
-        mirror_offset=mirror.offset if own else np.zeros(n),
-        mirror_contact=mirror.contact if own else np.arange(robot.nc),
+        mirror_joint=mirror.joint,
+        mirror_sign=mirror.sign,
+        mirror_offset=mirror.offset,
+        mirror_contact=mirror.contact,
         initial_state=State(first[0].copy(), first[1].copy()),
         cost=effort,
         spent=spent,
         optimal=optimal,
         margins=margins,
     )
+
+
+def _itself(robot: Robot) -> Mirror:
+    """Mirror that changes nothing."""
+    nv, nc, nf = np.arange(robot.nv), np.arange(robot.nc), np.arange(len(robot.feet))
+    return Mirror(nv, np.ones(robot.nv), nc, nf, np.zeros(robot.nq))
 
 
 def _phases(program: MotionProgram, unknowns: Floats) -> list[MotionPhase]:
