@@ -74,8 +74,6 @@ def usual() -> dict[str, dict[str, Any]]:
         "disturbance_response": {**walked, "disturbances": {}},
         "find_limit_cycle": walked,
         "floquet_multipliers": walked,
-        "ContactPhase": {},
-        "MotionTracking": {"robot": robot, "motion": None},
         "load_motion": {"path": "motion.json"},
         "optimize_motion": {
             "robot": robot,
@@ -116,8 +114,8 @@ RESULTS = """ActiveContacts BatchResult DisturbanceResponse Floquet Gait GaitFam
 LimitCycle ModeChange Monodromy Motion PhasedGait Robot Run RunDerivatives Snapshot StepDerivatives
 StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
-TOLD_APART = """Bundle Constraint EndOfRun GaitLQR GroundShape SteppingConstraints
-VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell controller number part
+TOLD_APART = """Bundle Constraint ContactPhase EndOfRun GaitLQR GroundShape MotionTracking
+SteppingConstraints VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell controller number part
 watch"""
 """Declarations of controllers, laws, classes to derive from, and the viewer, whose own tests have
 this."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from heelstrike.dynamics import contact_positions, inverse_kinematics
 from heelstrike.errors import RobotError
@@ -31,6 +30,8 @@ CYCLES = 2
 
 def guess_of(program: MotionProgram, *, lean: float = 0.0, lowered: float = LOWERED) -> Floats:
     """Return unknowns to start from."""
+    from scipy.interpolate import CubicSpline  # takes long to import
+
     request = program.request
     durations = request.usual
     distance = _distance(request, durations)

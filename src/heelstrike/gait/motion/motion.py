@@ -87,8 +87,8 @@ class MotionPhase:
         nodes, _ = gauss(stages)
         times = np.diff(self.breakpoints)[:, None] * nodes
         powers = times[..., None] ** np.arange(stages)
-        terms: Floats = np.linalg.solve(powers, self.force.reshape(count, stages, -1))
-        return terms
+        given = self.force.reshape(count, stages, -1)
+        return np.asarray(np.linalg.solve(powers, given), np.float64)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

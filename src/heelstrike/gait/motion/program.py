@@ -40,7 +40,7 @@ FROM_STOPS = 1e-3
 to hit them."""
 PARTS = 6
 """Kinds of unknowns of a phase."""
-RESERVE = 1e-6
+FROM_LIMITS = 1e-6
 """Scaled distance kept from the bounds of inequalities along the path, for the time between."""
 
 
@@ -371,7 +371,7 @@ class MotionProgram:
                     used = ends & free
                     lower[k] = upper[k] = 0.0
             if not np.all(lower[k] == upper[k]):
-                kept = FROM_STOPS if row.kind is Kind.RANGE else RESERVE
+                kept = FROM_STOPS if row.kind is Kind.RANGE else FROM_LIMITS
                 span = np.minimum(kept, 0.5 * (upper[k] - lower[k]))
                 lower[k], upper[k] = lower[k] + span, upper[k] - span
             lower[k] = np.where(used, lower[k], -np.inf)
