@@ -115,8 +115,8 @@ LimitCycle ModeChange Monodromy Motion PhasedGait Robot Run RunDerivatives Snaps
 StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
 TOLD_APART = """Bundle Constraint ContactPhase EndOfRun GaitLQR GroundShape MotionTracking
-SteppingConstraints VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell controller number part
-watch"""
+SteppingConstraints VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell
+controller number part watch"""
 """Declarations of controllers, laws, classes to derive from, and the viewer, whose own tests have
 this."""
 WRONG = ("0.5", None, object(), ["a"], {"a": 1}, 1j, b"x", [[1, [2]]], 2.5, hs.load_robot)
