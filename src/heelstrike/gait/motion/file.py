@@ -21,7 +21,7 @@ from heelstrike.whole_file import write_whole
 
 VERSION = 1
 LARGEST_NUMBER = 1e15
-"""No number of a motion is larger, in any unit: pieces are short, and their last coefficients large."""
+"""No number of a motion is larger, in any unit: last coefficients of short pieces are large."""
 
 _TEXTS = {"robot": "robot", "robot_fingerprint": "fingerprint"}
 _SCALARS = {
