@@ -13,8 +13,10 @@ from heelstrike.contact.linearized.partials import FRICTION
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.sim.closed_sets import RunStatus
+from heelstrike.sim.contacts.loops import PUT_ON
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.frame import is_due
+from heelstrike.sim.linearized.closing import close_positions
 from heelstrike.sim.linearized.flow import Variation
 from heelstrike.sim.linearized.inputs import LAW, TORQUE, Inputs, inputs_of
 from heelstrike.sim.linearized.law import AskedAlong, parameter_sizes
@@ -344,12 +346,14 @@ class _TimeSteps:
                 own = [size + column for column in inputs.of_parameters()]
                 held[:, own] += instant.by_parameters(inputs.parameters)
             slopes.q[:], slopes.v[:] = simulation.state.q, simulation.state.v
+            slopes.turning = 0.0 if np.any(simulation._memory.loops.braked == PUT_ON) else 0.5
             _one_step(simulation)
             if self._law is not None:
                 held[_at_limits(simulation, asked)] = 0.0
             refuse_step(simulation)
             found = other_modes(simulation, modes or {}) if single else ()
             differentiate_step(robot.model, simulation._work, simulation._memory, slopes)
+            close_positions(robot.model, simulation._work, simulation._memory, slopes)
             moved = slopes.state[:, :size] @ change[:size]
             moved += slopes.state[:, size : size + robot.nu] @ (added + held)
             by_number = slopes.state[:, size + robot.nu :]

@@ -124,7 +124,7 @@ def linearized(
     SimulationError
         If a controller or an event cannot be linearised; the message says which and why.
     """
-    _refuse(run.robot, run, until)
+    _refuse(run.robot, run, begin, until)
     instants = _instants(run, begin, until)
     times = [begin, *(events[0].time for events in instants)]
     bounds = list(pairwise(times if section else [*times, until]))
@@ -140,7 +140,7 @@ def linearized(
     return Motion(tuple(flows), tuple(saltations), arrival)
 
 
-def _refuse(robot: Robot, run: Run, period: float) -> None:
+def _refuse(robot: Robot, run: Run, begin: float, period: float) -> None:
     """Refuse steps whose errors have no derivative that is known here."""
     if np.any(robot.model.dry_friction > 0.0):
         raise SimulationError(
@@ -157,6 +157,8 @@ def _refuse(robot: Robot, run: Run, period: float) -> None:
             f"brakes of {robot.name!r} are on, which is not linearised here; "
             "hs.find_limit_cycle takes differences instead"
         )
+    if any(push.end > begin and push.start < period for push in run.pushes):
+        raise SimulationError("pushes within an event-driven motion are not linearised here")
     if run.saturations:
         raise SimulationError(
             "torques were clipped at the limits of the motors: a law that cannot do what it asks "

@@ -13,6 +13,8 @@ steps too, and with r of :mod:`heelstrike.contact.linearized.partials`, at a = (
 
 Rows may depend on each other, as those of a flat foot do: impulses are not unique then, velocities
 are. An impact that is whole within a step is a second such problem beside that of the positions.
+Positions are then put back on the equations of loops and brakes (:mod:`.closing`), which is
+differentiated apart.
 """
 
 from __future__ import annotations
@@ -29,17 +31,22 @@ from heelstrike.contact.linearized.partials import (
 from heelstrike.contact.modes import OPEN, SLIP_FORWARD, STICK
 from heelstrike.contact.sets import LINE
 from heelstrike.dynamics.dense import triangulate
+from heelstrike.dynamics.kernels import forward_kinematics
 from heelstrike.dynamics.loops import LoopRows, count_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.rows import (
+    BRAKE,
     DRY_JOINT,
+    LOOP,
     POINT,
     STOP,
+    Rows,
     lay_out_rows,
 )
 from heelstrike.sim.memory import Assembly, Memory, Surface
+from heelstrike.sim.push import Pushes, add_push_slopes
 from heelstrike.sim.time_stepping.method import (
     LINEARLY_IMPLICIT,
     MOREAU_JEAN,
@@ -78,6 +85,11 @@ class StepSlopes(Bundle):
     balance: Balance = part(Balance)
     partials: Partials = part(Partials)
     """balance, partials: The equations of the step."""
+    pushed_by_q: Floats = array("nv", "nq")
+    """What position does to the generalised force of pushes."""
+    turning: float = cell(float)
+    """The part of the step in which loops turn: half of it, none of one in which a brake takes
+    hold."""
     bounce_by_q: Floats = array("2 nc", "nq")
     """What position does to the velocities of the points before the step."""
     loops: LoopRows = part(LoopRows)
@@ -120,6 +132,7 @@ def allocate_slopes(
         active=ActiveRows.allocate(extents),
         program=partial_program(model, dated=False, numbers=numbers),
         rubs=int(friction),
+        turning=0.5,
     )
 
 
@@ -132,6 +145,8 @@ def differentiate_step(model: Model, work: Stepping, memory: Memory, slopes: Ste
     assembly, impact, surface = memory.assembly, work.impact, memory.surface
     added, normal = memory.equations.added, memory.contacts.normal
     pose_balance(slopes.q, slopes.v, added, normal, slopes.balance)
+    if memory.pushes.link.shape[0] > 0:
+        find_pushes(model, slopes.q, memory.pushes, slopes.tree, slopes.pushed_by_q)
     bounces = False
     for place in range(assembly.begin[POINT], assembly.until[POINT]):
         bounces = bounces or surface.restitution[assembly.candidate[place]] > 0.0
@@ -155,6 +170,18 @@ def differentiate_step(model: Model, work: Stepping, memory: Memory, slopes: Ste
     )  # fmt: skip
     moves = slopes.arriving if impact.happens == 1 else slopes.after
     write_state(model.nq, work.scheme, work.step, moves, slopes.after, slopes.state)
+
+
+@kernel
+def find_pushes(
+    model: Model, q: Floats, pushes: Pushes, tree: Workspace, pushed_by_q: Floats
+) -> None:
+    """Write what position does to the generalised force of the pushes that act in the step."""
+    for i in range(pushed_by_q.shape[0]):
+        for j in range(pushed_by_q.shape[1]):
+            pushed_by_q[i, j] = 0.0
+    forward_kinematics(model, q, tree)
+    add_push_slopes(model, tree, pushes, pushed_by_q)
 
 
 @kernel
@@ -205,6 +232,9 @@ def differentiate_problem(
     for place in range(assembly.begin[POINT], assembly.until[POINT]):
         for k in range(2):
             balance.push[assembly.candidate[place], k] = impulse[2 * place + k] / step
+    balance.ahead[1] = slopes.turning * step
+    for row in range(balance.pull.shape[0]):
+        balance.pull[row] = impulse[2 * (assembly.begin[LOOP] + row)] / step
     evaluate(model, after, slopes)
     rows, partials = slopes.active, slopes.partials
     rate = 1.0 / step if gaps else 0.0
@@ -214,7 +244,13 @@ def differentiate_problem(
         partials, rows,
     )  # fmt: skip
     active = write_joints(active, mode, rate, assembly, memory.rows.owner, memory.rows.side, rows)
+    if assembly.until[LOOP] > assembly.begin[LOOP]:
+        active = write_loops(
+            active, model.brake_joint, slopes.loops.jacobian, assembly, memory.rows, partials, rows
+        )
     write_free(model, step, active, partials, rows)
+    if memory.pushes.link.shape[0] > 0:
+        push_free(step, active, slopes.pushed_by_q, rows.response)
     if work.scheme == LINEARLY_IMPLICIT:
         stiffen(step, 1.0, active + model.nq, memory.stiffness, rows.response)
     elif work.scheme == MOREAU_JEAN:
@@ -314,6 +350,28 @@ def write_joints(
 
 
 @kernel
+def write_loops(
+    active: int, brake_joint: Integers, jacobian: Floats, assembly: Assembly, table: Rows,
+    partials: Partials, rows: ActiveRows,
+) -> int:  # fmt: skip
+    """Write the active rows of loops, couplings and brakes; return how many there are with them."""
+    nv = rows.held.shape[1]
+    for place in range(assembly.begin[LOOP], assembly.until[LOOP]):
+        entry, row = assembly.candidate[place], place - assembly.begin[LOOP]
+        begin_row(active, rows)
+        if table.kind[entry] == BRAKE:
+            joint = brake_joint[table.owner[entry]]
+            rows.held[active, joint] = rows.response[joint, active] = 1.0
+        else:
+            for j in range(nv):
+                rows.held[active, j] = rows.response[j, active] = jacobian[row, j]
+                rows.change[active, j] = partials.loop_along_by_q[row, j]
+                rows.change[active, nv + j] = partials.loop_along_by_v[row, j]
+        active += 1
+    return active
+
+
+@kernel
 def write_free(
     model: Model, step: float, active: int, partials: Partials, rows: ActiveRows
 ) -> None:
@@ -333,6 +391,14 @@ def write_free(
             response[i, by_number + j] = -step * partials.lacking_by_numbers[i, j]
     for j in range(model.nu):
         response[model.actuator_joint[j], by_torque + j] = step
+
+
+@kernel
+def push_free(step: float, active: int, pushed_by_q: Floats, response: Floats) -> None:
+    """Add what position does to pushes."""
+    for i in range(pushed_by_q.shape[0]):
+        for j in range(pushed_by_q.shape[1]):
+            response[i, active + j] += step * pushed_by_q[i, j]
 
 
 @kernel
