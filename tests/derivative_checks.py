@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -187,13 +188,15 @@ FINE = hs.EventDriven(rtol=1e-13, atol=1e-14)
 
 
 def blocks_of(
-    robot: hs.Robot, x: Floats, span: float, ground: hs.Ground, *, size: float
+    robot: hs.Robot, x: Floats, span: float, ground: hs.Ground, *, size: float, **acting: Any
 ) -> tuple[hs.StepDerivatives, Floats, hs.Run]:
     """Derivatives of an event-driven interval, differences by its beginning, and the run."""
 
     def simulated(begin: Floats) -> hs.Simulation:
         state = hs.State(begin[: robot.nq], begin[robot.nq :])
-        return hs.Simulation(robot, state=state, method=FINE, ground=ground, stop_when_fallen=False)
+        return hs.Simulation(
+            robot, state=state, method=FINE, ground=ground, stop_when_fallen=False, **acting
+        )
 
     def after(change: Floats) -> Floats:
         simulation = simulated(x + change)
@@ -207,7 +210,9 @@ def blocks_of(
     return found, seen, whole(simulation.record)
 
 
-def interval(robot: hs.Robot, *, seed: int, span: float = 0.15) -> tuple[float, set[str]] | None:
+def interval(
+    robot: hs.Robot, *, seed: int, span: float = 0.15, **acting: Any
+) -> tuple[float, set[str]] | None:
     """Compare derivatives of an event-driven fall; return the worst error and what happened.
 
     It ends before shocks accumulate. None where disturbed falls have other events.
@@ -218,14 +223,19 @@ def interval(robot: hs.Robot, *, seed: int, span: float = 0.15) -> tuple[float, 
     state = robot.placed(hs.State(q, state.v), ground)
     x = hs.State(state.q + 0.005 * np.eye(nq)[1], state.v).vector
     fall = hs.Simulation(
-        robot, state=hs.State(x[:nq], x[nq:]), method=FINE, ground=ground, stop_when_fallen=False
+        robot,
+        state=hs.State(x[:nq], x[nq:]),
+        method=FINE,
+        ground=ground,
+        stop_when_fallen=False,
+        **acting,
     )
     fall.advance(span)
     ends = [event.time for event in whole(fall.record).events if event.kind in NOT_SMOOTH]
     span = min([span, *(0.9 * end for end in ends)])
     tries = []
     for size in (1e-5, 4e-5):
-        found, seen, run = blocks_of(robot, x, span, ground, size=size)
+        found, seen, run = blocks_of(robot, x, span, ground, size=size, **acting)
         tries.append(seen)
     worst = 0.0
     for rows in (slice(0, nq), slice(nq, None)):

@@ -111,15 +111,41 @@ def test_a_push_turns_with_the_link_that_it_acts_on() -> None:
     assert found.worst <= ENOUGH
 
 
-def test_pushes_within_an_event_driven_motion_are_refused() -> None:
-    """They were left out of its equations."""
-    robot = mechanisms.block()
-    push = hs.Push(robot.link_names[-1], force=(5.0, 0.0), start=0.01, duration=0.01)
-    state = hs.State(robot.reference_state().q + np.array([0.0, 1.0, 0.0]), np.zeros(3))
-    simulation = hs.Simulation(robot, state=state, method=FINE, pushes=[push])
-    hs.step_derivatives(simulation, until=0.005)
-    with pytest.raises(hs.SimulationError, match="pushes"):
-        hs.step_derivatives(simulation, until=0.015)
+def test_pushes_and_brakes_are_gone_through_in_an_event_driven_motion() -> None:
+    """A push begins and ends within a fall in which a foot comes down; a brake holds a knee."""
+    legs = hs.RobotBuilder("legs")
+    trunk = legs.floating_base("trunk", (0.0, 0.8), mass=10.0, inertia=0.5)
+    for side in ("right", "left"):
+        thigh = legs.hinge(f"{side}_hip", trunk, mass=3.0, inertia=0.05, center_of_mass=(0, -0.2))
+        shank = legs.hinge(
+            f"{side}_knee", thigh, at=(0, -0.4), mass=2.0, inertia=0.03, center_of_mass=(0, -0.2)
+        )
+        legs.contact(shank, (0.0, -0.4))
+        legs.brake(f"{side}_knee")
+    robot = legs.build()
+    push = hs.Push("trunk", force=(60.0, -20.0), start=0.02, duration=0.05, point=(0.1, 0.3))
+    found = interval(robot, seed=2, pushes=(push,))
+    assert found is not None
+    worst, events = found
+    assert "TOUCHDOWN" in events
+    assert worst <= ENOUGH
+    # As a simulation begins, velocities are made to fit the brake, the shortest way by the masses.
+    state, nq = (
+        robot.perturbed(robot.reference_state(), position=0.1, velocity=1.0, seed=3),
+        robot.nq,
+    )
+    state = robot.placed(state, hs.Ground())
+    x, knee = state.vector.copy(), robot.joint_index("right_knee")
+    x[1], x[nq + knee] = x[1] + 0.01, 0.0
+    held = np.linalg.solve(hs.dynamics.mass_matrix(robot, x[:nq]), np.eye(nq)[knee])
+    fitted = np.eye(2 * nq)
+    fitted[nq:, nq + knee] -= held / held[knee]
+    told, seen, run = blocks_of(
+        robot, x, 0.2, hs.Ground(friction=0.5), size=1e-5, pushes=(push,), braked=("right_knee",)
+    )
+    assert any(event.kind.name == "TOUCHDOWN" for event in run.events)
+    error = np.linalg.norm(told.state @ fitted - seen)
+    assert error <= ENOUGH * np.linalg.norm(seen)
 
 
 @pytest.mark.parametrize("robot", ["compass_gait", "rabbit"])
