@@ -58,6 +58,9 @@ class StepDerivatives:
     changes: tuple[ModeChange, ...] = ()
     """Contact points at a change of mode, where the derivatives are those of one side; of one time
     step."""
+    spread: float = 0.0
+    """Where several points come down in one instant of an event-driven motion, derivatives are the
+    mean of those of all orders in which they may do so; what an event does differs by so much."""
 
     def forward(
         self, state: ArrayLike = 0.0, torque: ArrayLike = 0.0, *,
@@ -399,7 +402,8 @@ class _Flows:
         variation = Variation(self._again(now), controller, self._inputs, answers=self._answers)
         motion = linearized(run, end, variation, section=False, begin=begin)
         simulation.advance(end)
-        return _told(simulation, begin, motion.matrix, self._inputs, ())
+        spread = max((event.spread for event in motion.saltations), default=0.0)
+        return _told(simulation, begin, motion.matrix, self._inputs, (), spread)
 
     def _again(self, now: Snapshot) -> Simulation:
         """Return another simulation at the same instant."""
@@ -412,7 +416,7 @@ class _Flows:
 
 def _told(
     simulation: Simulation, begin: float, change: Floats, inputs: Inputs,
-    changes: tuple[ModeChange, ...],
+    changes: tuple[ModeChange, ...], spread: float = 0.0,
 ) -> StepDerivatives:  # fmt: skip
     """Tell columns apart."""
     size = simulation.robot.nq + simulation.robot.nv
@@ -425,4 +429,5 @@ def _told(
         numbers={name: by_input[:, inputs.of(name)] for name in inputs.numbers},
         gains={name: by_input[:, inputs.of(LAW + name)] for name in inputs.parameters},
         changes=changes,
+        spread=spread,
     )
