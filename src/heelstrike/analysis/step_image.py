@@ -18,9 +18,9 @@ from heelstrike.robot.state import State
 
 # Disturbance (m, rad, m/s, rad/s) of the central differences. The derivative's error is its square
 # times a third derivative of the map, plus the error of the map itself, some 1e-13, over it.
-DISTURBANCE = 1e-4
+VARIED = 1e-4
 # The same of sharp differences, which have an error of the fourth power of it.
-SHARP_DISTURBANCE = 3e-4
+VARIED_SHARPLY = 3e-4
 # How far (m, m/s) a state may be off the section.
 ON_THE_SECTION = 1e-8
 
@@ -71,12 +71,12 @@ class StepImage:
 
     def differences(self) -> Floats:
         """The same by central differences."""
-        return derivative(self, self._size, DISTURBANCE)
+        return derivative(self, self._size, VARIED)
 
     def sharp_differences(self) -> Floats:
         """The same by differences of fourth order; of second where the walk does not go on."""
         try:
-            near, far = (derivative(self, self._size, k * SHARP_DISTURBANCE) for k in (1, 2))
+            near, far = (derivative(self, self._size, k * VARIED_SHARPLY) for k in (1, 2))
         except LimitCycleError:
             return self.differences()
         return (4.0 * near - far) / 3.0

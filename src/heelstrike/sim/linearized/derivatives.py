@@ -408,10 +408,13 @@ class _Flows:
     def _again(self, now: Snapshot) -> Simulation:
         """Return another simulation at the same instant."""
         its = self._simulation
-        return Simulation(
+        again = Simulation(
             its.robot, its.controller, state=now, method=its.method, ground=its.ground,
             control_period=its._given_period, stop_when_fallen=False,
+            record_every=int(now.identity["record_every"]),
         )  # fmt: skip
+        again._clock.record_every = 1  # rows of all times are looked at
+        return again
 
 
 def _told(

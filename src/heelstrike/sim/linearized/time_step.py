@@ -42,10 +42,9 @@ from heelstrike.sim.contacts.rows import (
     LOOP,
     POINT,
     STOP,
-    Rows,
     lay_out_rows,
 )
-from heelstrike.sim.memory import Assembly, Memory, Surface
+from heelstrike.sim.memory import Assembly, Memory
 from heelstrike.sim.push import Pushes, add_push_slopes
 from heelstrike.sim.time_stepping.method import (
     LINEARLY_IMPLICIT,
@@ -239,15 +238,18 @@ def differentiate_problem(
     rows, partials = slopes.active, slopes.partials
     rate = 1.0 / step if gaps else 0.0
     bounce = slopes.bounce_by_q
+    surface, candidate = memory.surface, assembly.candidate
     active = write_points(
-        model, impulse, mode, rate, bounces, bounce, assembly, memory.surface, balance.rows,
-        partials, rows,
+        model, assembly.until[POINT], candidate, impulse, mode, rate, bounces, bounce,
+        surface.friction, surface.restitution, balance.rows, partials.along_by_q, rows,
     )  # fmt: skip
     active = write_joints(active, mode, rate, assembly, memory.rows.owner, memory.rows.side, rows)
     if assembly.until[LOOP] > assembly.begin[LOOP]:
         active = write_loops(
-            active, model.brake_joint, slopes.loops.jacobian, assembly, memory.rows, partials, rows
-        )
+            active, assembly.begin[LOOP], assembly.until[LOOP], candidate, model.brake_joint,
+            memory.rows.kind, memory.rows.owner,
+            slopes.loops.jacobian, partials, rows,
+        )  # fmt: skip
     write_free(model, step, active, partials, rows)
     if memory.pushes.link.shape[0] > 0:
         push_free(step, active, slopes.pushed_by_q, rows.response)
@@ -289,17 +291,18 @@ def begin_row(row: int, active: ActiveRows) -> None:
 
 @kernel
 def write_points(
-    model: Model, impulse: Floats, mode: Integers, rate: float, bounces: bool, bounce: Floats,
-    assembly: Assembly, surface: Surface, jacobian: Floats, partials: Partials, rows: ActiveRows,
+    model: Model, points: int, candidate: Integers, impulse: Floats, mode: Integers, rate: float,
+    bounces: bool, bounce: Floats, frictions: Floats, restitutions: Floats, jacobian: Floats,
+    along_by_q: Floats, rows: ActiveRows,
 ) -> int:  # fmt: skip
-    """Write the active rows of contact points; return how many there are."""
+    """Write the active rows of contact points, the first candidates; return how many there are."""
     active = 0
-    for place in range(assembly.begin[POINT], assembly.until[POINT]):
+    for place in range(points):
         if mode[place] == OPEN:
             continue
-        point = assembly.candidate[place]
+        point = candidate[place]
         normal, tangent = 2 * point, 2 * point + 1
-        friction, back = surface.friction[point], surface.restitution[point]
+        friction, back = frictions[point], restitutions[point]
         sticks = mode[place] == STICK and friction > 0.0
         way = 0.0 if mode[place] == STICK else (-1.0 if mode[place] == SLIP_FORWARD else 1.0)
         begin_row(active, rows)
@@ -308,7 +311,7 @@ def write_points(
         for j in range(model.nv):
             rows.held[active, j] = jacobian[normal, j]
             rows.response[j, active] = jacobian[normal, j] + way * friction * jacobian[tangent, j]
-            rows.change[active, j] = partials.along_by_q[normal, j] + rate * jacobian[normal, j]
+            rows.change[active, j] = along_by_q[normal, j] + rate * jacobian[normal, j]
             if bounces:
                 rows.change[active, j] += back * bounce[normal, j]
                 rows.change[active, model.nq + j] = back * jacobian[normal, j]
@@ -317,7 +320,7 @@ def write_points(
             begin_row(active, rows)
             for j in range(model.nv):
                 rows.held[active, j] = rows.response[j, active] = jacobian[tangent, j]
-                rows.change[active, j] = partials.along_by_q[tangent, j]
+                rows.change[active, j] = along_by_q[tangent, j]
             active += 1
     return active
 
@@ -351,16 +354,16 @@ def write_joints(
 
 @kernel
 def write_loops(
-    active: int, brake_joint: Integers, jacobian: Floats, assembly: Assembly, table: Rows,
-    partials: Partials, rows: ActiveRows,
+    active: int, first: int, last: int, candidate: Integers, brake_joint: Integers, kind: Integers,
+    owner: Integers, jacobian: Floats, partials: Partials, rows: ActiveRows,
 ) -> int:  # fmt: skip
     """Write the active rows of loops, couplings and brakes; return how many there are with them."""
     nv = rows.held.shape[1]
-    for place in range(assembly.begin[LOOP], assembly.until[LOOP]):
-        entry, row = assembly.candidate[place], place - assembly.begin[LOOP]
+    for place in range(first, last):
+        entry, row = candidate[place], place - first
         begin_row(active, rows)
-        if table.kind[entry] == BRAKE:
-            joint = brake_joint[table.owner[entry]]
+        if kind[entry] == BRAKE:
+            joint = brake_joint[owner[entry]]
             rows.held[active, joint] = rows.response[joint, active] = 1.0
         else:
             for j in range(nv):
