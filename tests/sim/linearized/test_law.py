@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import walking
 
 import heelstrike as hs
@@ -15,6 +16,22 @@ def looks(state, contacts, torque):
     for i in range(torque.shape[0]):
         torque[i] = state.joint_velocity[i] * state.joint_position[i]
     torque[0] += contacts.position[0, 0] + 3.0 * contacts.position[1, 1] + 10.0 * contacts.gap[1]
+
+
+@hs.controller
+def leans(contacts, torque):
+    """Ask for what the foot is pressed with."""
+    torque[0] = 1e-3 * contacts.force[0, 0]
+
+
+def test_a_law_that_acts_on_forces_is_refused() -> None:
+    """Errors change forces as well; what that does would be left out."""
+    robot = walking.bravo7()
+    simulation = hs.Simulation(robot, leans(), state=robot.reference_state())
+    simulation.advance(0.002)
+    with pytest.raises(hs.SimulationError, match="hang on forces"):
+        hs.step_derivatives(simulation)
+    hs.step_derivatives(simulation, answers=False)
 
 
 def test_a_law_sees_its_contact_points_where_a_changed_state_has_them() -> None:

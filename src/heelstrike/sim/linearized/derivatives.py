@@ -13,7 +13,7 @@ from heelstrike.contact.linearized.partials import FRICTION
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.sim.closed_sets import RunStatus
-from heelstrike.sim.contacts.loops import PUT_ON
+from heelstrike.sim.contacts.loops import TAKES_HOLD
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.frame import is_due
 from heelstrike.sim.linearized.closing import close_positions
@@ -349,8 +349,10 @@ class _TimeSteps:
                 own = [size + column for column in inputs.of_parameters()]
                 held[:, own] += instant.by_parameters(inputs.parameters)
             slopes.q[:], slopes.v[:] = simulation.state.q, simulation.state.v
-            slopes.turning = 0.0 if np.any(simulation._memory.loops.braked == PUT_ON) else 0.5
+            free = simulation._memory.loops.braked < TAKES_HOLD
             _one_step(simulation)
+            stops = np.any(free & (simulation._memory.loops.braked >= TAKES_HOLD))
+            slopes.turning = 0.0 if stops else 0.5
             if self._law is not None:
                 held[_at_limits(simulation, asked)] = 0.0
             refuse_step(simulation)

@@ -85,8 +85,22 @@ class Variation:
 
     @property
     def braked(self) -> tuple[int, ...]:
-        """Joints that brakes hold."""
-        return tuple(self._robot.joint_index(name) for name in self._simulation.braked)
+        """Joints that brakes hold.
+
+        Raises
+        ------
+        SimulationError
+            If one of them slips.
+        """
+        model = self._robot.model
+        joints = tuple(self._robot.joint_index(name) for name in self._simulation.braked)
+        limits = dict(zip(model.brake_joint.tolist(), model.brake_limit.tolist(), strict=True))
+        if any(limits[joint] < np.inf for joint in joints):
+            raise SimulationError(
+                f"brakes of {self._robot.name!r} are on that slip, which is not linearised here; "
+                "hs.find_limit_cycle takes differences instead"
+            )
+        return joints
 
     def flow(self, begin: float, end: float, active: ActiveContacts) -> Floats:
         """Return what the motion from one time to another does to errors and changes of inputs.

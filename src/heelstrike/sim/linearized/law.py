@@ -30,7 +30,8 @@ DISTURBANCE = 3e-6
 them: small, as laws have kinks."""
 
 PRESSED = 1e-3
-"""Change of a number that a law remembers, by which is seen whether torques hang on it."""
+"""Change of a number that a law remembers, and of forces as a part of them, by which is seen
+whether torques hang on them."""
 
 
 def numbers_in(bundle: Bundle) -> Iterator[tuple[str, Floats, tuple[int, ...]]]:
@@ -206,6 +207,7 @@ class AskedAlong:
 
     def check_call(self, instant: Instant) -> None:
         """Refuse a law that acts on what it keeps of the state in a call."""
+        self._check_forces(instant)
         instant.torque()
         usual = self._remembered()
         then = replace(instant, numbers=self._asked.snapshot())
@@ -224,6 +226,7 @@ class AskedAlong:
     def check_memory(self) -> None:
         """Refuse a law that acts on something that changes within the step: a state of its own."""
         instant = self.now()
+        self._check_forces(instant)
         self._asked.restore(instant.numbers)
         for label, held in self._remembered().items():
             if self._constant.setdefault(label, held) == held:
@@ -234,6 +237,16 @@ class AskedAlong:
                     "hang on it: it is a state of its own, which is not linearised here. "
                     "hs.floquet_multipliers takes differences of whole steps instead"
                 )
+
+    def _check_forces(self, instant: Instant) -> None:
+        """Refuse a law that acts on forces of contacts, which errors change, too."""
+        seen = {**instant.seen.members(), "force": (1.0 + PRESSED) * instant.seen.force}
+        pressed = replace(instant, seen=Contacts(**seen))
+        if not np.array_equal(pressed.torque(), instant.torque()):
+            raise SimulationError(
+                "the controller's torques hang on forces of the contacts, which is not linearised "
+                "here. hs.find_limit_cycle takes differences of whole steps instead"
+            )
 
     def _remembered(self) -> dict[str, float]:
         """The numbers of the law's memory now, by name."""

@@ -154,11 +154,6 @@ def _refuse(robot: Robot, run: Run, period: float) -> None:
             f"constraints from outside of {robot.name!r} are not linearised here; "
             "hs.find_limit_cycle takes differences instead"
         )
-    if np.any(run.brake_torque[:, np.isfinite(robot.model.brake_limit)]):
-        raise SimulationError(
-            f"brakes of {robot.name!r} are on that slip, which is not linearised here; "
-            "hs.find_limit_cycle takes differences instead"
-        )
     if run.saturations:
         raise SimulationError(
             "torques were clipped at the limits of the motors: a law that cannot do what it asks "
