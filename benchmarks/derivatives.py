@@ -1,18 +1,26 @@
-"""What the derivatives of a step cost: of bravo7 in stance, by state and torques.
+"""What the derivatives of a step cost, and how exact they are.
 
-``python benchmarks/derivatives.py`` prints microseconds a step: in compiled code, and from Python
-with the step itself and the law's answer left out. Processor time, the best of several.
+``python benchmarks/derivatives.py cost`` prints microseconds a step of bravo7 in stance: in
+compiled code, and from Python with the step itself and the law's answer left out. Processor time,
+the best of several.
+
+``python benchmarks/derivatives.py errors`` prints, of every library robot and method, the largest
+error of a block of the derivative, in parts of the block, against Richardson differences of falls
+onto ground and stops, and of how many steps or intervals; in event-driven falls also what happened.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from time import process_time
 from typing import Any
 
 import heelstrike as hs
 from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Model
+from heelstrike.sim import Scheme
 from heelstrike.sim.linearized.time_step import (
     StepSlopes,
     allocate_slopes,
@@ -20,6 +28,10 @@ from heelstrike.sim.linearized.time_step import (
 )
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.time_stepping.method import Stepping
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+
+from derivative_checks import Checks, interval, time_steps
 
 CALLS, REPEATS = 20_000, 15
 
@@ -43,7 +55,7 @@ def best(calls: int, function: Callable[..., Any], *arguments: Any) -> float:
     return 1e6 * min(times) / calls
 
 
-def main() -> None:
+def cost() -> None:
     """Print the times."""
     robot, ground = hs.load_robot("bravo7"), hs.Ground(friction=0.75)
     gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, friction=0.75)
@@ -69,5 +81,31 @@ def main() -> None:
     print(f"from Python  {best(1, from_python):8.0f} us, with the step and a snapshot restored")
 
 
+SEEDS = range(1, 5)
+"""Event-driven falls of each robot."""
+
+
+def errors() -> None:
+    """Print the table of errors."""
+    print(f"{'robot':18}{'method':24}{'compared':>9}{'worst':>9}  inside")
+    for name in hs.builtin_robots():
+        robot = hs.load_robot(name)
+        for scheme in Scheme:
+            tell(name, scheme.name.lower(), time_steps(robot, scheme), "")
+        found, events = Checks(), set()
+        for seed in SEEDS:
+            compared = interval(robot, seed=seed)
+            if found.add(None if compared is None else compared[0]):
+                events |= compared[1]
+        tell(name, "event-driven", found, ", ".join(sorted(events)).lower())
+
+
+def tell(robot: str, method: str, found: Checks, inside: str) -> None:
+    """Print a row."""
+    print(f"{robot:18}{method:24}{found.count:9}{found.worst:9.1e}  {inside}", flush=True)
+
+
 if __name__ == "__main__":
-    main()
+    parts = {"cost": cost, "errors": errors}
+    for part in sys.argv[1:] or parts:
+        parts[part]()

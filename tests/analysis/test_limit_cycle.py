@@ -273,6 +273,7 @@ def test_what_a_sampled_controller_remembers_has_multipliers() -> None:
     wanted = sorted([multiplier, 0.9**calls], reverse=True)
     np.testing.assert_allclose(cycle.multipliers, wanted, atol=1e-5)
     assert cycle.residual <= 1e-10
+    assert "carries memory" in cycle.differences
     assert 0.3 * speed < cycle.memory[0] < speed
     assert forgotten[-1] == pytest.approx(cycle.period, abs=1e-3)
     with pytest.raises(hs.SimulationError, match="has no sped; it has unused, speed"):

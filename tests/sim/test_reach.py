@@ -45,7 +45,7 @@ NOT_YET: dict[str, int] = {
     "sim.event_driven.smooth.faces": 4,
     "sim.event_driven.smooth.watch": 2,
     "sim.frame": 1,
-    "sim.linearized.time_step": 3,
+    "sim.linearized.time_step": 2,
     "sim.record.recording": 7,
     "sim.time_stepping.corners": 1,
     "sim.time_stepping.method": 16,

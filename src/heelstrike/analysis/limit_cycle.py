@@ -14,19 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.poincare_map import (
-    Carried,
-    Landing,
-    PoincareMap,
-    Section,
-    check_steps,
-    derivative,
-)
+from heelstrike.analysis.poincare_map import Carried, PoincareMap, Section, check_steps
 from heelstrike.analysis.stability.loop import ClosedLoop
 from heelstrike.analysis.stability.repeating import Repeating, repeating_walk
+from heelstrike.analysis.step_image import Derivatives, StepImage
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.linearized.standing import Chart
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
@@ -38,15 +31,10 @@ from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.method import Method
 from heelstrike.sim.snapshot import Snapshot
 
-# Disturbance (m, rad, m/s, rad/s) of the central differences. The derivative's error is its square
-# times a third derivative of the map, plus the error of the map itself, some 1e-13, over it.
-DISTURBANCE = 1e-4
-# The same of the multipliers, whose differences have an error of the fourth power of it.
-SHARP_DISTURBANCE = 3e-4
-# How far (m, m/s) a state may be off the section.
-ON_THE_SECTION = 1e-8
 # How often a Newton step is halved when the walk does not go on after it.
 HALVINGS = 6
+# A step that differs by less than this part of what the one before did is not differentiated anew.
+FAST = 0.1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,6 +67,9 @@ class LimitCycle(ShownInNotebooks):
     snapshot: Snapshot | None = None
     """Such a walk with all that its controller remembers, to be taken up as the `state` of a
     simulation."""
+    differences: str = ""
+    """Why `multipliers` are those of differences of whole steps; empty where the derivative of the
+    step is exact."""
 
     @property
     def stable(self) -> bool:
@@ -115,8 +106,10 @@ def find_limit_cycle(
 ) -> LimitCycle:
     """Find a limit cycle of a walking robot near a state, and its Floquet multipliers.
 
-    Newton's method on the map from touchdown to touchdown, differentiated by central differences;
-    for the multipliers by those of fourth order, which leave some 1e-10 of them.
+    Newton's method on the map from touchdown to touchdown, whose derivative is that of flows and
+    events (:func:`~heelstrike.monodromy`). What cannot be linearised, such as a sampled controller,
+    one in Python or one that carries memory on, is differentiated by differences of whole steps, of
+    fourth order for the multipliers, and `differences` says why.
 
     Parameters
     ----------
@@ -215,22 +208,22 @@ def find_limit_cycle(
     assert isinstance(state, State)
     assert isinstance(method, EventDriven)
     section = Section(robot, ground)
-    step = PoincareMap(
+    walked = PoincareMap(
         section, controller, method, landing, symmetry, longest_step, control_period,
         Carried(tuple(memory), relabelled),
     )  # fmt: skip
     start = state if method.swing_feet_pass else section.lifted(state)
-    landed = step(start, step.begin(start))
+    landed = walked(start, walked.begin(start))
     state, kept = landed.state, landed.memory
-    residual = np.inf
+    before, derivatives = np.inf, Derivatives()
     for iteration in range(max_iterations + 1):
-        image = _Image(step, section.chart(state), kept)
-        end = step(state, kept)
+        image = StepImage(walked, section.chart(state), kept)
+        end = walked(state, kept)
         change = image.coordinates(end)
         residual = float(np.abs(change).max(initial=0.0))
-        slope = derivative(image, len(change), DISTURBANCE)
         if residual <= tolerance:
-            multipliers = np.linalg.eigvals(_sharper(image, slope)).astype(np.complex128)
+            slope = derivatives.sharp(image, state, end)
+            multipliers = np.linalg.eigvals(slope).astype(np.complex128)
             return LimitCycle(
                 state=state,
                 period=end.time,
@@ -239,7 +232,11 @@ def find_limit_cycle(
                 residual=residual,
                 iterations=iteration,
                 memory=kept,
+                differences=derivatives.why_not,
             )
+        if iteration == 0 or residual > FAST * before:
+            slope = derivatives.good_enough(image, state, end)
+        before = residual
         newton = np.asarray(np.linalg.lstsq(np.eye(len(change)) - slope, change)[0], np.float64)
         state, kept = _moved_on(image, newton)
     raise LimitCycleError(
@@ -260,6 +257,7 @@ def _going_on(found: Repeating) -> LimitCycle:
         iterations=found.iterations,
         steps=walk.steps,
         snapshot=walk.begins[0],
+        differences="its controller goes on from step to step with all that it remembers",
     )
 
 
@@ -279,47 +277,7 @@ def _check(robot: Robot, ground: Ground, state: Any, method: Any) -> None:
     check_steps(robot, ground)
 
 
-@dataclass(frozen=True)
-class _Image:
-    """The map in coordinates about a state and a memory: those of a chart, then the memory's."""
-
-    step: PoincareMap
-    chart: Chart
-    memory: Floats
-
-    def at(self, coordinates: Floats) -> tuple[State, Floats]:
-        """Return the state and the memory at some coordinates."""
-        place, nq = self.chart.directions.shape[1], self.step.section.robot.nq
-        x = self.chart.moved(coordinates[:place])
-        if self.chart.off(x) > ON_THE_SECTION:
-            raise LimitCycleError("the step leads too far from the states just after touchdown")
-        return State(x[:nq], x[nq:]), self.memory + coordinates[place:]
-
-    def coordinates(self, end: Landing) -> Floats:
-        """Return the coordinates of the end of a step."""
-        if (off := self.chart.off(end.state.vector)) > ON_THE_SECTION:
-            raise LimitCycleError(
-                "the contact points that stand after the step are not those that stood before it "
-                f"({off:.3g} m or m/s between the two)"
-            )
-        there = self.chart.coordinates(end.state.vector)
-        return np.concatenate((there, end.memory - self.memory))
-
-    def __call__(self, coordinates: Floats) -> Floats:
-        return self.coordinates(self.step(*self.at(coordinates)))
-
-
-def _sharper(image: _Image, slope: Floats) -> Floats:
-    """Return the derivative of the map by differences of fourth order; its slope where none are."""
-    size = slope.shape[1]
-    try:
-        near, far = (derivative(image, size, k * SHARP_DISTURBANCE) for k in (1, 2))
-    except LimitCycleError:  # so far from the cycle, the walk does not go on
-        return slope
-    return (4.0 * near - far) / 3.0
-
-
-def _moved_on(image: _Image, newton: Floats) -> tuple[State, Floats]:
+def _moved_on(image: StepImage, newton: Floats) -> tuple[State, Floats]:
     """Return state and memory after a Newton step, shortened until the walk goes on from there."""
     for halving in range(HALVINGS):
         try:

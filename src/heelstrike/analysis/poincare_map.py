@@ -199,8 +199,7 @@ class PoincareMap:
         self._controller = controller
         self._control_period = control_period
         self._carried = carried
-        # Only the rows of events are looked at.
-        self._method = replace(method, output_period=longest)
+        self._method = method
         self._longest = longest
         self._expected = longest
         if landing is not None and not (landing and set(landing) <= set(range(robot.nc))):
@@ -256,10 +255,22 @@ class PoincareMap:
             left = self._carried.of(again)
         return Landing(after, time, abs(end - begin), left, contact)
 
-    def _simulation(self, state: State, memory: Floats | None) -> Simulation:
-        """Begin a step."""
+    @property
+    def carries(self) -> tuple[str, ...]:
+        """What the controller remembers from step to step, by name."""
+        return self._carried.names
+
+    def simulation(self, state: State) -> Simulation:
+        """Begin a step with all rows, of a controller that carries nothing."""
+        return self._simulation(state, None, self._method)
+
+    def _simulation(
+        self, state: State, memory: Floats | None, method: EventDriven | None = None
+    ) -> Simulation:
+        """Begin a step. Only the rows of events are looked at."""
+        method = replace(self._method, output_period=self._longest) if method is None else method
         simulation = Simulation(
-            self.section.robot, self._controller, state=state, method=self._method,
+            self.section.robot, self._controller, state=state, method=method,
             ground=self.section.ground, control_period=self._control_period,
         )  # fmt: skip
         if memory is not None and self._carried.names:

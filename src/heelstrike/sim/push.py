@@ -12,7 +12,7 @@ from heelstrike.arguments import check_fields
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import point_position
-from heelstrike.dynamics.places import add_point_force
+from heelstrike.dynamics.places import add_point_force, place_of, velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
@@ -220,3 +220,28 @@ def add_pushes(model: Model, tree: Workspace, pushes: Pushes, force: Floats) -> 
             push = (pushes.share[i] * pushes.force[i, 0], pushes.share[i] * pushes.force[i, 1])
             point_position(tree, link, pushes.point[i], position)
             add_point_force(model, tree, link, position, push, force)
+
+
+@kernel
+def add_push_slopes(model: Model, tree: Workspace, pushes: Pushes, slopes: Floats) -> None:
+    """Add the derivative of Jᵀf of the pushes by position, (nv, nq), to `slopes`.
+
+    The column of J of a coordinate turns with all coordinates nearer to the root, and with itself:
+    ∂²p/∂q_j ∂q_k is the turning of the one nearer to the root times the column of the other.
+    """
+    for i in range(pushes.link.shape[0]):
+        if pushes.share[i] > 0.0:
+            x, z = pushes.share[i] * pushes.force[i, 0], pushes.share[i] * pushes.force[i, 1]
+            point_position(tree, pushes.link[i], pushes.point[i], pushes.position[i])
+            place = place_of(tree, pushes.position[i])
+            j = pushes.link[i]
+            while j >= 0:
+                along_x, along_z = velocity_at(tree.motion, j, place)
+                turned = x * along_z - z * along_x
+                k = j
+                while k >= 0:
+                    slopes[j, k] += tree.motion[k, 0] * turned
+                    if k != j:
+                        slopes[k, j] += tree.motion[k, 0] * turned
+                    k = model.parent[k]
+                j = model.parent[j]

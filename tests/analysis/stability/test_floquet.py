@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
+from heelstrike.analysis.stability import returns
 from heelstrike.analysis.stability.across import _with_consequence
 from heelstrike.experiments.passive import METHOD, passive_walk
 
@@ -41,6 +42,19 @@ def test_two_steps_of_the_compass() -> None:
     assert found.coordinates == ("robot 1", "robot 2", "robot 3", "robot 4")
     assert "stable" in repr(found)
     assert next(iter(found.slowest)) in found.coordinates
+
+
+def test_returns_without_memory_are_those_that_differences_show(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of a walk on two legs, in the middle of its steps."""
+    robot, cycle = compass()
+    walked = {"ground": RAMP, "method": METHOD, "settling": 0, "returns": 1}
+    exact = hs.floquet_multipliers(robot, cycle.state, **walked)
+    monkeypatch.setattr(returns, "_linearised", lambda *_: None)
+    differences = hs.floquet_multipliers(robot, cycle.state, **walked)
+    assert not np.array_equal(exact.matrix, differences.matrix)
+    np.testing.assert_allclose(exact.matrix, differences.matrix, atol=1e-6)
 
 
 @cache

@@ -94,7 +94,7 @@ def test_the_riccati_equation_is_that_of_the_least_cost() -> None:
 
 
 def test_multipliers_are_those_of_the_closed_loop() -> None:
-    """Of the walk as simulated, through its impacts, by differences of its return map."""
+    """Of the walk as simulated, through its impacts, by flows and saltations."""
     found = hs.find_limit_cycle(gait().robot, zero().initial_state, law())
     assert abs(found.period - zero().period) < 1e-9
     predicted = law().multipliers

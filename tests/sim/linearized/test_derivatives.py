@@ -2,180 +2,159 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cache
-from itertools import combinations
+from dataclasses import replace
 
 import mechanisms
 import numpy as np
 import pytest
 import walking
-from numpy.typing import NDArray
+from derivative_checks import (
+    ENOUGH,
+    FINE,
+    Floats,
+    Torques,
+    blocks_of,
+    differences,
+    hold,
+    interval,
+    time_steps,
+)
 
 import heelstrike as hs
 from heelstrike.sim import Scheme
-from heelstrike.sim.whole_run import whole
-
-Floats = NDArray[np.float64]
-
-# Blocks by position, velocity, torque and every number, each of positions and velocities after.
-ENOUGH = 1e-7
-FORWARD = np.array([-25.0, 48.0, -36.0, 16.0, -3.0]) / 12.0
-NEAR, SLIPS = 1e-5, 1e-8
-
-
-class Torques(hs.Bundle):
-    """Torques that a law asks for, whatever happens."""
-
-    torque: Floats = hs.array("nu")
-
-
-@hs.controller
-def hold(torque: Floats, parameters: Torques) -> None:
-    """Ask for the same torques all the time."""
-    for i in range(torque.shape[0]):
-        torque[i] = parameters.torque[i]
-
-
-def differences(
-    function: Callable[[Floats], Floats], ways: Floats, size: Floats, two_sided: Sequence[bool]
-) -> Floats:
-    """Derivatives of a function along some ways at zero: of order four, to one side or to both."""
-    columns = []
-    for way, change, both in zip(ways.T, size, two_sided, strict=True):
-        if both:
-            near, far = (
-                (function(k * change * way) - function(-k * change * way)) / (2.0 * k * change)
-                for k in (1, 2)
-            )
-            columns.append((4.0 * near - far) / 3.0)
-        else:
-            seen = [function(k * change * way) for k in range(5)]
-            columns.append(FORWARD @ np.array(seen) / change)
-    return np.array(columns).T
-
-
-def allowed(simulation: hs.Simulation) -> tuple[Floats, list[bool]]:
-    """Ways in which positions may change without a foot in the ground or a joint beyond its stop.
-
-    The first leave all gaps that are closed as they are; the others open one each.
-    """
-    robot, q = simulation.robot, simulation.state.q
-    gap = simulation.contacts.gap
-    normal = hs.dynamics.contact_jacobian(robot, q)[np.abs(gap) < NEAR, 0]
-    model = robot.model
-    lower, upper = np.abs(q - model.lower) < NEAR, np.abs(q - model.upper) < NEAR
-    rows = np.vstack([normal, np.eye(robot.nv)[lower], -np.eye(robot.nv)[upper]])
-    if not len(rows):
-        return np.eye(robot.nq), [True] * robot.nq
-    _, singular, across = np.linalg.svd(rows)
-    rank = int(np.sum(singular > 1e-9 * singular[0]))
-    still, lift = across[rank:].T, np.linalg.pinv(rows)
-    opens = (rows @ lift).min(axis=0) > -1e-9
-    return np.hstack([still, lift[:, opens]]), [True] * still.shape[1] + [False] * opens.sum()
-
-
-def modes_of(simulation: hs.Simulation) -> tuple[object, ...]:
-    """What contacts and stops did in the last step, and whether an impact fell into it.
-
-    Of two points of a foot that turns by next to nothing one slips by next to nothing.
-    """
-    reaction = simulation._memory.reaction
-    slips = np.sign(reaction.slip) * (np.abs(reaction.slip) > SLIPS)
-    return (reaction.mode > 0).tolist(), slips.tolist(), int(simulation._work.impact.happens)
-
-
-def worst_of(simulation: hs.Simulation) -> float | None:
-    """Largest error of a block of the derivatives of the next step, in parts of the block.
-
-    None if disturbed steps have other contact modes: there is no derivative to all sides then; or
-    if differences of several sizes are farther apart, where the solver's tolerance of 1e-9 shows.
-    """
-    robot, begin = simulation.robot, simulation.snapshot()
-    nq, size = robot.nq, robot.nq + robot.nv
-    torque = simulation.parameters.torque.copy() if robot.nu else np.zeros(0)
-    ways, two_sided = allowed(simulation)
-    found = hs.step_derivatives(simulation, answers=False)
-    modes, changed = modes_of(simulation), False
-
-    def after(change: Floats) -> Floats:
-        nonlocal changed
-        state = hs.State(begin.state.q + change[:nq], begin.state.v + change[nq:size])
-        simulation.restore(begin.moved(state))
-        if robot.nu:
-            simulation.parameters.torque[:] = torque + change[size:]
-        simulation.step()
-        changed = changed or modes_of(simulation) != modes
-        return simulation.state.vector
-
-    every = np.zeros((size + robot.nu, ways.shape[1] + robot.nv + robot.nu))
-    every[:nq, : ways.shape[1]] = ways
-    every[nq:, ways.shape[1] :] = np.eye(robot.nv + robot.nu)
-    sides = two_sided + [True] * (robot.nv + robot.nu)
-    blocks = np.split(np.arange(len(sides)), np.cumsum([ways.shape[1], robot.nv]))
-    told = np.hstack([found.state, found.torque]) @ every
-    sizes = np.repeat([1e-6, 1e-5, 1e-3], [len(block) for block in blocks])
-    sizes[: ways.shape[1]][~np.array(two_sided, dtype=bool)] = 1e-7
-    tries = []
-    for factor in (1.0, 2.5, 100.0):
-        changed = False
-        seen = differences(after, every, factor * sizes, sides)
-        tries += [] if changed else [seen]
-    simulation.restore(begin)
-    if robot.nu:
-        simulation.parameters.torque[:] = torque
-    worst = 0.0
-    for rows in (slice(0, nq), slice(nq, None)):
-        for block in blocks:
-            scale = np.linalg.norm(told[rows, block]) or 1.0
-            apart = [
-                np.linalg.norm((one - other)[rows, block]) / scale
-                for one, other in combinations(tries, 2)
-            ]
-            if min(apart, default=1.0) > ENOUGH:  # differences do not know better themselves
-                return None
-            off = [np.linalg.norm((told - seen)[rows, block]) / scale for seen in tries]
-            worst = max(worst, min(off))
-    return worst
-
-
-@cache
-def falling(robot: str, scheme: Scheme) -> tuple[int, float, set[int]]:
-    """Check derivatives along a fall under random torques: how many, the worst, contact modes."""
-    built, ground = hs.load_robot(robot), hs.Ground(friction=0.5)
-    draw = np.random.default_rng(3)
-    activation = 0.0 if scheme in (Scheme.IMPACT_RESOLVED, Scheme.GAP_LINEARISED) else 1e-3
-    law = hold(Torques(torque=draw.normal(size=built.nu))) if built.nu else None
-    state = built.placed(
-        built.perturbed(built.reference_state(), position=0.05, velocity=0.3, seed=1), ground
-    )
-    simulation = hs.Simulation(
-        built, law, state=state, ground=ground, stop_when_fallen=False,
-        method=hs.TimeStepping(step=1e-3, scheme=scheme, activation=activation),
-    )  # fmt: skip
-    checked, worst, modes = 0, 0.0, set()
-    for _ in range(12):
-        simulation.advance(simulation.time + 0.023)
-        error = worst_of(simulation)
-        if error is not None:
-            checked, worst = checked + 1, max(worst, error)
-            modes |= set(simulation._memory.reaction.mode.tolist())
-    return checked, worst, modes
 
 
 @pytest.mark.parametrize("robot", hs.builtin_robots())
 def test_a_time_step_of_every_robot_has_the_derivatives_that_differences_show(robot: str) -> None:
     """Along a fall onto the ground and onto stops, wherever disturbed steps keep contact modes."""
-    checked, worst, _ = falling(robot, Scheme.IMPACT_RESOLVED)
-    assert checked >= 3
-    assert worst <= ENOUGH
+    found = time_steps(hs.load_robot(robot))
+    assert found.count >= 3
+    assert found.worst <= ENOUGH
 
 
 @pytest.mark.parametrize("scheme", Scheme)
 def test_so_has_one_of_every_scheme(scheme: Scheme) -> None:
-    checked, worst, modes = falling("bravo7", scheme)
-    assert {0, 1} <= modes
-    assert checked >= 3
+    found = time_steps(hs.load_robot("bravo7"), scheme)
+    assert {0, 1} <= found.modes
+    assert found.count >= 3
+    assert found.worst <= ENOUGH
+
+
+def lifted(robot: hs.Robot) -> hs.State:
+    """A robot in the air, moving, with its loops closed."""
+    moving = robot.perturbed(robot.reference_state(), position=0.02, velocity=0.2, seed=1)
+    state = robot.closed(robot.placed(moving, hs.Ground()))
+    return hs.State(state.q + 0.01 * np.eye(robot.nq)[1], state.v)
+
+
+def test_closed_loops_are_kept_by_steps_that_are_differentiated() -> None:
+    """Fast ones too, whose positions are put back by what matters; and coupled joints."""
+    robot = mechanisms.four_bar()
+    for scheme in (Scheme.IMPACT_RESOLVED, Scheme.MOREAU_JEAN):
+        turning = hs.State(robot.reference_state().q, [8.0, 0.0, 0.0])
+        found = time_steps(robot, scheme, state=turning, tries=3)
+        assert found.count == 3
+        assert found.worst <= ENOUGH
+    legs = mechanisms.parallel_ankles()
+    found = time_steps(legs, state=lifted(legs), tries=4)
+    assert {0, 1} <= found.modes
+    assert found.worst <= ENOUGH
+    geared = mechanisms.geared((0.1, 2.0, 0.4))
+    state = geared.closed(hs.State([0.4, 0.3], [3.0, 1.0]))
+    found = time_steps(geared, state=state, tries=3)
+    assert found.count == 3
+    assert found.worst <= ENOUGH
+
+
+def test_a_heavier_link_closes_a_loop_another_way() -> None:
+    """By masses, against differences of robots with other masses, in a step and over several."""
+    robot = mechanisms.four_bar()
+    state = robot.closed(hs.State(robot.reference_state().q, [8.0, 0.0, 0.0]))
+
+    def simulated(mass: Floats) -> hs.Simulation:
+        heavier = replace(robot, model=robot.model.replaced(mass=robot.model.mass + mass))
+        return hs.Simulation(heavier, state=state, stop_when_fallen=False)
+
+    def after(mass: Floats) -> Floats:
+        simulation = simulated(mass)
+        simulation.advance(0.02)
+        return simulation.state.vector
+
+    found = hs.step_derivatives(simulated(np.zeros(3)), until=0.02, numbers=("mass",))
+    seen = differences(after, np.eye(3), np.full(3, 1e-3), [True] * 3)
+    for rows in (slice(0, 3), slice(3, None)):
+        error = np.linalg.norm((found.numbers["mass"] - seen)[rows])
+        assert error <= ENOUGH * np.linalg.norm(seen[rows])
+
+
+def test_brakes_take_hold_and_hold_in_steps_that_are_differentiated() -> None:
+    """Where a brake takes hold the joint stops; then it stays."""
+    robot = mechanisms.braked()
+    simulation = hs.Simulation(robot, state=hs.State([0.3], [2.0]), stop_when_fallen=False)
+    simulation.step()
+    simulation.braked = ("swing",)
+    for _ in range(2):
+        np.testing.assert_allclose(hs.step_derivatives(simulation).state, 0.0, atol=1e-12)
+
+
+def test_a_push_turns_with_the_link_that_it_acts_on() -> None:
+    """Its force keeps its direction, its lever does not."""
+    robot = hs.load_robot("bravo7")
+    state = robot.perturbed(robot.reference_state(), position=0.05, velocity=0.3, seed=1)
+    pushes = (
+        hs.Push("trunk", force=(300.0, 80.0), start=0.0, duration=0.1, point=(0.3, 0.4)),
+        hs.Push("right_foot", force=(30.0, -80.0), start=0.0, duration=0.1, point=(0.1, 0.0)),
+    )
+    high = hs.State(state.q + np.eye(robot.nq)[1], state.v)
+    found = time_steps(robot, state=high, pushes=pushes, tries=2)
+    assert found.count == 2
+    assert found.worst <= ENOUGH
+
+
+def test_pushes_and_brakes_are_gone_through_in_an_event_driven_motion() -> None:
+    """A push begins and ends within a fall in which a foot comes down; a brake holds a knee."""
+    legs = hs.RobotBuilder("legs")
+    trunk = legs.floating_base("trunk", (0.0, 0.8), mass=10.0, inertia=0.5)
+    for side in ("right", "left"):
+        thigh = legs.hinge(f"{side}_hip", trunk, mass=3.0, inertia=0.05, center_of_mass=(0, -0.2))
+        shank = legs.hinge(
+            f"{side}_knee", thigh, at=(0, -0.4), mass=2.0, inertia=0.03, center_of_mass=(0, -0.2)
+        )
+        legs.contact(shank, (0.0, -0.4))
+        legs.brake(f"{side}_knee")
+    robot = legs.build()
+    push = hs.Push("trunk", force=(60.0, -20.0), start=0.02, duration=0.05, point=(0.1, 0.3))
+    found = interval(robot, seed=2, pushes=(push,))
+    assert found is not None
+    worst, events = found
+    assert "TOUCHDOWN" in events
+    assert worst <= ENOUGH
+    # As a simulation begins, velocities are made to fit the brake, the shortest way by the masses.
+    state, nq = (
+        robot.perturbed(robot.reference_state(), position=0.1, velocity=1.0, seed=3),
+        robot.nq,
+    )
+    state = robot.placed(state, hs.Ground())
+    x, knee = state.vector.copy(), robot.joint_index("right_knee")
+    x[1], x[nq + knee] = x[1] + 0.01, 0.0
+    held = np.linalg.solve(hs.dynamics.mass_matrix(robot, x[:nq]), np.eye(nq)[knee])
+    fitted = np.eye(2 * nq)
+    fitted[nq:, nq + knee] -= held / held[knee]
+    told, seen, run = blocks_of(
+        robot, x, 0.2, hs.Ground(friction=0.5), size=1e-5, pushes=(push,), braked=("right_knee",)
+    )
+    assert any(event.kind.name == "TOUCHDOWN" for event in run.events)
+    error = np.linalg.norm(told.state @ fitted - seen)
+    assert error <= ENOUGH * np.linalg.norm(seen)
+
+
+@pytest.mark.parametrize("robot", ["compass_gait", "rabbit"])
+def test_an_event_driven_fall_has_the_derivatives_that_differences_show(robot: str) -> None:
+    """Touchdowns, slips and quick light legs; ``benchmarks/derivatives.py`` has all robots."""
+    found = interval(hs.load_robot(robot), seed=3)
+    assert found is not None
+    worst, events = found
+    assert "TOUCHDOWN" in events
     assert worst <= ENOUGH
 
 
@@ -264,30 +243,6 @@ def test_a_point_that_bounces_within_a_step_leaves_with_a_part_of_its_speed() ->
     assert found[nq + 1, nq + 1] == pytest.approx(-0.5, abs=1e-12)
     assert found[nq + 1, 1] == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(found[1, [1, nq + 1]], 0.0, atol=1e-12)
-
-
-FINE = hs.EventDriven(rtol=1e-13, atol=1e-14)
-
-
-def blocks_of(
-    robot: hs.Robot, x: Floats, span: float, ground: hs.Ground, *, size: float
-) -> tuple[hs.StepDerivatives, Floats, hs.Run]:
-    """Derivatives of an event-driven interval, differences by its beginning, and the run."""
-
-    def simulated(begin: Floats) -> hs.Simulation:
-        state = hs.State(begin[: robot.nq], begin[robot.nq :])
-        return hs.Simulation(robot, state=state, method=FINE, ground=ground, stop_when_fallen=False)
-
-    def after(change: Floats) -> Floats:
-        simulation = simulated(x + change)
-        simulation.advance(span)
-        return simulation.state.vector
-
-    found = hs.step_derivatives(simulated(x), until=span, numbers=("friction", "mass"))
-    seen = differences(after, np.eye(len(x)), np.full(len(x), size), [True] * len(x))
-    simulation = simulated(x)
-    simulation.advance(span)
-    return found, seen, whole(simulation.record)
 
 
 def test_an_interval_with_touchdown_slip_and_rest_inside_has_exact_derivatives() -> None:

@@ -1,8 +1,4 @@
-"""The linearisation of a step: what :func:`~heelstrike.find_limit_cycle` gets without differences.
-
-A step that repeats is linearised event by event (:mod:`heelstrike.sim.linearized.step`), and its
-legs exchanged: the derivative of the map from touchdown to touchdown.
-"""
+"""The linearisation of a step that repeats, event by event, and what footholds do to it."""
 
 from __future__ import annotations
 
@@ -12,11 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.poincare_map import PoincareMap, Section, derivative
+from heelstrike.analysis.linearized_step import linearized_step
+from heelstrike.analysis.poincare_map import PoincareMap, Section
 from heelstrike.analysis.stability.sensitivity import gait_sensitivity_norm
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.linearized.slopes import along_the_ground, contact_slopes
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
@@ -24,12 +20,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.event_driven.method import EventDriven
-from heelstrike.sim.linearized.flow import Variation
-from heelstrike.sim.linearized.step import SAME_INSTANT, Motion, Saltation, linearized
-from heelstrike.sim.simulation import Simulation, simulate
-
-BEYOND = 1.02
-"""How much longer than a step is simulated."""
+from heelstrike.sim.linearized.step import Motion, Saltation
 
 REPEATS = 1e-5
 """A state and its image one step later differ by less (m, rad, m/s, rad/s), or nothing repeats."""
@@ -151,8 +142,8 @@ def monodromy(
 ) -> Monodromy:
     """Linearise a step that repeats: flows between its events times saltation matrices at them.
 
-    What :func:`~heelstrike.find_limit_cycle` gets from differences of whole steps, from derivatives
-    instead; the two have nothing in common but the simulation of the step itself.
+    The multipliers are those of :func:`~heelstrike.find_limit_cycle`, which linearises steps in the
+    same way; here are the flows, the saltations and what the height of a foothold does, too.
 
     Parameters
     ----------
@@ -203,36 +194,13 @@ def monodromy(
             f"this step does not repeat: the state changes by {change:.3g} from touchdown to "
             "touchdown. Begin with the state of hs.find_limit_cycle"
         )
-    period = landed.time
-    run = simulate(
-        robot, controller, state=state, duration=BEYOND * period, method=method, ground=ground
-    )
-    simulation = Simulation(robot, controller, state=state, method=method, ground=ground)
-    motion = linearized(run, period, Variation(simulation, controller))
-    row = np.flatnonzero(run.time <= period + SAME_INSTANT)[-1]
     normal = np.zeros(robot.nq + robot.nv)
     normal[:2] = ground.model().normal[0]
-    end = State(run.position[row], run.velocity[row])
+    found = linearized_step(step, state, landed)
     return Monodromy(
-        period=period,
-        motion=motion,
-        relabelling=_relabelling(section, step, end, landed.contact),
+        period=landed.time,
+        motion=found.motion,
+        relabelling=found.relabelling,
         tangent=section.chart(begin).directions,
         normal=normal,
     )
-
-
-def _relabelling(section: Section, step: PoincareMap, end: State, contact: int) -> Floats:
-    """Derivative of the exchange of the legs and the way back, which is affine."""
-    nq, size = section.robot.nq, len(end.vector)
-
-    def image(change: Floats) -> Floats:
-        moved = State(end.q + change[:nq], end.v + change[nq:])
-        return step.relabelled(moved, contact).vector
-
-    exchange, after = derivative(image, size, 1.0), step.relabelled(end, contact)
-    way = np.zeros(size)
-    way[:2] = along_the_ground(section.ground)
-    slopes = contact_slopes(section.robot, after.q, after.v, section.ground)
-    back: Floats = exchange - np.outer(way, slopes.place[section.foothold(after)] @ exchange)
-    return back

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from heelstrike.analysis.stability.loop import ClosedLoop, Walk
 from heelstrike.analysis.stability.section import Section
-from heelstrike.errors import LimitCycleError
+from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
+from heelstrike.sim.linearized.derivatives import step_derivatives
 from heelstrike.sim.run import Run
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.whole_run import whole
@@ -60,15 +61,18 @@ def returned(
 ) -> Disturbed:  # fmt: skip
     """Disturb a walk in every coordinate, both ways, and see what is left one return later.
 
-    And what an indicator of the return makes of it.
+    And what an indicator of the return makes of it. Where nothing but the robot is disturbed, and
+    its motion can be linearised, errors are derivatives.
     """
     begin, end = walk.begins[place], walk.begins[place + 1]
     simulation = loop.simulation
+    exact = None if indicator is not None else _linearised(loop, section, walk, place)
     simulation.restore(end)
     usual = section.read(simulation)
     counts = section.words.counts(simulation)
     columns, told, one_sided, switched = [], [], set(), set()
-    for name, unit in zip(section.names, np.eye(len(section.names)), strict=True):
+    units = np.eye(len(section.names)) if exact is None else ()
+    for name, unit in zip(section.names, units, strict=exact is None):
         sides, seen = [], []
         for sign in (1.0, -1.0):
             section.disturb(simulation, begin, sign * size * unit)
@@ -88,7 +92,7 @@ def returned(
         told.append((seen[0] - seen[1]) / (2.0 * size) if seen else np.zeros(0))
     missed = section.flat(usual[0] - begin.state.vector)
     return Disturbed(
-        matrix=np.array(columns).T,
+        matrix=np.array(columns).T if exact is None else exact,
         seen=np.array(told).T,
         residual=section.size(missed),
         residual_but_late=section.size(section.but_late(missed, section.rate(begin))),
@@ -97,6 +101,23 @@ def returned(
         one_sided=frozenset(one_sided),
         switched=frozenset(switched),
     )
+
+
+def _linearised(loop: ClosedLoop, section: Section, walk: Walk, place: int) -> Floats | None:
+    """Return the derivative of a return from its steps, or flows and events.
+
+    None where numbers of the memory are disturbed too, where steps of the integration fall
+    otherwise for disturbances, and of what has no derivative, or one to each side.
+    """
+    simulation = loop.simulation
+    if section.words.names or not loop.even(walk):
+        return None
+    simulation.restore(walk.begins[place])
+    try:
+        found = step_derivatives(simulation, until=walk.begins[place + 1].time)
+    except SimulationError:
+        return None
+    return section.of(found.state @ section.directions) if found.spread == 0.0 else None
 
 
 def keeps_step(loop: ClosedLoop, section: Section, walk: Walk) -> Floats | None:

@@ -130,8 +130,8 @@ class Section:
         self._read = np.linalg.pinv(frame * self._scale[:, None])
 
     def of(self, difference: Floats) -> Floats:
-        """Coordinates of a difference of two states (q, v)."""
-        coordinates: Floats = self._read[1:] @ (self._scale * difference)
+        """Coordinates of a difference of two states (q, v), or of several in columns."""
+        coordinates: Floats = (self._read[1:] * self._scale) @ difference
         return coordinates
 
     def error(self, one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> Floats:

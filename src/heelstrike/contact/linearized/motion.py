@@ -85,6 +85,8 @@ def linearize_contact(
     *,
     ground: Ground | None = None,
     numbers: Sequence[str] = (),
+    force: ArrayLike | None = None,
+    force_by_q: ArrayLike | None = None,
 ) -> PhaseLinearization:
     """Linearise the motion of a robot on the ground while its contacts stay as they are.
 
@@ -106,6 +108,8 @@ def linearize_contact(
     numbers : sequence of str
         Numbers by which to differentiate too: ``"friction"`` of the ground, ``"mass"`` and others
         of the robot's :class:`~heelstrike.robot.model.Model`, all of a name.
+    force, force_by_q : (nv,) and (nv, nq) array, optional
+        Generalised force that acts besides, and its derivative by position; none by default.
 
     Returns
     -------
@@ -130,6 +134,7 @@ def linearize_contact(
     """
     held = _Held(robot, q, v, active, ground, numbers)
     gamma = held.spread(joint_vector(robot, "torque", torque))
+    gamma += 0.0 if force is None else np.asarray(force, np.float64)
     at, nv, nq = held.at, robot.nv, robot.nq
     at.look(ahead=1.0)
     held.find_rows()
@@ -140,7 +145,8 @@ def linearize_contact(
     at.look(ahead=1.0, going=solution[:nv], acceleration=solution[:nv], **held.forces(force))
     own = at.partials
     by_state = np.hstack([held.change("q"), held.change("v")])
-    lacking = np.hstack([own.lacking_by_q, own.lacking_by_v])
+    besides = 0.0 if force_by_q is None else np.asarray(force_by_q, np.float64)
+    lacking = np.hstack([own.lacking_by_q - besides, own.lacking_by_v])
     right = np.zeros((len(solution), by_state.shape[1] + robot.nu + held.columns))
     right[:nv, : nq + nv], right[nv:, : nq + nv] = -lacking, -by_state
     right[robot.model.actuator_joint, nq + nv + np.arange(robot.nu)] = 1.0

@@ -46,7 +46,7 @@ class Strike:
 def strikes(
     robot: Robot, q: Floats, v: Floats, rate: Floats, torque: Floats,
     order: Sequence[tuple[Floats, ActiveContacts]], ground: Ground | None = None,
-    numbers: Sequence[str] = (),
+    numbers: Sequence[str] = (), force: Floats | None = None,
 ) -> list[Strike]:  # fmt: skip
     """Let contact points, or joints at stops, come down in an order.
 
@@ -64,6 +64,8 @@ def strikes(
         Of each the derivative of its gap, and what takes part in its impact and holds after it.
     ground, numbers
         As of :func:`~heelstrike.linearize_impact`.
+    force : (nv,) float, optional
+        Generalised force that acts besides.
 
     Returns
     -------
@@ -76,6 +78,6 @@ def strikes(
             return []
         impact = linearize_impact(robot, q, v, active, ground=ground, numbers=numbers)
         v, before = impact.velocity, rate
-        rate = linearize_contact(robot, q, v, torque, active, ground=ground).rate
+        rate = linearize_contact(robot, q, v, torque, active, ground=ground, force=force).rate
         found.append(Strike(gradient, before, rate, impact))
     return found

@@ -33,16 +33,21 @@ class AskedLaw:
     checked : bool
         Whether every index is looked at. A law of this package, whose tests see to that, is asked
         compiled.
+
+    Attributes
+    ----------
+    control : Control
+        What compiled code hands along to ask it.
     """
 
     def __init__(
         self, robot: Robot, law: Law, *, compiled: bool = False, checked: bool = False
     ) -> None:
         ready = ReadyLaw(robot, law)
-        control = ready.control
+        self.control = control = ready.control
         self.partner = law.function.partner
         self.name = law.function.name
-        self.numbers, self._control = ready, control
+        self.numbers = ready
         self._torque: NDArray[np.float64] = np.zeros(robot.nu)
         self._given: dict[str, Any] = {
             "state": control.state,
@@ -76,12 +81,12 @@ class AskedLaw:
         ControllerError
             If it is checked and reads or writes beyond an array, or writes to one not its own.
         """
-        own = self._control.state
+        own = self.control.state
         own.q[:], own.v[:] = state.q, state.v
-        self._control.robot.update(own)
+        self.control.robot.update(own)
         if contacts is not None:
             for name, values in contacts.members().items():
-                getattr(self._control.contacts, name)[...] = values
+                getattr(self.control.contacts, name)[...] = values
         given = self._given | {"t": np.float64(t)}
         with np.errstate(all="ignore"):
             self._call(*(given[name] for name in self._names))
@@ -94,7 +99,7 @@ class AskedLaw:
 
     def snapshot(self) -> NDArray[np.int64]:
         """Return its parameters and its memory, and those of an object that it asks."""
-        own = self._control.parameters, self._control.kept
+        own = self.control.parameters, self.control.kept
         if self.partner is None:
             return np.concatenate(own)
         its = np.ascontiguousarray(self.partner.snapshot(), dtype=np.float64).ravel()
@@ -102,9 +107,9 @@ class AskedLaw:
 
     def restore(self, numbers: NDArray[np.int64]) -> None:
         """Take up what :meth:`snapshot` returned."""
-        place = self._control.parameters.size
-        end = place + self._control.kept.size
-        self._control.parameters[:] = numbers[:place]
-        self._control.kept[:] = numbers[place:end]
+        place = self.control.parameters.size
+        end = place + self.control.kept.size
+        self.control.parameters[:] = numbers[:place]
+        self.control.kept[:] = numbers[place:end]
         if self.partner is not None:
             self.partner.restore(numbers[end:].view(np.float64).copy())

@@ -13,8 +13,10 @@ from heelstrike.contact.linearized.partials import FRICTION
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.sim.closed_sets import RunStatus
+from heelstrike.sim.contacts.loops import TAKES_HOLD
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.frame import is_due
+from heelstrike.sim.linearized.closing import close_positions
 from heelstrike.sim.linearized.flow import Variation
 from heelstrike.sim.linearized.inputs import LAW, TORQUE, Inputs, inputs_of
 from heelstrike.sim.linearized.law import AskedAlong, parameter_sizes
@@ -56,6 +58,9 @@ class StepDerivatives:
     changes: tuple[ModeChange, ...] = ()
     """Contact points at a change of mode, where the derivatives are those of one side; of one time
     step."""
+    spread: float = 0.0
+    """Where several points come down in one instant of an event-driven motion, derivatives are the
+    mean of those of all orders in which they may do so; what an event does differs by so much."""
 
     def forward(
         self, state: ArrayLike = 0.0, torque: ArrayLike = 0.0, *,
@@ -344,12 +349,16 @@ class _TimeSteps:
                 own = [size + column for column in inputs.of_parameters()]
                 held[:, own] += instant.by_parameters(inputs.parameters)
             slopes.q[:], slopes.v[:] = simulation.state.q, simulation.state.v
+            free = simulation._memory.loops.braked < TAKES_HOLD
             _one_step(simulation)
+            stops = np.any(free & (simulation._memory.loops.braked >= TAKES_HOLD))
+            slopes.turning = 0.0 if stops else 0.5
             if self._law is not None:
                 held[_at_limits(simulation, asked)] = 0.0
             refuse_step(simulation)
             found = other_modes(simulation, modes or {}) if single else ()
             differentiate_step(robot.model, simulation._work, simulation._memory, slopes)
+            close_positions(robot.model, simulation._work, simulation._memory, slopes)
             moved = slopes.state[:, :size] @ change[:size]
             moved += slopes.state[:, size : size + robot.nu] @ (added + held)
             by_number = slopes.state[:, size + robot.nu :]
@@ -395,20 +404,24 @@ class _Flows:
         variation = Variation(self._again(now), controller, self._inputs, answers=self._answers)
         motion = linearized(run, end, variation, section=False, begin=begin)
         simulation.advance(end)
-        return _told(simulation, begin, motion.matrix, self._inputs, ())
+        spread = max((event.spread for event in motion.saltations), default=0.0)
+        return _told(simulation, begin, motion.matrix, self._inputs, (), spread)
 
     def _again(self, now: Snapshot) -> Simulation:
         """Return another simulation at the same instant."""
         its = self._simulation
-        return Simulation(
+        again = Simulation(
             its.robot, its.controller, state=now, method=its.method, ground=its.ground,
             control_period=its._given_period, stop_when_fallen=False,
+            record_every=int(now.identity["record_every"]),
         )  # fmt: skip
+        again._clock.record_every = 1  # rows of all times are looked at
+        return again
 
 
 def _told(
     simulation: Simulation, begin: float, change: Floats, inputs: Inputs,
-    changes: tuple[ModeChange, ...],
+    changes: tuple[ModeChange, ...], spread: float = 0.0,
 ) -> StepDerivatives:  # fmt: skip
     """Tell columns apart."""
     size = simulation.robot.nq + simulation.robot.nv
@@ -421,4 +434,5 @@ def _told(
         numbers={name: by_input[:, inputs.of(name)] for name in inputs.numbers},
         gains={name: by_input[:, inputs.of(LAW + name)] for name in inputs.parameters},
         changes=changes,
+        spread=spread,
     )

@@ -8,29 +8,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle_type import address_of
+from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.linearized.slopes import ContactSlopes, contact_slopes
-from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
 from heelstrike.errors import SimulationError
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.state import State
+from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts, Controller
-from heelstrike.sim.controller.law import law_of
+from heelstrike.sim.controller.law import controller_in, law_of
 from heelstrike.sim.simulation import Simulation
-
-Floats = NDArray[np.float64]
 
 DISTURBANCE = 3e-6
 """Disturbance (m, rad, m/s, rad/s) of the law's derivative, and of its parameters as a part of
 them: small, as laws have kinks."""
 
 PRESSED = 1e-3
-"""Change of a number that a law remembers, by which is seen whether torques hang on it."""
+"""Change of a number that a law remembers, and of forces as a part of them, by which is seen
+whether torques hang on them."""
 
 
 def numbers_in(bundle: Bundle) -> Iterator[tuple[str, Floats, tuple[int, ...]]]:
@@ -41,37 +42,96 @@ def numbers_in(bundle: Bundle) -> Iterator[tuple[str, Floats, tuple[int, ...]]]:
                 yield f"{name}{list(place) if place else ''}", values, place
 
 
+@kernel
+def ask_near(
+    time: float, q: Floats, v: Floats, changes: Floats, gap: Floats, place: Floats,
+    usual: Contacts, remembered: Integers, control: Control, torques: Floats,
+) -> None:  # fmt: skip
+    """Ask a law in states near one, each time with the same memory.
+
+    Parameters
+    ----------
+    time : float
+        Time (s).
+    q, v : (nq,) and (nv,) float
+        The state.
+    changes : (k, nq + nv) float
+        What is added to it.
+    gap, place : (nc, nq + nv) float
+        Derivatives of gaps, and of places along the ground.
+    usual : Contacts
+        The contact points in that state.
+    remembered : (m,) int
+        Words of the law's memory.
+    control : Control
+        What it is asked with.
+    torques : (k, nu) float
+        Receives its torques.
+    """
+    controller = controller_in(control.function)
+    state, robot, contacts = control.state, control.robot, control.contacts
+    for row in range(changes.shape[0]):
+        copy_words(remembered, control.kept)
+        for j in range(q.shape[0]):
+            state.q[j] = q[j] + changes[row, j]
+        for j in range(v.shape[0]):
+            state.v[j] = v[j] + changes[row, q.shape[0] + j]
+        robot.update(state)
+        for i in range(usual.gap.shape[0]):
+            higher = along = 0.0
+            for j in range(changes.shape[1]):
+                higher += gap[i, j] * changes[row, j]
+                along += place[i, j] * changes[row, j]
+            x, z = usual.normal[i, 0], usual.normal[i, 1]
+            contacts.gap[i] = usual.gap[i] + higher
+            contacts.position[i, 0] = usual.position[i, 0] + higher * x + along * z
+            contacts.position[i, 1] = usual.position[i, 1] + higher * z - along * x
+        controller(
+            time, address_of(state), address_of(contacts), address_of(robot),
+            control.parameters_at, control.kept_at, control.log_at, torques[row],
+        )  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Instant:
     """A law at an instant: what it remembers, and what it sees."""
 
     asked: AskedLaw
-    numbers: Any
+    numbers: Integers
     time: float
     state: State
-    at: ContactKinematics
+    seen: Contacts
     slopes: ContactSlopes
-    force: Floats
 
     def torque(self, change: Floats | None = None) -> Floats:
         """What it asks for in a state changed by so little; it forgets the call."""
-        nq = len(self.state.q)
-        change = np.zeros(nq + len(self.state.v)) if change is None else change
-        normal, gap, place = self.at.normal, self.slopes.gap @ change, self.slopes.place @ change
-        along = np.column_stack((normal[:, 1], -normal[:, 0]))
-        seen = Contacts(
-            position=self.at.position + gap[:, None] * normal + place[:, None] * along,
-            normal=normal, gap=self.at.gap + gap, force=self.force,
+        changes = np.zeros((1, len(self.state.vector)))
+        if change is not None:
+            changes[0] = change
+        torque: Floats = self.torques(changes)[0]
+        return torque
+
+    def torques(self, changes: Floats) -> Floats:
+        """The same in states changed by each of some changes, (k, nu)."""
+        asked, seen, slopes = self.asked, self.seen, self.slopes
+        asked.restore(self.numbers)
+        control = asked.control
+        for name, values in seen.members().items():
+            getattr(control.contacts, name)[...] = values
+        torques = np.zeros((len(changes), asked.numbers.robot.nu))
+        ask_near(
+            self.time, self.state.q, self.state.v, changes, slopes.gap, slopes.place, seen,
+            control.kept.copy(), control, torques,
         )  # fmt: skip
-        self.asked.restore(self.numbers)
-        there = State(self.state.q + change[:nq], self.state.v + change[nq:])
-        return self.asked.torque(self.time, there, seen)
+        return torques
 
     def gains(self) -> Floats:
         """Derivative of the torques by the state, (nu, nq + nv)."""
-        changes = DISTURBANCE * np.eye(len(self.state.q) + len(self.state.v))
-        columns = [self.torque(each) - self.torque(-each) for each in changes]
-        return np.array(columns).T / (2.0 * DISTURBANCE)
+        changes = DISTURBANCE * np.eye(len(self.state.vector))
+        size = len(changes)
+        torques = self.torques(np.vstack((changes, -changes)))
+        gains: Floats = (torques[:size] - torques[size:]).T / (2.0 * DISTURBANCE)
+        return gains
 
     def by_parameters(self, names: Sequence[str]) -> Floats:
         """Derivative of the torques by parameters of the law, (nu, k)."""
@@ -124,6 +184,7 @@ class AskedAlong:
             )
         self._simulation = simulation
         self._asked = AskedLaw(simulation.robot, law, compiled=True)
+        self._asked.control.function[:] = law.function.words
         self._constant: dict[str, float] = {}
         self._first: Instant | None = None
         self._first = replace(self.now(), numbers=self._asked.snapshot())
@@ -131,12 +192,12 @@ class AskedAlong:
     def now(self) -> Instant:
         """Return the law at the instant where the simulation is."""
         simulation, state = self._simulation, self._simulation.state
-        kept = simulation.snapshot().part("control")
-        numbers = np.concatenate((kept["parameters"], kept["kept"]))
-        at = contact_kinematics(simulation.robot, state.q, state.v, simulation.ground)
+        own = simulation._numbers.control
+        numbers = np.concatenate((own.parameters, own.kept))
+        shown = simulation.contacts
+        seen = Contacts(**{name: each.copy() for name, each in shown.members().items()})
         slopes = contact_slopes(simulation.robot, state.q, state.v, simulation.ground)
-        force = simulation.contacts.force
-        return Instant(self._asked, numbers, simulation.time, state, at, slopes, force)
+        return Instant(self._asked, numbers, simulation.time, state, seen, slopes)
 
     def check_beginning(self) -> None:
         """Refuse a law that acts on what it made of the state in which the step began."""
@@ -146,6 +207,7 @@ class AskedAlong:
 
     def check_call(self, instant: Instant) -> None:
         """Refuse a law that acts on what it keeps of the state in a call."""
+        self._check_forces(instant)
         instant.torque()
         usual = self._remembered()
         then = replace(instant, numbers=self._asked.snapshot())
@@ -164,6 +226,7 @@ class AskedAlong:
     def check_memory(self) -> None:
         """Refuse a law that acts on something that changes within the step: a state of its own."""
         instant = self.now()
+        self._check_forces(instant)
         self._asked.restore(instant.numbers)
         for label, held in self._remembered().items():
             if self._constant.setdefault(label, held) == held:
@@ -174,6 +237,16 @@ class AskedAlong:
                     "hang on it: it is a state of its own, which is not linearised here. "
                     "hs.floquet_multipliers takes differences of whole steps instead"
                 )
+
+    def _check_forces(self, instant: Instant) -> None:
+        """Refuse a law that acts on forces of contacts, which errors change, too."""
+        seen = {**instant.seen.members(), "force": (1.0 + PRESSED) * instant.seen.force}
+        pressed = replace(instant, seen=Contacts(**seen))
+        if not np.array_equal(pressed.torque(), instant.torque()):
+            raise SimulationError(
+                "the controller's torques hang on forces of the contacts, which is not linearised "
+                "here. hs.find_limit_cycle takes differences of whole steps instead"
+            )
 
     def _remembered(self) -> dict[str, float]:
         """The numbers of the law's memory now, by name."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.contact.modes import OPEN
-from heelstrike.dynamics.loops import count_rows
 from heelstrike.errors import SimulationError
 from heelstrike.sim.closed_sets import Scheme
 from heelstrike.sim.contacts.rows import POINT, SECOND_FACE
@@ -48,14 +47,8 @@ def refuse_step(simulation: Simulation) -> None:
         That says what is in the way.
     """
     reasons = {
-        "closed loops and coupled joints": bool(count_rows(simulation.robot.model)),
         "constraints from outside": bool(simulation.robot.constraints),
         "smooth ground": bool(simulation.ground.model().curved),
-        "brakes": bool(simulation.braked),
-        "pushes": any(
-            push.end > simulation.time - _step(simulation) and push.start < simulation.time
-            for push in simulation._pushes
-        ),
         "a motor on its speed-torque line, or under a voltage,": bool(
             np.any(simulation._memory.torque != simulation._memory.command)
         ),
@@ -69,10 +62,6 @@ def refuse_step(simulation: Simulation) -> None:
     for what, there in reasons.items():
         if there:
             raise SimulationError(f"{what} in a time step cannot be differentiated yet")
-
-
-def _step(simulation: Simulation) -> float:
-    return simulation.method.step_length or 0.0
 
 
 def _held(simulation: Simulation, kind: int) -> np.ndarray:

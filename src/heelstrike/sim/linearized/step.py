@@ -27,6 +27,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.linearized.flow import Variation
 from heelstrike.sim.linearized.inputs import Inputs
+from heelstrike.sim.linearized.pushed import pushed
 from heelstrike.sim.run import Event, Run
 
 Floats = NDArray[np.float64]
@@ -45,7 +46,7 @@ MOST_TOGETHER = 3
 
 NOT_SMOOTH = (
     EventKind.ZENO, EventKind.PAINLEVE, EventKind.ENERGY_GAIN, EventKind.BRIDGE, EventKind.WEDGED,
-    EventKind.JOINT_SLIP, EventKind.JOINT_STICK,
+    EventKind.JOINT_SLIP, EventKind.JOINT_STICK, EventKind.JOINT_BRAKE,
 )  # fmt: skip
 """Events behind which errors have no derivative that is known here."""
 
@@ -128,13 +129,14 @@ def linearized(
     instants = _instants(run, begin, until)
     times = [begin, *(events[0].time for events in instants)]
     bounds = list(pairwise(times if section else [*times, until]))
-    held = [_active(run, *each) for each in bounds]
+    held = [_active(run, *each, variation.braked) for each in bounds]
     flows, saltations, arrival = [], [], None
     for k, begin_and_end in enumerate(bounds):
         flows.append(variation.flow(*begin_and_end, held[k]))
         if k < len(instants):
             after = held[k + 1] if k + 1 < len(held) else None
-            instant = _Instant(run, tuple(instants[k]), held[k], after, variation.inputs)
+            events = tuple(instants[k])
+            instant = _Instant(run, events, held[k], after, variation.inputs, variation.braked)
             saltations.append(instant.saltation())
             arrival = instant.arrival() if after is None else None
     return Motion(tuple(flows), tuple(saltations), arrival)
@@ -150,11 +152,6 @@ def _refuse(robot: Robot, run: Run, period: float) -> None:
     if robot.constraints:
         raise SimulationError(
             f"constraints from outside of {robot.name!r} are not linearised here; "
-            "hs.find_limit_cycle takes differences instead"
-        )
-    if np.any(run.brake_torque):
-        raise SimulationError(
-            f"brakes of {robot.name!r} are on, which is not linearised here; "
             "hs.find_limit_cycle takes differences instead"
         )
     if run.saturations:
@@ -183,7 +180,7 @@ def _instants(run: Run, begin: float, period: float) -> list[list[Event]]:
     return instants
 
 
-def _active(run: Run, begin: float, end: float) -> ActiveContacts:
+def _active(run: Run, begin: float, end: float, braked: tuple[int, ...]) -> ActiveContacts:
     """What holds the robot between two events, as the row nearest to their middle shows it."""
     row = int(np.argmin(np.abs(run.time - 0.5 * (begin + end))))
     if not begin + SAME_INSTANT < run.time[row] < end - SAME_INSTANT:
@@ -194,7 +191,7 @@ def _active(run: Run, begin: float, end: float) -> ActiveContacts:
     return ActiveContacts(
         resting=tuple(i for i in down if abs(speed[i]) <= SLIPS),
         sliding=tuple((i, 1 if speed[i] > 0.0 else -1) for i in down if abs(speed[i]) > SLIPS),
-        joints=tuple(int(j) for j in np.flatnonzero(run.stop_torque[row])),
+        joints=(*(int(j) for j in np.flatnonzero(run.stop_torque[row])), *braked),
     )
 
 
@@ -207,6 +204,8 @@ class _Instant:
     held: ActiveContacts
     after: ActiveContacts | None
     inputs: Inputs
+    braked: tuple[int, ...]
+    """Joints that brakes hold."""
 
     @property
     def time(self) -> float:
@@ -272,7 +271,8 @@ class _Instant:
     def _rate(self, row: int, active: ActiveContacts) -> Floats:
         run = self.run
         q, v, torque = run.position[row], run.velocity[row], run.torque[row]
-        return linearize_contact(run.robot, q, v, torque, active, ground=run.ground).rate
+        acting = pushed(run.robot, q, run.pushes, float(run.time[row]))
+        return linearize_contact(run.robot, q, v, torque, active, ground=run.ground, **acting).rate
 
     def _through(self, order: list[Strike]) -> Floats:
         """Matrix of what comes down in an order."""
@@ -318,12 +318,13 @@ class _Instant:
         friction = float(run.ground.model().friction[0]) * run.robot.model.friction_scale
         others = [event for event in self.struck if event not in self.fresh]
         down = [
-            (self._gap_gradient(event), _struck([*order[:count], *others], friction))
+            (self._gap_gradient(event), self._struck([*order[:count], *others], friction))
             for count, event in enumerate(order, start=1)
         ]
         found = strikes(
             run.robot, run.position[first], run.velocity[first], self.before, run.torque[last],
             down, run.ground, self.inputs.numbers,
+            pushed(run.robot, run.position[last], run.pushes, float(run.time[last])).get("force"),
         )  # fmt: skip
         if found:
             v = found[-1].impact.velocity
@@ -334,6 +335,27 @@ class _Instant:
                     f"bounce or come off in it leave velocities {off:.3g} from those recomputed"
                 )
         return found
+
+    def _struck(self, events: Sequence[Event], friction: Floats) -> ActiveContacts:
+        """What receives impulses in an impact; `friction` is that of all points."""
+        points = [event for event in events if not event.kind.of_joint]
+        on_the_cone = [
+            abs(event.impulse[1]) >= friction[event.contact] * event.impulse[0] * (1.0 - 1e-9)
+            for event in points
+        ]
+        return ActiveContacts(
+            resting=tuple(
+                event.contact
+                for event, slides in zip(points, on_the_cone, strict=True)
+                if not slides
+            ),
+            sliding=tuple(
+                (event.contact, -1 if event.impulse[1] > 0.0 else 1)
+                for event, slides in zip(points, on_the_cone, strict=True)
+                if slides
+            ),
+            joints=(*(event.contact for event in events if event.kind.of_joint), *self.braked),
+        )
 
     def _gap_gradient(self, event: Event) -> Floats:
         """Derivative of what vanishes as a point comes down, or a joint comes to its stop."""
@@ -346,23 +368,3 @@ class _Instant:
         upper = self.run.position[self.rows[0], event.contact] > middle
         gradient[event.contact] = -1.0 if upper else 1.0
         return gradient
-
-
-def _struck(events: Sequence[Event], friction: Floats) -> ActiveContacts:
-    """What receives impulses in an impact, as its events tell; `friction` is that of all points."""
-    points = [event for event in events if not event.kind.of_joint]
-    on_the_cone = [
-        abs(event.impulse[1]) >= friction[event.contact] * event.impulse[0] * (1.0 - 1e-9)
-        for event in points
-    ]
-    return ActiveContacts(
-        resting=tuple(
-            event.contact for event, slides in zip(points, on_the_cone, strict=True) if not slides
-        ),
-        sliding=tuple(
-            (event.contact, -1 if event.impulse[1] > 0.0 else 1)
-            for event, slides in zip(points, on_the_cone, strict=True)
-            if slides
-        ),
-        joints=tuple(event.contact for event in events if event.kind.of_joint),
-    )

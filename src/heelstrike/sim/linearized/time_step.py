@@ -13,6 +13,8 @@ steps too, and with r of :mod:`heelstrike.contact.linearized.partials`, at a = (
 
 Rows may depend on each other, as those of a flat foot do: impulses are not unique then, velocities
 are. An impact that is whole within a step is a second such problem beside that of the positions.
+Positions are then put back on the equations of loops and brakes (:mod:`.closing`), which is
+differentiated apart.
 """
 
 from __future__ import annotations
@@ -29,17 +31,21 @@ from heelstrike.contact.linearized.partials import (
 from heelstrike.contact.modes import OPEN, SLIP_FORWARD, STICK
 from heelstrike.contact.sets import LINE
 from heelstrike.dynamics.dense import triangulate
+from heelstrike.dynamics.kernels import forward_kinematics
 from heelstrike.dynamics.loops import LoopRows, count_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.rows import (
+    BRAKE,
     DRY_JOINT,
+    LOOP,
     POINT,
     STOP,
     lay_out_rows,
 )
-from heelstrike.sim.memory import Assembly, Memory, Surface
+from heelstrike.sim.memory import Assembly, Memory
+from heelstrike.sim.push import Pushes, add_push_slopes
 from heelstrike.sim.time_stepping.method import (
     LINEARLY_IMPLICIT,
     MOREAU_JEAN,
@@ -78,6 +84,11 @@ class StepSlopes(Bundle):
     balance: Balance = part(Balance)
     partials: Partials = part(Partials)
     """balance, partials: The equations of the step."""
+    pushed_by_q: Floats = array("nv", "nq")
+    """What position does to the generalised force of pushes."""
+    turning: float = cell(float)
+    """The part of the step in which loops turn: half of it, none of one in which a brake takes
+    hold."""
     bounce_by_q: Floats = array("2 nc", "nq")
     """What position does to the velocities of the points before the step."""
     loops: LoopRows = part(LoopRows)
@@ -120,6 +131,7 @@ def allocate_slopes(
         active=ActiveRows.allocate(extents),
         program=partial_program(model, dated=False, numbers=numbers),
         rubs=int(friction),
+        turning=0.5,
     )
 
 
@@ -132,6 +144,8 @@ def differentiate_step(model: Model, work: Stepping, memory: Memory, slopes: Ste
     assembly, impact, surface = memory.assembly, work.impact, memory.surface
     added, normal = memory.equations.added, memory.contacts.normal
     pose_balance(slopes.q, slopes.v, added, normal, slopes.balance)
+    if memory.pushes.link.shape[0] > 0:
+        find_pushes(model, slopes.q, memory.pushes, slopes.tree, slopes.pushed_by_q)
     bounces = False
     for place in range(assembly.begin[POINT], assembly.until[POINT]):
         bounces = bounces or surface.restitution[assembly.candidate[place]] > 0.0
@@ -155,6 +169,18 @@ def differentiate_step(model: Model, work: Stepping, memory: Memory, slopes: Ste
     )  # fmt: skip
     moves = slopes.arriving if impact.happens == 1 else slopes.after
     write_state(model.nq, work.scheme, work.step, moves, slopes.after, slopes.state)
+
+
+@kernel
+def find_pushes(
+    model: Model, q: Floats, pushes: Pushes, tree: Workspace, pushed_by_q: Floats
+) -> None:
+    """Write what position does to the generalised force of the pushes that act in the step."""
+    for i in range(pushed_by_q.shape[0]):
+        for j in range(pushed_by_q.shape[1]):
+            pushed_by_q[i, j] = 0.0
+    forward_kinematics(model, q, tree)
+    add_push_slopes(model, tree, pushes, pushed_by_q)
 
 
 @kernel
@@ -205,16 +231,28 @@ def differentiate_problem(
     for place in range(assembly.begin[POINT], assembly.until[POINT]):
         for k in range(2):
             balance.push[assembly.candidate[place], k] = impulse[2 * place + k] / step
+    balance.ahead[1] = slopes.turning * step
+    for row in range(balance.pull.shape[0]):
+        balance.pull[row] = impulse[2 * (assembly.begin[LOOP] + row)] / step
     evaluate(model, after, slopes)
     rows, partials = slopes.active, slopes.partials
     rate = 1.0 / step if gaps else 0.0
     bounce = slopes.bounce_by_q
+    surface, candidate = memory.surface, assembly.candidate
     active = write_points(
-        model, impulse, mode, rate, bounces, bounce, assembly, memory.surface, balance.rows,
-        partials, rows,
+        model, assembly.until[POINT], candidate, impulse, mode, rate, bounces, bounce,
+        surface.friction, surface.restitution, balance.rows, partials.along_by_q, rows,
     )  # fmt: skip
     active = write_joints(active, mode, rate, assembly, memory.rows.owner, memory.rows.side, rows)
+    if assembly.until[LOOP] > assembly.begin[LOOP]:
+        active = write_loops(
+            active, assembly.begin[LOOP], assembly.until[LOOP], candidate, model.brake_joint,
+            memory.rows.kind, memory.rows.owner,
+            slopes.loops.jacobian, partials, rows,
+        )  # fmt: skip
     write_free(model, step, active, partials, rows)
+    if memory.pushes.link.shape[0] > 0:
+        push_free(step, active, slopes.pushed_by_q, rows.response)
     if work.scheme == LINEARLY_IMPLICIT:
         stiffen(step, 1.0, active + model.nq, memory.stiffness, rows.response)
     elif work.scheme == MOREAU_JEAN:
@@ -253,17 +291,18 @@ def begin_row(row: int, active: ActiveRows) -> None:
 
 @kernel
 def write_points(
-    model: Model, impulse: Floats, mode: Integers, rate: float, bounces: bool, bounce: Floats,
-    assembly: Assembly, surface: Surface, jacobian: Floats, partials: Partials, rows: ActiveRows,
+    model: Model, points: int, candidate: Integers, impulse: Floats, mode: Integers, rate: float,
+    bounces: bool, bounce: Floats, frictions: Floats, restitutions: Floats, jacobian: Floats,
+    along_by_q: Floats, rows: ActiveRows,
 ) -> int:  # fmt: skip
-    """Write the active rows of contact points; return how many there are."""
+    """Write the active rows of contact points, the first candidates; return how many there are."""
     active = 0
-    for place in range(assembly.begin[POINT], assembly.until[POINT]):
+    for place in range(points):
         if mode[place] == OPEN:
             continue
-        point = assembly.candidate[place]
+        point = candidate[place]
         normal, tangent = 2 * point, 2 * point + 1
-        friction, back = surface.friction[point], surface.restitution[point]
+        friction, back = frictions[point], restitutions[point]
         sticks = mode[place] == STICK and friction > 0.0
         way = 0.0 if mode[place] == STICK else (-1.0 if mode[place] == SLIP_FORWARD else 1.0)
         begin_row(active, rows)
@@ -272,7 +311,7 @@ def write_points(
         for j in range(model.nv):
             rows.held[active, j] = jacobian[normal, j]
             rows.response[j, active] = jacobian[normal, j] + way * friction * jacobian[tangent, j]
-            rows.change[active, j] = partials.along_by_q[normal, j] + rate * jacobian[normal, j]
+            rows.change[active, j] = along_by_q[normal, j] + rate * jacobian[normal, j]
             if bounces:
                 rows.change[active, j] += back * bounce[normal, j]
                 rows.change[active, model.nq + j] = back * jacobian[normal, j]
@@ -281,7 +320,7 @@ def write_points(
             begin_row(active, rows)
             for j in range(model.nv):
                 rows.held[active, j] = rows.response[j, active] = jacobian[tangent, j]
-                rows.change[active, j] = partials.along_by_q[tangent, j]
+                rows.change[active, j] = along_by_q[tangent, j]
             active += 1
     return active
 
@@ -314,6 +353,28 @@ def write_joints(
 
 
 @kernel
+def write_loops(
+    active: int, first: int, last: int, candidate: Integers, brake_joint: Integers, kind: Integers,
+    owner: Integers, jacobian: Floats, partials: Partials, rows: ActiveRows,
+) -> int:  # fmt: skip
+    """Write the active rows of loops, couplings and brakes; return how many there are with them."""
+    nv = rows.held.shape[1]
+    for place in range(first, last):
+        entry, row = candidate[place], place - first
+        begin_row(active, rows)
+        if kind[entry] == BRAKE:
+            joint = brake_joint[owner[entry]]
+            rows.held[active, joint] = rows.response[joint, active] = 1.0
+        else:
+            for j in range(nv):
+                rows.held[active, j] = rows.response[j, active] = jacobian[row, j]
+                rows.change[active, j] = partials.loop_along_by_q[row, j]
+                rows.change[active, nv + j] = partials.loop_along_by_v[row, j]
+        active += 1
+    return active
+
+
+@kernel
 def write_free(
     model: Model, step: float, active: int, partials: Partials, rows: ActiveRows
 ) -> None:
@@ -333,6 +394,14 @@ def write_free(
             response[i, by_number + j] = -step * partials.lacking_by_numbers[i, j]
     for j in range(model.nu):
         response[model.actuator_joint[j], by_torque + j] = step
+
+
+@kernel
+def push_free(step: float, active: int, pushed_by_q: Floats, response: Floats) -> None:
+    """Add what position does to pushes."""
+    for i in range(pushed_by_q.shape[0]):
+        for j in range(pushed_by_q.shape[1]):
+            response[i, active + j] += step * pushed_by_q[i, j]
 
 
 @kernel
