@@ -23,7 +23,7 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
-from heelstrike.contact.sets import INTERVAL, LINE, is_empty, room
+from heelstrike.contact.sets import INTERVAL, LINE, is_empty, room, row_of
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -127,7 +127,7 @@ def certify(
     first, end = problem.first, 0
     nothing = 0.0 * unit  # and stays nothing unless a number is infinite or none
     for contact in range(count):
-        normal, end = end, first[contact + 1]
+        normal, end = end, row_of(contact + 1, first)
         tangent = normal + 1
         normal_impulse = impulse[normal]
         if problem.set[contact] == INTERVAL:

@@ -19,9 +19,12 @@ import enum
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import product_error
-from heelstrike.contact.workspace import ContactProblem
+from heelstrike.contact.workspace import ContactProblem, Integers
 
 CONE, HALF_LINE, LINE, INTERVAL = range(4)
+
+EVERY_ROW = 2**31 - 1
+"""No problem has more rows."""
 
 
 class ImpulseSet(enum.IntEnum):
@@ -36,6 +39,15 @@ class ImpulseSet(enum.IntEnum):
     HALF_LINE = HALF_LINE
     LINE = LINE
     INTERVAL = INTERVAL
+
+
+@kernel
+def row_of(place: int, rows: Integers) -> int:
+    """Row of a problem from a list of them, such as those that its groups begin with.
+
+    The compiler is told that it is not negative: at every use of it as an index it would ask.
+    """
+    return rows[place] & EVERY_ROW
 
 
 @kernel

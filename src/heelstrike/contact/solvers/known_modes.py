@@ -13,7 +13,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.certificate import REST_TOLERANCE, certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
-from heelstrike.contact.sets import LINE, projected
+from heelstrike.contact.sets import LINE, projected, row_of
 from heelstrike.contact.solvers.elimination import POOR_PIVOT
 from heelstrike.contact.workspace import (
     ContactAnswer,
@@ -63,7 +63,7 @@ def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) 
         equation[row] = -1
     size = 0
     for contact in range(problem.count):
-        row = first[contact]
+        row = row_of(contact, first)
         tangent = row + 1
         if mode[contact] == OPEN and problem.set[contact] != LINE:
             continue
@@ -77,7 +77,7 @@ def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) 
         if not has_friction:
             continue
         for earlier in range(contact):
-            other = first[earlier] + 1
+            other = row_of(earlier, first) + 1
             if problem.friction[earlier] > 0.0 and equation[other] >= 0:
                 both = delassus[tangent, tangent] + delassus[other, other]
                 if abs(both - 2.0 * delassus[tangent, other]) <= SHARED_ROW * both:
@@ -108,15 +108,16 @@ def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> int
     for attempt in range(2):
         place = 0
         for i in range(size):
-            row = source[i]
+            row = row_of(i, source)
             x[i] = -problem.free[row]
             for j in range(i + 1):
-                matrix[place] = delassus[row, source[j]]
+                matrix[place] = delassus[row, row_of(j, source)]
                 place += 1
         play(rows.programs[size], (matrix, x, pivot))
         outcome, late, rank = HOLDS, -1, 0
         for i in range(size):
-            diagonal = delassus[source[i], source[i]]
+            row = row_of(i, source)
+            diagonal = delassus[row, row]
             rank += pivot[i] > POOR_PIVOT * diagonal
             if pivot[i] > EARLY_PIVOT * diagonal or abs(pivot[i]) <= NO_PIVOT * diagonal:
                 continue
@@ -307,14 +308,14 @@ def share_impulses(problem: ContactProblem, rows: StickingRows, answer: ContactA
         largest = max(largest, abs(impulse[row]))
     pulling = 0
     for contact in range(problem.count):
-        if impulse[first[contact]] < -CLEAN * largest and problem.set[contact] != LINE:
+        if impulse[row_of(contact, first)] < -CLEAN * largest and problem.set[contact] != LINE:
             answer.mode[contact] = OPEN
             rows.pulled[contact] = 1
             pulling += 1
     if pulling == 0:
         end = 0
         for contact in range(problem.count):
-            row, end = end, first[contact + 1]
+            row, end = end, row_of(contact + 1, first)
             if end == row + 1:
                 impulse[row], _ = projected(problem, contact, impulse[row], 0.0)
                 continue
@@ -338,7 +339,7 @@ def name_by_velocity(
     root, rest, first = yardstick.root, answer.rest, problem.first
     pressed, end = 0, 0
     for contact in range(problem.count):
-        normal, end = end, first[contact + 1]
+        normal, end = end, row_of(contact + 1, first)
         tangent = normal + 1
         if velocity[normal] > rest * root[normal] and problem.set[contact] != LINE:
             if mode[contact] != OPEN:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, STICK
-from heelstrike.contact.sets import INTERVAL
+from heelstrike.contact.sets import INTERVAL, row_of
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.geometry import EVERYWHERE, contact_rows, write_unit_row
@@ -38,7 +38,7 @@ def list_candidate(entry: int, place: int, components: int, memory: Memory) -> i
     Returns the first of them.
     """
     problem, assembly = memory.assembly.problem, memory.assembly
-    first = problem.first[place]
+    first = row_of(place, problem.first)
     problem.first[place + 1] = first + components
     problem.set[place] = memory.rows.set[entry]
     problem.friction[place] = memory.surface.friction[entry]
@@ -176,14 +176,14 @@ def note_answer(model: Model, span: float, memory: Memory) -> None:
     for entry in range(rows.first[DRY_JOINT]):
         reaction.mode[entry] = OPEN
     for place in range(begin[POINT], until[POINT]):
-        contact, row = candidate[place], first[place]
+        contact, row = candidate[place], row_of(place, first)
         force[contact, 0] = impulse[row] / span
         force[contact, 1] = impulse[row + 1] / span
         reaction.slip[contact] = answer.velocity[row + 1]
         reaction.mode[contact] = answer.mode[place]
     for place in range(begin[STOP], until[STOP]):
         stop = candidate[place]
-        pressing = rows.side[stop] * impulse[first[place]]
+        pressing = rows.side[stop] * impulse[row_of(place, first)]
         reaction.stop_torque[rows.owner[stop]] += pressing / span
         reaction.mode[stop] = answer.mode[place] != OPEN
     for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):

@@ -109,7 +109,10 @@ def collide(model: Model, nudge: float, memory: Memory, work: Motion) -> tuple[b
     count = list_hit(rows, modes, impact.hit, candidate)
     if count + rows_of(loops) == 0:
         return True, 0.0, 0.0
-    write_candidates(count, candidate, model, equations.tree, rows, assembly)
+    write_candidates(
+        count, candidate, model, equations.tree, rows, assembly.problem.first, assembly.leaf,
+        jacobian,
+    )  # fmt: skip
     for place in range(count):
         contact = candidate[place]
         normal = row_product(jacobian, 2 * place, v)
@@ -179,7 +182,10 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
     )  # fmt: skip
     find_loops(model, q, v, tree, loops)
     count = list_closed(rows, modes, candidate, assembly.problem.bound)
-    write_candidates(count, candidate, model, tree, rows, assembly)
+    write_candidates(
+        count, candidate, model, tree, rows, assembly.problem.first, assembly.leaf,
+        jacobian,
+    )  # fmt: skip
     for place in range(count):
         contact = candidate[place]
         free_gap_acceleration(contact, place, model, tree, rows, face, bend, rate, jacobian, free)

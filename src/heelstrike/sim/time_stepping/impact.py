@@ -39,7 +39,7 @@ from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
+from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE, row_of
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -237,13 +237,13 @@ def arrives(step: float, place: int, first: Integers, answer: ContactAnswer) -> 
 
     With the linearised gap in the free term, velocities are gaps at the end divided by the step.
     """
-    return step * answer.velocity[first[place]] <= CLOSED_GAP
+    return step * answer.velocity[row_of(place, first)] <= CLOSED_GAP
 
 
 @dissolved_kernel
 def would_close(step: float, place: int, problem: ContactProblem) -> bool:
     """Whether a candidate would touch at the end of the step if it were free."""
-    return step * problem.free[problem.first[place]] < CLOSED_GAP
+    return step * problem.free[row_of(place, problem.first)] < CLOSED_GAP
 
 
 @dissolved_kernel

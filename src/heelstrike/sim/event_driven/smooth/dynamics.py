@@ -314,7 +314,10 @@ def evaluate(
     if rows_of(loops) > 0:
         find_loops(model, q, v, tree, loops)
     count = list_closed(rows, modes, assembly.candidate, assembly.problem.bound)
-    write_candidates(count, assembly.candidate, model, tree, rows, assembly)
+    write_candidates(
+        count, assembly.candidate, model, tree, rows, assembly.problem.first, assembly.leaf,
+        assembly.jacobian,
+    )  # fmt: skip
     total = append_loops(count, 2, loops, assembly)
     forces.count = count
     saddle.needed = 0

@@ -17,7 +17,6 @@ from heelstrike.sim.contacts.faces import CURVE
 from heelstrike.sim.contacts.geometry import write_unit_row
 from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, STOP, Rows, is_of_ground
 from heelstrike.sim.contacts.writers import rate_of
-from heelstrike.sim.memory import Assembly
 
 
 @kernel
@@ -56,10 +55,10 @@ def gap_rows(
 
 @kernel
 def write_candidates(
-    count: int, candidate: Integers, model: Model, tree: Workspace, rows: Rows, assembly: Assembly
-) -> None:
+    count: int, candidate: Integers, model: Model, tree: Workspace, rows: Rows, first: Integers,
+    leaf: Integers, jacobian: Floats,
+) -> None:  # fmt: skip
     """Write the Jacobian rows of the first `count` candidates."""
-    first, leaf, jacobian = assembly.problem.first, assembly.leaf, assembly.jacobian
     for place in range(count):
         gap_rows(candidate[place], place, model, tree, rows, first, leaf, jacobian)
 
