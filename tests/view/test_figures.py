@@ -326,7 +326,7 @@ def test_a_dollar_in_a_name_is_a_dollar(tmp_path: Path) -> None:
 
 def test_a_picture_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """matplotlib draws a figure twice to lay it out; what is written is the same, bit by bit."""
-    figure = plot(pendulum(), "energy")
+    figure = plot(walking.walk(steps=4), "energy")
     with styled():
         figure.savefig(tmp_path / "twice.png")
     draws, draw = [], Picture.draw
