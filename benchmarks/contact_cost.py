@@ -23,7 +23,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, Solver
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.solvers.certified_solve import contact_workspace
-from heelstrike.contact.workspace import ContactAnswer, ContactProblem
+from heelstrike.contact.workspace import ContactAnswer, contact_problem
 from heelstrike.dynamics import bias_force, mass_matrix, point_jacobian
 
 BATCHES = 20
@@ -83,8 +83,8 @@ def measure(number: int = 200, repeats: int = 20) -> dict[str, dict[str, float]]
         times = []
         shortcuts = 0
         for delassus, free in problems:
-            problem = ContactProblem.allocate(
-                nc=count, count=count, delassus=delassus, free=free, friction=friction
+            problem = contact_problem(
+                count, count=count, delassus=delassus, free=free, friction=friction
             )
             solve_contact_kernel(order, problem, work, answer)
             first = answer.mode.copy() if name == "warm" else cold

@@ -60,7 +60,7 @@ def list_closed(kind: int, count: int, memory: Any) -> int:
     first = count
     for entry in range(memory.rows.first[kind], memory.rows.end[kind]):
         if memory.rows.gap[entry] <= 0.0:
-            sim.list_candidate(entry, count, memory)
+            sim.list_candidate(entry, count, memory.rows.components[entry], memory)
             count += 1
     sim.note_group(kind, first, count, memory.assembly)
     return count
@@ -78,9 +78,9 @@ def pose(model: Any, step: float, memory: Any) -> int:
     )
     tree, seconds = memory.equations.tree, memory.seconds
     sim.write_rows(model, tree, memory.contacts, seconds, memory.rows, assembly)
-    for row in range(2 * count):
+    for row in range(assembly.problem.first[count]):
         assembly.problem.free[row] = sim.row_product(assembly.jacobian, row, v)
-    total = sim.append_loops(count, loops, assembly)
+    total = sim.append_loops(count, 1, loops, assembly)
     sim.free_loops(total, loops, v, 0.5 * step, assembly)
     return sim.note_group(sim.LOOP, count, total, assembly)
 

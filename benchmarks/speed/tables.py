@@ -36,6 +36,15 @@ def _steps(part: dict[str, Any]) -> Iterator[Table]:
         ["scenario", "heelstrike", *engines.values(), "to set ours up", "control"],
         body,
     )
+    motions = ("standing", "walking", "falling", "lying")
+    yield Table(
+        "times as long as ours, least to most of the robots",
+        ["", *motions],
+        [
+            [title, *(_range(rows, name, each) for each in motions)]
+            for name, title in engines.items()
+        ],
+    )
     sides = {"heelstrike": "heelstrike", **engines}
     yield Table(
         "active contacts, and the share of the weight that they carry",
@@ -55,6 +64,13 @@ def _steps(part: dict[str, Any]) -> Iterator[Table]:
                 for row, its in zip(rows, theirs, strict=True)
             ],
         )
+
+
+def _range(rows: list[dict[str, Any]], engine: str, motion: str) -> str:
+    """Least and largest of how many times as long an engine takes in scenarios of a motion."""
+    found = [row.get("times_faster", {}).get(engine) for row in rows if motion in row["scenario"]]
+    times = sorted({number(value) for value in found if value is not None}, key=float)
+    return "–".join(times[:: len(times) - 1] if len(times) > 1 else times) or "not measured"
 
 
 def _stops(part: dict[str, Any]) -> Iterator[Table]:

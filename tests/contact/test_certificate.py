@@ -21,7 +21,7 @@ from heelstrike.contact import ContactSolution, SolveStatus, solve_contact
 from heelstrike.contact.certificate import certify, velocity_error
 from heelstrike.contact.sets import CONE, LINE
 from heelstrike.contact.solvers.certified_solve import contact_workspace
-from heelstrike.contact.workspace import ContactAnswer, ContactProblem
+from heelstrike.contact.workspace import ContactAnswer, contact_problem
 
 SOLVERS = ["lemke", "fischer_burmeister", "gauss_seidel"]
 BLOCK = 0.5 * np.eye(2)
@@ -56,7 +56,7 @@ def verdict(
     work.yardstick.slope[: mu.size] = slope
     work.settings.floor = floor
     work.settings.skewed = skewed
-    problem = ContactProblem.allocate(nc=mu.size, count=mu.size, delassus=G, free=b, friction=mu)
+    problem = contact_problem(mu.size, count=mu.size, delassus=G, free=b, friction=mu)
     problem.set[:] = CONE if sets is None else sets
     answer = ContactAnswer.allocate(nc=mu.size, impulse=x)
     worst = certify(problem, work.settings, work.yardstick, answer)

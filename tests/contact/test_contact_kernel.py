@@ -27,7 +27,7 @@ from heelstrike.contact.modes import (
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.solvers.known_modes import repeat
-from heelstrike.contact.workspace import ContactAnswer, ContactProblem
+from heelstrike.contact.workspace import ContactAnswer, contact_problem
 
 ALL = (LEMKE, FISCHER_BURMEISTER, GAUSS_SEIDEL)
 
@@ -46,7 +46,7 @@ class Caller:
     residual: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        self.problem = ContactProblem.allocate(nc=self.capacity)
+        self.problem = contact_problem(self.capacity)
         self.answer = ContactAnswer.allocate(nc=self.capacity)
         for name in ("mode", "impulse", "velocity", "residual"):
             setattr(self, name, getattr(self.answer, name))
@@ -309,8 +309,8 @@ def test_many_points_of_two_soles_that_stick(points: int, close: bool) -> None:
     pressed = np.ravel(np.column_stack([1.0 + 0.0 * x, draw.uniform(-0.01, 0.01, points)]))
     free = -delassus @ pressed
     work = contact_workspace(points)
-    problem = ContactProblem.allocate(
-        nc=points, count=points, delassus=delassus, free=free, friction=np.full(points, 0.8)
+    problem = contact_problem(
+        points, count=points, delassus=delassus, free=free, friction=np.full(points, 0.8)
     )
     answer = ContactAnswer.allocate(nc=points, mode=np.full(points, STICK))
     assert repeat(problem, work.settings, work.sticking, work.yardstick, answer)

@@ -31,14 +31,14 @@ def test_what_was_taken_is_put_back_bit_by_bit() -> None:
     work.ticks, work.wheel[:], other.plan[:] = 6, 0.0, 0
     camera.put_back(image)
     assert [values.tobytes() for _, values in (*work.storage(), *other.storage())] == before
-    assert dict(zip(camera.names, image.arrays, strict=True))["two.plan"].tolist()[1] == [4, 5, 6]
+    assert image.by_name()["two.plan"].tolist()[1] == [4, 5, 6]
 
 
 def test_arrays_that_were_set_since_count() -> None:
     work = clockwork()
     camera = Camera([("", work)])
     image = camera.take()
-    arrays = dict(zip(camera.names, image.arrays, strict=True))
+    arrays = image.by_name()
     assert camera.image_of(arrays, image) is image
     arrays["wheel"] = np.array([7.0, 8.0, 9.0])
     camera.put_back(camera.image_of(arrays, image))
@@ -52,7 +52,7 @@ def test_what_does_not_fit_is_refused(wrong: np.ndarray | None) -> None:
     work = clockwork()
     camera = Camera([("", work)])
     image = camera.take()
-    arrays = dict(zip(camera.names, image.arrays, strict=True)) | {"wheel": wrong}
+    arrays = image.by_name() | {"wheel": wrong}
     with pytest.raises(ValueError, match="wheel"):
         camera.image_of(arrays, image)  # type: ignore[arg-type]
     del arrays["wheel"], arrays["nothing"]

@@ -22,6 +22,7 @@ import heelstrike as hs
 from heelstrike.analysis import energy_balance, reference_motion, zero_moment_point
 from heelstrike.view import FIGURES, ViewError, plot
 from heelstrike.view.panels import impact_rows
+from heelstrike.view.style import Picture, save_figure, styled
 
 
 def curve(axes: Axes, label: str) -> tuple[np.ndarray, np.ndarray]:
@@ -330,3 +331,16 @@ def test_a_dollar_in_a_name_is_a_dollar(tmp_path: Path) -> None:
     robot = dataclasses.replace(box(), name=r"$\frac$ of a_b^c")
     plot(make_run(robot, np.linspace(0.0, 1.0, 5)), "gaps", path=tmp_path / "box.svg")
     assert r"$\frac$ of a_b^c" in (tmp_path / "box.svg").read_text()
+
+
+def test_a_picture_is_drawn_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """matplotlib draws a figure twice to lay it out; what is written is the same, bit by bit."""
+    figure = plot(walking.walk(steps=4), "energy")
+    with styled():
+        figure.savefig(tmp_path / "twice.png")
+    draws, draw = [], Picture.draw
+    monkeypatch.setattr(Picture, "draw", lambda *given: (draws.append(1), draw(*given)))
+    once = save_figure(figure, tmp_path / "once.png")
+    assert once.read_bytes() == (tmp_path / "twice.png").read_bytes()
+    assert len(draws) == 1
+    assert figure.get_layout_engine() is not None

@@ -23,7 +23,7 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
-from heelstrike.contact.sets import INTERVAL, LINE, has_no_tangent, room
+from heelstrike.contact.sets import INTERVAL, LINE, is_empty, room, row_of
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -124,14 +124,14 @@ def certify(
     answer.rest = REST_TOLERANCE * unit * (1.0 + yardstick.effort)
     inverse = 1.0 / unit if unit > 0.0 else 0.0
     complementarity = cone = non_penetration = 0.0
+    first, end = problem.first, 0
     nothing = 0.0 * unit  # and stays nothing unless a number is infinite or none
     for contact in range(count):
-        normal, tangent = 2 * contact, 2 * contact + 1
-        normal_impulse, tangent_impulse = impulse[normal], impulse[tangent]
+        normal, end = end, row_of(contact + 1, first)
+        tangent = normal + 1
+        normal_impulse = impulse[normal]
         if problem.set[contact] == INTERVAL:
             normal_impulse = problem.bound[contact]
-        upper, lower = room(problem, contact, normal_impulse, tangent_impulse, sharply)
-        nothing += 0.0 * velocity[normal] + 0.0 * velocity[tangent] + 0.0 * (upper + lower)
 
         force_scale = 0.0
         if problem.set[contact] != INTERVAL:
@@ -147,7 +147,12 @@ def certify(
                 else:
                     cone = max(cone, -force)
 
-        if has_no_tangent(problem, contact):
+        if end == tangent:
+            nothing += 0.0 * velocity[normal] + 0.0 * normal_impulse
+            continue
+        upper, lower = room(problem, contact, normal_impulse, impulse[tangent], sharply)
+        nothing += 0.0 * velocity[normal] + 0.0 * velocity[tangent] + 0.0 * (upper + lower)
+        if is_empty(problem, contact, tangent):
             continue
         if root[tangent] > 0.0:
             force_scale = root[tangent] * inverse
@@ -196,10 +201,11 @@ def weigh(
     unit = settings.floor
     skewed = settings.skewed != 0
     effort = 0.0
-    for i in range(2 * problem.count):
+    rows = problem.first[problem.count]
+    for i in range(rows):
         weight = delassus[i, i]
         if skewed:
-            weight = general_weight(2 * problem.count, i, delassus)
+            weight = general_weight(rows, i, delassus)
         root[i] = math.sqrt(weight) if weight > 0.0 else 0.0
         if weight > 0.0:
             unit = max(unit, abs(problem.free[i]) / root[i])
@@ -236,18 +242,16 @@ def relative_speed(velocity: float, root: float, inverse: float) -> float:
 @kernel
 def sum_velocities(problem: ContactProblem, impulse: Floats, velocity: Floats) -> None:
     """Write ``velocity = G impulse + free``."""
-    count, delassus, free = problem.count, problem.delassus, problem.free
-    for i in range(2 * count):
-        if i % 2 == 1 and has_no_tangent(problem, i // 2):
-            velocity[i] = free[i]
-            continue
-        # Friction is summed apart from the normal impulses: the sums run side by side.
-        by_normal = free[i]
-        by_friction = 0.0
-        for contact in range(count):
-            by_normal += delassus[i, 2 * contact] * impulse[2 * contact]
-            by_friction += delassus[i, 2 * contact + 1] * impulse[2 * contact + 1]
-        velocity[i] = by_normal + by_friction
+    delassus, free, rows = problem.delassus, problem.free, problem.first[problem.count]
+    for i in range(rows):
+        # Two sums run side by side: where all contacts have a tangent, friction and the rest.
+        even, odd = free[i], 0.0
+        for pair in range(rows // 2):
+            even += delassus[i, 2 * pair] * impulse[2 * pair]
+            odd += delassus[i, 2 * pair + 1] * impulse[2 * pair + 1]
+        if rows % 2 == 1:
+            even += delassus[i, rows - 1] * impulse[rows - 1]
+        velocity[i] = even + odd
 
 
 @kernel
@@ -259,16 +263,16 @@ def sum_velocities_sharply(
     What is left is relative to the data's velocities. ``yardstick.effort`` becomes the
     largest sum of magnitudes of any row, in the same unit.
     """
-    count, delassus, free = problem.count, problem.delassus, problem.free
+    rows, delassus, free = problem.first[problem.count], problem.delassus, problem.free
     root, unit = yardstick.root, yardstick.unit
-    terms = 2.0 * count + 1.0
+    terms = 2.0 * problem.count + 1.0
     effort = 0.0
     rounding = 0.0
-    for i in range(2 * count):
+    for i in range(rows):
         total = free[i]
         error = 0.0
         magnitude = abs(free[i])
-        for j in range(2 * count):
+        for j in range(rows):
             product = delassus[i, j] * impulse[j]
             if product == 0.0:
                 continue
@@ -305,7 +309,7 @@ def velocity_error(worst: float, friction: Floats, yardstick: Yardstick) -> Floa
     worst : float
         Largest residual, rounding included.
     friction : (nc,) float
-        Friction coefficients.
+        Friction coefficients of contacts that have a tangent all.
     yardstick : Yardstick
         As :func:`certify` left it.
 

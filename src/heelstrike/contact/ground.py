@@ -306,9 +306,7 @@ class Ground(ShownInNotebooks):
             of_shape = [self.shape.at(each)[0] for each in x.reshape(-1).tolist()]
             return np.array(of_shape, dtype=np.float64).reshape(x.shape)
         vertices = self._model.vertices
-        segment = np.clip(
-            np.searchsorted(vertices[:, 0], x, side="right") - 1, 0, len(vertices) - 2
-        )
+        segment = np.searchsorted(vertices[1:-1, 0], x, side="right")
         left, right = vertices[segment], vertices[segment + 1]
         run = right[..., 0] - left[..., 0]
         slope = (right[..., 1] - left[..., 1]) / np.where(run > 0.0, run, np.inf)

@@ -26,6 +26,7 @@ from heelstrike.contact.workspace import (
     ContactWorkspace,
     Floats,
     Integers,
+    contact_problem,
 )
 from heelstrike.errors import ContactProblemError
 from heelstrike.field_texts import dataclass
@@ -218,8 +219,8 @@ def run_solvers(
     work.settings.amendments = 0  # nobody has guessed the modes
     work.settings.patient = 1
     work.settings.skewed = 0 if semidefinite else 1
-    problem = ContactProblem.allocate(
-        nc=count, count=count, delassus=matrix, free=offset, friction=friction,
+    problem = contact_problem(
+        count, count=count, delassus=matrix, free=offset, friction=friction,
         set=np.full(count, CONE, np.int64) if sets is None else sets,
     )  # fmt: skip
     answer = ContactAnswer.allocate(nc=count, mode=mode)

@@ -7,9 +7,10 @@
 ``INTERVAL``          ‖λ_t‖ ≤ bound               dry friction of a joint
 ====================  ==========================  =========================================
 
-A group has two rows, normal and tangent. Only cones have friction; that of half-lines and lines is
-zero. An interval is the section of a cone of friction 1 where the normal impulse is the bound, and
-has no normal row: what stands in its place belongs to the solvers (:func:`press`).
+A group has two rows, normal and tangent, or the normal alone. Only cones have friction; that of
+half-lines and lines is zero, and they need no tangent. An interval is the section of a cone of
+friction 1 where the normal impulse is the bound, and has no normal row: what stands in its place
+belongs to the solvers (:func:`press`).
 """
 
 from __future__ import annotations
@@ -18,9 +19,12 @@ import enum
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import product_error
-from heelstrike.contact.workspace import ContactProblem
+from heelstrike.contact.workspace import ContactProblem, Integers
 
 CONE, HALF_LINE, LINE, INTERVAL = range(4)
+
+EVERY_ROW = 2**31 - 1
+"""No problem has more rows."""
 
 
 class ImpulseSet(enum.IntEnum):
@@ -38,9 +42,23 @@ class ImpulseSet(enum.IntEnum):
 
 
 @kernel
-def has_no_tangent(problem: ContactProblem, group: int) -> bool:
+def row_of(place: int, rows: Integers) -> int:
+    """Row of a problem from a list of them, such as those that its groups begin with.
+
+    The compiler is told that it is not negative: at every use of it as an index it would ask.
+    """
+    return rows[place] & EVERY_ROW
+
+
+@kernel
+def components_of(kind: int) -> int:
+    """How many rows a group needs by its set."""
+    return 1 if kind in (HALF_LINE, LINE) else 2
+
+
+@kernel
+def is_empty(problem: ContactProblem, group: int, tangent: int) -> bool:
     """Whether the second row of a group is empty: that of a stop or a loop."""
-    tangent = 2 * group + 1
     return problem.set[group] in (HALF_LINE, LINE) and problem.delassus[tangent, tangent] == 0.0
 
 
@@ -54,9 +72,9 @@ def press(group: int, problem: ContactProblem) -> None:
 
     where g, the Delassus diagonal of the tangent, makes both rows of one size.
     """
-    normal = 2 * group
+    normal = problem.first[group]
     weight = problem.delassus[normal + 1, normal + 1]
-    for i in range(2 * problem.count):
+    for i in range(problem.first[problem.count]):
         problem.delassus[normal, i] = problem.delassus[i, normal] = 0.0
     problem.delassus[normal, normal] = weight
     problem.free[normal] = -weight * problem.bound[group]

@@ -1,11 +1,14 @@
 """The contact problem, its answer, and the memory of the solvers, reused by every solve.
 
-Rows of a problem go contact by contact, normal before tangent: n0 t0 n1 t1 ... Of these the solvers
-make *unknowns*, the rows that can carry an impulse, scaled; and for given modes *equations*, the
-unknowns whose velocity vanishes.
+Rows of a problem go contact by contact, normal before tangent: n0 t0 n1 t1 ... What has no friction
+may do without a tangent, so that every contact tells its first row. Of the rows the solvers make
+*unknowns*, those that can carry an impulse, scaled; and for given modes *equations*, the unknowns
+whose velocity vanishes.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +24,8 @@ class ContactProblem(Bundle):
 
     count: int = cell(int)
     """Number of contacts; the leading blocks of the arrays are used."""
+    first: Integers = array("nc + 1", of=int)
+    """Row that each contact begins with; after the last, how many rows there are."""
     delassus: Floats = array("2 nc", "2 nc")
     """Delassus matrix, symmetric."""
     free: Floats = array("2 nc")
@@ -31,6 +36,12 @@ class ContactProblem(Bundle):
     """Largest tangential impulse of each interval."""
     set: Integers = array("nc", of=int)
     """Where its impulses may lie; see :mod:`heelstrike.contact.sets`."""
+
+
+def contact_problem(contacts: int, **given: Any) -> ContactProblem:
+    """Allocate a problem of so many contacts, each with a normal and a tangent."""
+    first = 2 * np.arange(contacts + 1)
+    return ContactProblem.allocate(**{"nc": contacts, "first": first} | given)
 
 
 class ContactAnswer(Bundle):

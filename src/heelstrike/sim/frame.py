@@ -20,6 +20,7 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache
 from time import perf_counter
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numba import types
@@ -215,14 +216,23 @@ def fixed_for(robot: Robot, ground: GroundModel, work: Any, usual: Mapping[str, 
 
     Two loops a method are enough: each is compiled when it is first needed.
     """
-    model = robot.model
-    dry = model.dry_friction.any() or np.isfinite(model.brake_limit).any()
-    joints = dry or model.loops or model.couplings or model.latches or model.brakes
-    rare = joints or len(robot.constraints)
-    plain = not rare and ground.friction.size == 1 and ground.curved == 0
+    plain = not has_rare_rows(robot) and ground.friction.size == 1 and ground.curved == 0
     if not (plain and all(getattr(work, name) == value for name, value in usual.items())):
         return ()
     return PLAIN + tuple(usual.items())
+
+
+def has_rare_rows(robot: Robot) -> bool:
+    """Whether a robot has rows of other kinds than contact points and joint stops."""
+    if robot not in _RARE:
+        model = robot.model
+        dry = model.dry_friction.any() or np.isfinite(model.brake_limit).any()
+        joints = model.loops or model.couplings or model.latches or model.brakes
+        _RARE[robot] = bool(dry or joints or robot.constraints)
+    return _RARE[robot]
+
+
+_RARE: WeakKeyDictionary[Robot, bool] = WeakKeyDictionary()
 
 
 @lru_cache

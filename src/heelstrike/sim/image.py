@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Iterable, Mapping
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,22 +22,42 @@ from heelstrike.robot.model import Integers
 Arrays = dict[str, NDArray[Any]]
 
 
-class Image(NamedTuple):
-    """What was in some bundles.
-
-    Attributes
-    ----------
-    layout : tuple
-        Names, shapes and kinds of their arrays.
-    words : (n,) int
-        All that was in them, one array after the other.
-    arrays : tuple of array
-        The same words as arrays.
-    """
+class Form(NamedTuple):
+    """What bundles consist of: the same for all that were cast in the same molds."""
 
     layout: Layout
-    words: Integers
-    arrays: tuple[NDArray[Any], ...]
+    """Names, shapes and kinds of their arrays."""
+    names: tuple[str, ...]
+    ends: list[int]
+    """names, ends: The names, and where each array ends among the words of all."""
+
+
+class Image:
+    """What was in some bundles.
+
+    Parameters
+    ----------
+    form : Form
+        What they consist of.
+    words : (n,) int
+        All that was in them, one array after the other.
+    """
+
+    def __init__(self, form: Form, words: Integers) -> None:
+        self.form, self.words = form, words
+
+    @cached_property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """The same words as arrays."""
+        begins = (0, *self.form.ends)
+        return tuple(
+            np.ndarray(shape, kind, self.words, WORD_BYTES * begin)
+            for (_, shape, kind), begin in zip(self.form.layout, begins, strict=False)
+        )
+
+    def by_name(self) -> Arrays:
+        """Return its arrays by their names."""
+        return dict(zip(self.form.names, self.arrays, strict=True))
 
 
 class Camera:
@@ -54,7 +74,7 @@ class Camera:
         prefixes, self._bundles = zip(*bundles, strict=True)
         layouts, places = zip(*map(written_to, self._bundles), strict=True)
         self._places = np.concatenate(places)
-        self._layout, self.names, self._ends = _together(prefixes, layouts)
+        self._form = _together(prefixes, layouts)
 
     def take(self) -> Image:
         """Take an image."""
@@ -66,6 +86,10 @@ class Camera:
         """Let everything be as it was."""
         _copy()(self._places, address_of_array(image.words), 0)
 
+    def fits(self, image: Image) -> bool:
+        """Whether an image is one of such bundles, taken in this process."""
+        return image.form is self._form
+
     def image_of(self, arrays: Mapping[str, NDArray[Any]], taken: Image | None) -> Image:
         """Return an image of arrays by name, which may be those of an image that was taken.
 
@@ -74,12 +98,11 @@ class Camera:
         ValueError
             If something is missing, or of another shape or kind. Empty arrays may be missing.
         """
-        given = tuple(map(arrays.get, self.names))
-        alike = taken is not None and taken.layout is self._layout
-        if taken is not None and alike and all(map(operator.is_, given, taken.arrays)):
+        given = tuple(map(arrays.get, self._form.names))
+        if taken is not None and self.fits(taken) and all(map(operator.is_, given, taken.arrays)):
             return taken
         image = self._empty()
-        for name, mine, its in zip(self.names, image.arrays, given, strict=True):
+        for name, mine, its in zip(self._form.names, image.arrays, given, strict=True):
             if mine.size == 0:
                 continue
             if its is None or its.shape != mine.shape or its.dtype != mine.dtype:
@@ -88,19 +111,11 @@ class Camera:
         return image
 
     def _empty(self) -> Image:
-        words = np.empty(self._ends[-1], dtype=np.int64)
-        begins = (0, *self._ends)
-        arrays = tuple(
-            np.ndarray(shape, kind, words, WORD_BYTES * begin)
-            for (_, shape, kind), begin in zip(self._layout, begins, strict=False)
-        )
-        return Image(self._layout, words, arrays)
+        return Image(self._form, np.empty(self._form.ends[-1], dtype=np.int64))
 
 
-def _together(
-    prefixes: tuple[str, ...], layouts: tuple[Layout, ...]
-) -> tuple[Layout, tuple[str, ...], list[int]]:
-    """Return layouts as one, its names, and where each of its arrays ends, in words."""
+def _together(prefixes: tuple[str, ...], layouts: tuple[Layout, ...]) -> Form:
+    """Return layouts as one."""
     of = prefixes, tuple(map(id, layouts))
     if of not in _KNOWN:
         each = list(zip(prefixes, layouts, strict=True))
@@ -108,11 +123,11 @@ def _together(
             (prefix + name, shape, kind) for prefix, all_of in each for name, shape, kind in all_of
         )
         ends = np.cumsum([math.prod(shape) for _, shape, _ in layout]).tolist()
-        _KNOWN[of] = (layout, tuple(name for name, _, _ in layout), ends), layouts
+        _KNOWN[of] = Form(layout, tuple(name for name, _, _ in layout), ends), layouts
     return _KNOWN[of][0]
 
 
-_KNOWN: dict[Any, Any] = {}
+_KNOWN: dict[Any, tuple[Form, Any]] = {}
 """By prefixes and layouts, which are kept: their ids must stay theirs."""
 
 

@@ -12,7 +12,12 @@ from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.mold import Mold
 from heelstrike.contact.modes import STICK
 from heelstrike.contact.solvers.certified_solve import contact_workspace
-from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
+from heelstrike.contact.workspace import (
+    ContactAnswer,
+    ContactProblem,
+    ContactWorkspace,
+    contact_problem,
+)
 from heelstrike.dynamics.articulated import ArticulatedBodies
 from heelstrike.dynamics.loops import LoopRows
 from heelstrike.dynamics.workspace import Workspace
@@ -291,7 +296,7 @@ def _laid_out(robot: Robot) -> Memory:
     programs = straight_line_programs(model, points)
     assembly = Assembly.allocate(
         extents,
-        problem=ContactProblem.allocate(nc=most),
+        problem=contact_problem(most),
         answer=ContactAnswer.allocate(nc=most),
     )
     problem = assembly.problem
@@ -307,8 +312,8 @@ def _laid_out(robot: Robot) -> Memory:
         solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
         usual=UsualPoints.allocate(
             extents,
-            usual_problem=ContactProblem.allocate(
-                nc=len(points),
+            usual_problem=contact_problem(
+                len(points),
                 free=problem.free[: 2 * len(points)],
                 friction=problem.friction[: len(points)],
             ),

@@ -307,6 +307,8 @@ def check_constraints(method: Method, setting: Setting) -> None:
         That says which, and what to do instead.
     """
     robot = setting.robot
+    if not robot.constraints:
+        return
     names = constraint_names(robot)
     for name, each in zip(names, robot.constraints, strict=True):
         if each.set not in method.holds:

@@ -477,14 +477,17 @@ def joined(records: Sequence[Record], since: float, log: Bundle) -> dict[str, An
     """
 
     def join(member: str, used: str) -> Any:
-        return np.concatenate([getattr(part, member)[: getattr(part, used)] for part in records])
+        parts = [getattr(record, member)[: getattr(record, used)] for record in records]
+        return np.concatenate(parts) if len(parts) > 1 else parts[0].copy()
 
     first = int(np.searchsorted(join("time", "rows"), since))
     rows = {name: join(name, "rows")[first:] for name in ("time", *QUANTITIES)}
-    arrays = {name: join(f"event_{name}", "events") for name in EVENT_MEMBERS}
-    order = np.argsort(arrays["time"], kind="stable")
-    order = order[arrays["time"][order] >= since]
-    events = events_of(*(values[order] for values in arrays.values()))
+    events: tuple[Event, ...] = ()
+    if any(record.events for record in records):
+        arrays = {name: join(f"event_{name}", "events") for name in EVENT_MEMBERS}
+        order = np.argsort(arrays["time"], kind="stable")
+        order = order[arrays["time"][order] >= since]
+        events = events_of(*(values[order] for values in arrays.values()))
     return rows | {"events": events, "log": _logged(join("log", "rows")[first:], log)}
 
 

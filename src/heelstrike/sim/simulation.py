@@ -236,7 +236,7 @@ class Simulation:
         method.set_clock(setting, self._clock)
         for bundle in (self._memory, self._work, self._clock, setting.ground.model()):
             _ = bundle.address  # laid out now, not while the loop is timed
-        self._timing = Timing(self._choose_loop(), 0.0)
+        self._compile_s, self._wall_s = self._choose_loop(), 0.0
         self._fork: Snapshot | None = None
         self._cameras: tuple[tuple[Any, Any], Any] = ((None, None), None)
         self._around: tuple[tuple[Any, Any], dict[str, Any]] = ((None, None), {})
@@ -495,8 +495,7 @@ class Simulation:
         except KeyboardInterrupt as interrupt:
             acknowledge(interrupt)
             self.status, self.message = RunStatus.INTERRUPTED, f"interrupted at {self._now}"
-        wall_s = self._timing.wall_s + clock_time.perf_counter() - begin
-        self._timing = Timing(self._timing.compile_s, wall_s)
+        self._wall_s += clock_time.perf_counter() - begin
         self._tell_error(self.status, self.message)
         return self.status
 
@@ -716,8 +715,10 @@ class Simulation:
         robot, memory, clock = self.robot, self._memory, self._clock
         law = law_of(controller)
         setting = self._setting
+        own_period = None if law is None else law.period
         if self._given_period is None:
-            setting = replace(setting, control_period=None if law is None else law.period)
+            if setting.control_period != own_period:
+                setting = replace(setting, control_period=own_period)
         elif law is not None and law.keeps_period and setting.control_period != law.period:
             raise ControllerError(
                 f"controller {law.function.name!r} keeps time by its own period of {law.period} s: "
@@ -792,11 +793,10 @@ class Simulation:
             returns an array of numbers, and ``restore(numbers)``.
         """
         taken = self._camera(self._memory).take()
-        arrays: dict[str, Any] = {"time": np.array(self.time), **self._surroundings()}
-        arrays.update(zip(self._cameras[1].names, taken.arrays, strict=True))
+        beside: dict[str, Any] = {"time": np.array(self.time), **self._surroundings()}
         if self._python is not None:
-            arrays["controller"] = np.array(_partaking(self._python, self._name).snapshot())
-        return Snapshot(arrays, dict(self._identity), taken)
+            beside["controller"] = np.array(_partaking(self._python, self._name).snapshot())
+        return Snapshot.pictured(beside, dict(self._identity), taken)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Be again as a simulation was; the record begins anew.
@@ -843,21 +843,22 @@ class Simulation:
 
     def _put_back(self, snapshot: Snapshot) -> None:
         """Take up what a snapshot holds, or leave everything as it is."""
-        arrays = snapshot.arrays
+        beside, taken = snapshot.beside, snapshot.taken
         memory, pushes, ground = self._memory, self._pushes, self._ground
         try:
-            float(arrays["time"])
+            float(beside["time"])
             now = self._surroundings()
-            if not all(map(operator.is_, map(arrays.get, now), now.values())):
+            if not all(map(operator.is_, map(beside.get, now), now.values())):
                 pushes, ground = pushes_of_numbers(snapshot.part("push")), _ground_of(snapshot)
                 memory = memory.replaced(pushes=pushes_on(self.robot, pushes))
             camera = self._camera(memory)
-            image = camera.image_of(arrays, snapshot.taken)
+            if taken is None or snapshot.is_named or not camera.fits(taken):
+                taken = camera.image_of(snapshot.arrays, taken)
             if self._python is not None:
-                _partaking(self._python, self._name).restore(arrays["controller"].copy())
+                _partaking(self._python, self._name).restore(beside["controller"].copy())
         except (KeyError, ValueError) as error:
             raise SimulationError(f"the snapshot is damaged: {error}") from error
-        camera.put_back(image)
+        camera.put_back(taken)
         self._memory, self._pushes = memory, pushes
         if ground is not self._ground:
             self._ground = ground
@@ -938,8 +939,7 @@ class Simulation:
         if not self._can_be_kept:
             return None
         final = self.snapshot() if self._fork is None else self._fork
-        final.arrays["time"] = np.array(self.time)
-        return final
+        return final.at(self.time)
 
     def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Run:
         """Return what is recorded as a run, which goes on from `final`."""
@@ -953,7 +953,7 @@ class Simulation:
             message=message,
             **joined(self._records, self._recorded_until, self._logs.log),
             **tallied(self._memory, self.method.solves_with),
-            timing=self._timing,
+            timing=Timing(self._compile_s, self._wall_s),
             error=self.error,
             pushes=self._pushes,
             final=final,

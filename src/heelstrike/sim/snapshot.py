@@ -11,7 +11,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from heelstrike.sim.image import Image
 from heelstrike.whole_file import write_whole
 
 _IDENTITY = "identity"
-_FORMAT = 5
+_FORMAT = 6
 # What reading an archive raises when its bytes are others.
 _DAMAGED = (ValueError, KeyError, AttributeError, TypeError, EOFError, RuntimeError, OverflowError)
 
@@ -44,10 +44,73 @@ class Snapshot:
     taken: Image | None = field(default=None, repr=False)
     """Where it was taken in this process, what most of these arrays are views of."""
 
+    @classmethod
+    def pictured(
+        cls, told: dict[str, NDArray[Any]], identity: Mapping[str, str], taken: Image
+    ) -> Snapshot:
+        """Return one of an image, whose arrays get their names when they are asked for.
+
+        Most snapshots are put back as they are.
+
+        Parameters
+        ----------
+        told : dict
+            Arrays that are not on the image, by name.
+        identity : mapping
+            Robot, method and controller.
+        taken : Image
+            The image.
+
+        Returns
+        -------
+        Snapshot
+            The snapshot.
+        """
+        made = cls.__new__(cls)
+        made.__dict__.update(_told=told, identity=identity, taken=taken)
+        return made
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Name the arrays of an image."""
+            if name != "arrays" or "_told" not in self.__dict__:
+                raise AttributeError(f"a snapshot has no attribute {name!r}")
+            arrays = self.__dict__["_told"] | self.taken.by_name()
+            return self.__dict__.setdefault("arrays", arrays)
+
+    @property
+    def beside(self) -> Mapping[str, NDArray[Any]]:
+        """Arrays among which those are that are on no image: time, ground, pushes, controller."""
+        return self.arrays if self.is_named else self.__dict__["_told"]
+
+    @property
+    def is_named(self) -> bool:
+        """Whether it holds arrays by name, and somebody may have put others in their places."""
+        return "arrays" in self.__dict__
+
     @property
     def time(self) -> float:
         """When it was taken, in s."""
-        return float(self.arrays["time"])
+        return float(self.beside["time"])
+
+    def at(self, time: float) -> Snapshot:
+        """Return the same as of another time.
+
+        Parameters
+        ----------
+        time : float
+            The time, in s.
+
+        Returns
+        -------
+        Snapshot
+            A snapshot; this one stays what it is.
+        """
+        now = {"time": np.array(time)}
+        if self.is_named or self.taken is None:
+            return Snapshot(self.arrays | now, self.identity, self.taken)
+        return Snapshot.pictured({**self.beside, **now}, self.identity, self.taken)
 
     @property
     def state(self) -> State:

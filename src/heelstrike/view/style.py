@@ -175,8 +175,25 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
             )
         picture = io.BytesIO()
         with styled():
-            figure.savefig(picture, format=kind)
+            if kind == "png":
+                save_png(figure, picture)
+            else:
+                figure.savefig(picture, format=kind)
         return write_whole(target, picture.getbuffer())
+
+
+def save_png(figure: Figure, picture: io.BytesIO) -> None:
+    """Draw a figure as PNG, once: matplotlib by itself draws it another time to lay it out."""
+    engine, own, dpi = figure.get_layout_engine(), figure.dpi, matplotlib.rcParams["savefig.dpi"]
+    try:
+        if engine is not None:
+            figure.dpi = dpi
+            engine.execute(figure)
+            figure.set_layout_engine(None)
+        figure.savefig(picture, format="png", dpi=dpi)
+    finally:
+        figure.dpi = own
+        figure.set_layout_engine(engine)
 
 
 @contextlib.contextmanager

@@ -12,7 +12,7 @@ from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, STICK
 from heelstrike.contact.solvers import combinations as modes_in_turn
 from heelstrike.contact.solvers.certified_solve import contact_workspace, nearly_singular
 from heelstrike.contact.solvers.combinations import MOST
-from heelstrike.contact.workspace import ContactProblem, ContactWorkspace, Integers
+from heelstrike.contact.workspace import ContactWorkspace, Integers, contact_problem
 
 begin_combinations = uncompiled(modes_in_turn.begin_combinations)
 next_combination = uncompiled(modes_in_turn.next_combination)
@@ -142,7 +142,7 @@ def test_what_rounding_decides(matrix: object, size: float, doubtful: bool) -> N
     unit = 2.0 ** np.round(np.log2(size))
     reduced.source[:number] = np.arange(number)
     reduced.scale[:number] = 1.0 / np.sqrt(unit * np.diag(delassus))
-    problem = ContactProblem.allocate(nc=2)
+    problem = contact_problem(2)
     problem.delassus[:number, :number] = unit * delassus
     assert uncompiled(nearly_singular)(problem, reduced) == doubtful
 

@@ -16,7 +16,7 @@ from heelstrike.contact.solvers.elimination import (
     eliminate,
     elimination_programs,
 )
-from heelstrike.contact.workspace import ContactAnswer, ContactProblem
+from heelstrike.contact.workspace import ContactAnswer, contact_problem
 from heelstrike.robot.model import Floats
 
 
@@ -64,8 +64,8 @@ def test_sticking_contacts_are_solved_alike_with_and_without_programs(freedom: i
         for programs in (elimination_programs(), np.zeros(1, np.int64)):
             work = contact_workspace(count)
             work = work.replaced(sticking=work.sticking.replaced(programs=programs))
-            problem = ContactProblem.allocate(
-                nc=count, count=count, delassus=delassus, free=free, friction=np.full(count, 3.0)
+            problem = contact_problem(
+                count, count=count, delassus=delassus, free=free, friction=np.full(count, 3.0)
             )
             answer = ContactAnswer.allocate(nc=count, mode=np.full(count, STICK, np.int64))
             assert solve_contact_kernel(solver_order("lemke"), problem, work, answer) == SOLVED

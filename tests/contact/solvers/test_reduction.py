@@ -9,15 +9,13 @@ from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.solvers.reduction import reduce_problem, scale_matrix
-from heelstrike.contact.workspace import ContactProblem, Floats, Integers, ReducedProblem
+from heelstrike.contact.workspace import Floats, Integers, ReducedProblem, contact_problem
 
 
 def reduced_to(delassus: Floats, free: Floats, friction: Floats, mode: Integers) -> ReducedProblem:
     """Write the scaled problem with its matrix."""
     count, work = len(friction), contact_workspace(len(friction))
-    problem = ContactProblem.allocate(
-        nc=count, count=count, delassus=delassus, free=free, friction=friction
-    )
+    problem = contact_problem(count, count=count, delassus=delassus, free=free, friction=friction)
     uncompiled(reduce_problem)(problem, mode, work.yardstick.slope, work.reduced)
     uncompiled(scale_matrix)(problem, work.yardstick.slope, work.reduced)
     return work.reduced

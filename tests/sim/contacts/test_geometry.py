@@ -54,20 +54,25 @@ def test_delassus_matrix_and_what_impulses_do(
         locate_contacts(robot.model, Ground().model(), tree, memory.contacts, memory.surface)
         for contact in range(robot.nc):
             contact_rows(robot.model, tree, memory.contacts, contact, contact, assembly)
-        for place in range(2):  # a stop and a dry joint
-            row = 2 * (robot.nc + place) + place
+        first = assembly.problem.first
+        for component in range(2):  # a stop, which has one row, and a dry joint
+            place = robot.nc + component
+            first[place + 1] = first[place] + 1 + component
             write_unit_row(
-                int(draw.integers(robot.nv)), row, -1.0, assembly.leaf, assembly.jacobian
-            )
+                int(draw.integers(robot.nv)), place, component, -1.0, first, assembly.leaf,
+                assembly.jacobian,
+            )  # fmt: skip
         count = robot.nc + 2
+        rows = first[count]
+        assert rows == 2 * robot.nc + 3
         assemble_delassus(robot.model, count, equations, assembly)
-        jacobian = assembly.jacobian[: 2 * count]
+        jacobian = assembly.jacobian[:rows]
         inverse = np.linalg.inv(dynamics.mass_matrix(robot, memory.q))
         expected = jacobian @ inverse @ jacobian.T
-        found = assembly.problem.delassus[: 2 * count, : 2 * count]
+        found = assembly.problem.delassus[:rows, :rows]
         np.testing.assert_allclose(found, expected, atol=ROUNDING * np.abs(expected).max())
-        assembly.answer.impulse[: 2 * count] = draw.normal(size=2 * count)
-        change = inverse @ jacobian.T @ assembly.answer.impulse[: 2 * count]
+        assembly.answer.impulse[:rows] = draw.normal(size=rows)
+        change = inverse @ jacobian.T @ assembly.answer.impulse[:rows]
         v = draw.normal(size=robot.nv)
         after = v.copy()
         add_impulse(robot.model, assembly, count, equations, after)

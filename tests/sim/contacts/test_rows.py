@@ -192,3 +192,15 @@ def test_kinds_are_told_apart_by_the_table_alone() -> None:
     done = {name: found[name] for name in found if Path(name).parts[0] not in PENDING}
     assert not any(done.values()), {name: each for name, each in done.items() if each}
     assert rooms == set(PENDING), "a room that is done is pending no longer"
+
+
+def test_a_stop_brings_one_row() -> None:
+    """walker2d, left alone, comes to lie on points and stops: each tells where its rows begin."""
+    robot = hs.load_robot("walker2d")
+    simulation = hs.Simulation(robot, state=robot.reference_state(), stop_when_fallen=False)
+    simulation.advance(0.8)
+    assembly, rows = simulation._memory.assembly, simulation._memory.rows
+    kinds = rows.kind[assembly.candidate[: assembly.problem.count]]
+    assert {POINT, STOP} == set(kinds.tolist())
+    brought = np.diff(assembly.problem.first[: assembly.problem.count + 1])
+    assert np.array_equal(brought, np.where(kinds == STOP, 1, 2))

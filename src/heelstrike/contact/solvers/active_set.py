@@ -110,9 +110,11 @@ def expand(
     mode, impulse = answer.mode, answer.impulse
     place = 0
     for contact in range(problem.count):
-        row = 2 * contact
+        row = problem.first[contact]
+        has_tangent = problem.first[contact + 1] > row + 1
         impulse[row] = 0.0
-        impulse[row + 1] = 0.0
+        if has_tangent:
+            impulse[row + 1] = 0.0
         if mode[contact] == OPEN:
             continue
         along = point[place]
@@ -127,7 +129,9 @@ def expand(
                 lean = -limit if mode[contact] == SLIP_FORWARD else limit
             along /= math.sqrt(1.0 + lean * lean)
             across = lean * along
-        impulse[row], impulse[row + 1] = projected(problem, contact, along, across)
+        impulse[row], across = projected(problem, contact, along, across)
+        if has_tangent:
+            impulse[row + 1] = across
 
 
 @kernel
@@ -216,7 +220,18 @@ def mode_of_slip(velocity: float, rest: float) -> int:
 
 
 @kernel
-def label(count: int, reduced: ReducedProblem, yardstick: Yardstick, answer: ContactAnswer) -> bool:
+def slip_of(problem: ContactProblem, contact: int, root: Floats, answer: ContactAnswer) -> int:
+    """Name what a contact does, if it is closed, by its tangential velocity, if it has one."""
+    tangent = problem.first[contact] + 1
+    if problem.first[contact + 1] == tangent:
+        return STICK
+    return mode_of_slip(answer.velocity[tangent], answer.rest * root[tangent])
+
+
+@kernel
+def label(
+    problem: ContactProblem, tangent: Integers, yardstick: Yardstick, answer: ContactAnswer
+) -> bool:
     """Name every contact's mode from its velocity; return whether that is another problem.
 
     A contact that a solver calls open or slipping, but whose velocity is zero, may carry any
@@ -224,12 +239,12 @@ def label(count: int, reduced: ReducedProblem, yardstick: Yardstick, answer: Con
     """
     mode, velocity, root, rest = answer.mode, answer.velocity, yardstick.root, answer.rest
     changed = False
-    for contact in range(count):
-        row = 2 * contact
-        name = mode_of_slip(velocity[row + 1], rest * root[row + 1])
-        if velocity[row] > rest * root[row] and reduced.set[contact] != LINE:
+    for contact in range(problem.count):
+        row = problem.first[contact]
+        name = slip_of(problem, contact, root, answer)
+        if velocity[row] > rest * root[row] and problem.set[contact] != LINE:
             name = OPEN
-        if reduced.tangent[contact] >= 0:
+        if tangent[contact] >= 0:
             changed = changed or name != mode[contact]
         else:
             changed = changed or (name == OPEN) != (mode[contact] == OPEN)
@@ -255,11 +270,11 @@ def amend(
     changed = False
     place = 0
     for contact in range(problem.count):
-        row = 2 * contact
+        row = problem.first[contact]
         before = mode[contact]
         if before == OPEN:
             if velocity[row] < -rest * root[row]:
-                mode[contact] = mode_of_slip(velocity[row + 1], rest * root[row + 1])
+                mode[contact] = slip_of(problem, contact, root, trial)
         else:
             along = point[place]
             place += 1

@@ -65,15 +65,15 @@ ROUNDS = 6
 
 
 @kernel
-def keep(count: int, trial: ContactAnswer, answer: ContactAnswer) -> None:
+def keep(problem: ContactProblem, trial: ContactAnswer, answer: ContactAnswer) -> None:
     """Copy the trial to the answer."""
-    for i in range(2 * count):
+    for i in range(problem.first[problem.count]):
         answer.impulse[i] = trial.impulse[i]
         answer.velocity[i] = trial.velocity[i]
     for i in range(3):
         answer.residual[i] = trial.residual[i]
     answer.rest = trial.rest
-    for contact in range(count):
+    for contact in range(problem.count):
         answer.mode[contact] = trial.mode[contact]
 
 
@@ -207,7 +207,7 @@ def seek(
         certified = solver != WARM_START and settings.patient == 0 and worst <= settings.tolerance
         if worst < best or certified:
             best = worst
-            keep(problem.count, trial, answer)
+            keep(problem, trial, answer)
         if certified:
             return SOLVED, best
         if is_clean(problem.count, worst, settings, work.yardstick):
@@ -226,7 +226,7 @@ def release(
     """
     reduced, yardstick, trial = work.reduced, work.yardstick, work.trial
     for _ in range(ROUNDS):
-        if not label(problem.count, reduced, yardstick, answer):
+        if not label(problem, reduced.tangent, yardstick, answer):
             return True, best
         for contact in range(problem.count):
             trial.mode[contact] = answer.mode[contact]
@@ -236,7 +236,7 @@ def release(
         if not (worst < best or worst <= AS_GOOD):
             break
         best = worst
-        keep(problem.count, trial, answer)
+        keep(problem, trial, answer)
     return False, best
 
 
@@ -302,7 +302,7 @@ def begin(
     """Put the modes of the answer on trial, and no impulse in their place."""
     for contact in range(problem.count):
         trial.mode[contact] = answer.mode[contact]
-    for i in range(2 * problem.count):
+    for i in range(problem.first[problem.count]):
         answer.impulse[i] = 0.0
         answer.velocity[i] = problem.free[i]
     for i in range(3):

@@ -13,7 +13,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.certificate import REST_TOLERANCE, certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
-from heelstrike.contact.sets import LINE, projected
+from heelstrike.contact.sets import LINE, projected, row_of
 from heelstrike.contact.solvers.elimination import POOR_PIVOT
 from heelstrike.contact.workspace import (
     ContactAnswer,
@@ -57,14 +57,14 @@ FAILS, HOLDS, MAY_DRIFT = range(3)
 @dissolved_kernel
 def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) -> int:
     """List the rows that shall have no velocity; return how many differ, or -1 to give up."""
-    delassus = problem.delassus
+    delassus, first = problem.delassus, problem.first
     source, equation, sharers = rows.row, rows.equation, rows.sharers
+    for row in range(first[problem.count]):
+        equation[row] = -1
     size = 0
     for contact in range(problem.count):
-        row = 2 * contact
+        row = row_of(contact, first)
         tangent = row + 1
-        equation[row] = -1
-        equation[tangent] = -1
         if mode[contact] == OPEN and problem.set[contact] != LINE:
             continue
         has_friction = problem.friction[contact] > 0.0
@@ -77,8 +77,8 @@ def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) 
         if not has_friction:
             continue
         for earlier in range(contact):
-            other = 2 * earlier + 1
-            if equation[other] >= 0:
+            other = row_of(earlier, first) + 1
+            if problem.friction[earlier] > 0.0 and equation[other] >= 0:
                 both = delassus[tangent, tangent] + delassus[other, other]
                 if abs(both - 2.0 * delassus[tangent, other]) <= SHARED_ROW * both:
                     equation[tangent] = equation[other]
@@ -108,15 +108,16 @@ def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> int
     for attempt in range(2):
         place = 0
         for i in range(size):
-            row = source[i]
+            row = row_of(i, source)
             x[i] = -problem.free[row]
             for j in range(i + 1):
-                matrix[place] = delassus[row, source[j]]
+                matrix[place] = delassus[row, row_of(j, source)]
                 place += 1
         play(rows.programs[size], (matrix, x, pivot))
         outcome, late, rank = HOLDS, -1, 0
         for i in range(size):
-            diagonal = delassus[source[i], source[i]]
+            row = row_of(i, source)
+            diagonal = delassus[row, row]
             rank += pivot[i] > POOR_PIVOT * diagonal
             if pivot[i] > EARLY_PIVOT * diagonal or abs(pivot[i]) <= NO_PIVOT * diagonal:
                 continue
@@ -128,7 +129,7 @@ def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> int
                 outcome = MAY_DRIFT
         if late < 0 or attempt == 1:
             break
-        list_last(late, size, 2 * problem.count, rows)
+        list_last(late, size, problem.first[problem.count], rows)
     if outcome != FAILS and rank < size:
         leave_out_idle(size, rows)
     return outcome
@@ -299,21 +300,25 @@ def share_impulses(problem: ContactProblem, rows: StickingRows, answer: ContactA
     Their modes become open. -1 is returned where friction is not held. What pulls no more than
     rounding may explain is cut off, and the certificate decides.
     """
-    impulse = answer.impulse
+    impulse, first = answer.impulse, problem.first
     largest = 0.0
-    for row in range(2 * problem.count):
+    for row in range(first[problem.count]):
         place = rows.equation[row]
         impulse[row] = rows.x[place] / rows.sharers[place] if place >= 0 else 0.0
         largest = max(largest, abs(impulse[row]))
     pulling = 0
     for contact in range(problem.count):
-        if impulse[2 * contact] < -CLEAN * largest and problem.set[contact] != LINE:
+        if impulse[row_of(contact, first)] < -CLEAN * largest and problem.set[contact] != LINE:
             answer.mode[contact] = OPEN
             rows.pulled[contact] = 1
             pulling += 1
     if pulling == 0:
+        end = 0
         for contact in range(problem.count):
-            row = 2 * contact
+            row, end = end, row_of(contact + 1, first)
+            if end == row + 1:
+                impulse[row], _ = projected(problem, contact, impulse[row], 0.0)
+                continue
             impulse[row], across = projected(problem, contact, impulse[row], impulse[row + 1])
             if across != impulse[row + 1]:
                 return -1
@@ -331,10 +336,10 @@ def name_by_velocity(
     parts, nor where it comes nearer by so little that the answer is clean.
     """
     mode, velocity = answer.mode, answer.velocity
-    root, rest = yardstick.root, answer.rest
-    pressed = 0
+    root, rest, first = yardstick.root, answer.rest, problem.first
+    pressed, end = 0, 0
     for contact in range(problem.count):
-        normal = 2 * contact
+        normal, end = end, row_of(contact + 1, first)
         tangent = normal + 1
         if velocity[normal] > rest * root[normal] and problem.set[contact] != LINE:
             if mode[contact] != OPEN:
@@ -345,7 +350,7 @@ def name_by_velocity(
             moves = velocity[normal] >= -CLEAN * size and abs(velocity[normal]) > BARELY * size
             pressed += not (moves and pulled[contact] == 1)
         mode[contact] = STICK
-        if abs(velocity[tangent]) > rest * root[tangent]:
+        if end > tangent and abs(velocity[tangent]) > rest * root[tangent]:
             mode[contact] = SLIP_FORWARD if velocity[tangent] > 0.0 else SLIP_BACKWARD
             if problem.friction[contact] > 0.0:
                 return -1

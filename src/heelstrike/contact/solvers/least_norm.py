@@ -61,19 +61,19 @@ def keep_velocity(
     Where contacts slip the equations leave their slip speed open, so a free direction may change
     it. Elimination on the velocities that the directions cause leaves the combinations without.
     """
-    count, size, delassus = problem.count, equations.size, problem.delassus
+    rows, size, delassus = problem.first[problem.count], equations.size, problem.delassus
     equation, lean, weight = equations.unknown, equations.lean, equations.weight
     basis, image, kind = equations.basis, equations.image, equations.moves
     for k in range(found):
         largest = 0.0
-        for i in range(2 * count):
+        for i in range(rows):
             image[k, i] = 0.0
         for j in range(size):
             column = reduced.source[equation[j]]
             scaled = basis[k, j] / weight[j]
             largest = max(largest, abs(scaled))
             along = scaled * reduced.scale[equation[j]]
-            for i in range(2 * count):
+            for i in range(rows):
                 diagonal = delassus[i, i]
                 entry = along * delassus[i, column]
                 if lean[j] != 0.0:
@@ -82,19 +82,19 @@ def keep_velocity(
         for other in range(k):
             if kind[other] == 1:
                 along = 0.0
-                for i in range(2 * count):
+                for i in range(rows):
                     along += image[k, i] * image[other, i]
-                for i in range(2 * count):
+                for i in range(rows):
                     image[k, i] -= along * image[other, i]
                 for j in range(size):
                     basis[k, j] -= along * basis[other, j]
         length = 0.0
-        for i in range(2 * count):
+        for i in range(rows):
             length += image[k, i] * image[k, i]
         length = math.sqrt(length)
         kind[k] = 1 if length > STILL_MOVES * largest else 0
         if kind[k] == 1:
-            for i in range(2 * count):
+            for i in range(rows):
                 image[k, i] /= length
             for j in range(size):
                 basis[k, j] /= length

@@ -42,12 +42,12 @@ def reduce_problem(
             reduced.tangent[contact] = unknowns + 1
             components = 2
         for component in range(components):
-            row = 2 * contact + component
+            row = problem.first[contact] + component
             weight = delassus[row, row]
             if not weight > 0.0:
                 # Nothing moves it, or the matrix is not a Delassus matrix.
                 weight = 0.0
-                for j in range(2 * problem.count):
+                for j in range(problem.first[problem.count]):
                     weight = max(weight, max(abs(delassus[row, j]), abs(delassus[j, row])))
             reduced.source[unknowns] = row
             scale[unknowns] = 1.0 / math.sqrt(weight) if weight > 0.0 else 1.0
@@ -63,11 +63,14 @@ def reduce_problem(
 def scale_matrix(problem: ContactProblem, slope: Floats, reduced: ReducedProblem) -> None:
     """Write the scaled matrix of the listed unknowns; friction that is prescribed is part of it."""
     delassus, source, scale = problem.delassus, reduced.source, reduced.scale
-    for j in range(reduced.unknowns):
-        column = source[j]
-        along = slope[column // 2]
-        for i in range(reduced.unknowns):
-            entry = delassus[source[i], column]
-            if along != 0.0:
-                entry += along * delassus[source[i], column + 1]
-            reduced.matrix[i, j] = scale[i] * entry * scale[j]
+    for contact in range(problem.count):
+        along, last = slope[contact], reduced.normal[contact]
+        if reduced.tangent[contact] >= 0:
+            last = reduced.tangent[contact]
+        for j in range(reduced.normal[contact], last + 1):
+            column = source[j]
+            for i in range(reduced.unknowns):
+                entry = delassus[source[i], column]
+                if along != 0.0:
+                    entry += along * delassus[source[i], column + 1]
+                reduced.matrix[i, j] = scale[i] * entry * scale[j]

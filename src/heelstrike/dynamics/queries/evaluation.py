@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.arguments import are_numbers, refusal
+from heelstrike.compiler.mold import Mold
 from heelstrike.dynamics import kernels
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import RobotError
 from heelstrike.robot.coordinates import index_of
-from heelstrike.robot.model import Floats
+from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 
 
@@ -40,15 +42,19 @@ class Evaluation:
         self.robot, self.model = robot, robot.model
         self.symbolic = isinstance(q, np.ndarray) and q.dtype == object
         self.q = self.vector("q", q)
+        self.rests = v is None
         self.v = self.zeros(robot.nv) if v is None else self.vector("v", v)
 
     @cached_property
     def work(self) -> Workspace:
         """Kinematics and velocities of the state, for the kernels that follow."""
-        dtype = object if self.symbolic else None
-        made = Workspace.allocate(self.model.extents, dtype=dtype)
+        if self.symbolic:
+            made = Workspace.allocate(self.model.extents, dtype=object)
+        else:
+            made = new_workspace(self.model)
         self.run(kernels.forward_kinematics, self.model, self.q, made)
-        self.run(kernels.link_velocities, self.model, self.v, made)
+        if self.symbolic or not self.rests:  # what is new is at rest
+            self.run(kernels.link_velocities, self.model, self.v, made)
         return made
 
     def run(self, kernel: Callable[..., Any], *arguments: Any) -> None:
@@ -101,6 +107,16 @@ class Evaluation:
             (i, *self.point(int(model.contact_link[i]), model.contact_position[i]))
             for i in contact_indices(self.robot, contacts)
         ]
+
+
+def new_workspace(model: Model) -> Workspace:
+    """Return a workspace of zeros for a robot."""
+    if model not in _MOLDS:
+        _MOLDS[model] = Mold(Workspace.allocate(model.extents))
+    return _MOLDS[model].cast()
+
+
+_MOLDS: WeakKeyDictionary[Model, Mold[Workspace]] = WeakKeyDictionary()
 
 
 def joint_vector(robot: Robot, name: str, value: ArrayLike) -> Floats:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, STICK
-from heelstrike.contact.sets import INTERVAL
+from heelstrike.contact.sets import INTERVAL, row_of
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.geometry import EVERYWHERE, contact_rows, write_unit_row
@@ -31,13 +31,20 @@ from heelstrike.sim.memory import Assembly, Memory
 
 
 @dissolved_kernel
-def list_candidate(entry: int, place: int, memory: Memory) -> None:
-    """List an entry as a candidate, with its set, its friction and its mode before."""
+def list_candidate(entry: int, place: int, components: int, memory: Memory) -> int:
+    """List an entry as a candidate, with its set, its friction and its mode before.
+
+    Candidates are listed one after the other; `components` tells how many rows this one has.
+    Returns the first of them.
+    """
     problem, assembly = memory.assembly.problem, memory.assembly
+    first = row_of(place, problem.first)
+    problem.first[place + 1] = first + components
     problem.set[place] = memory.rows.set[entry]
     problem.friction[place] = memory.surface.friction[entry]
     assembly.answer.mode[place] = memory.reaction.mode[entry]
     assembly.candidate[place] = entry
+    return first
 
 
 @dissolved_kernel
@@ -70,11 +77,9 @@ def hold_latched(model: Model, count: int, v: Floats, memory: Memory) -> int:
     loops, assembly, stops = memory.loops, memory.assembly, memory.rows.latch_stop
     missing = hold(count, stops, loops.held, assembly)
     while missing >= 0:
-        list_candidate(stops[missing], count, memory)
-        assembly.problem.free[2 * count] = (
-            -model.latch_side[missing] * v[model.latch_joint[missing]]
-        )
-        assembly.problem.free[2 * count + 1] = 0.0
+        row = list_candidate(stops[missing], count, 1, memory)
+        rate = -model.latch_side[missing] * v[model.latch_joint[missing]]
+        assembly.problem.free[row] = rate
         assembly.answer.mode[count] = STICK
         count += 1
         missing = hold(count, stops, loops.held, assembly)
@@ -91,8 +96,8 @@ def list_dry_joints(count: int, span: float, v: Floats, memory: Memory) -> int:
     for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
         joint = rows.owner[dry]
         if memory.breakaway[joint] > 0.0:
-            list_candidate(dry, count, memory)
-            problem.free[2 * count + 1] = v[joint]
+            row = list_candidate(dry, count, 2, memory)
+            problem.free[row + 1] = v[joint]
             problem.bound[count] = span * memory.breakaway[joint]
             count += 1
     return count
@@ -111,12 +116,19 @@ def find_constraints(model: Model, q: Floats, v: Floats, tree: Workspace, rows: 
 
 
 @kernel
-def write_own_rows(entry: int, place: int, rows: Rows, leaf: Integers, jacobian: Floats) -> None:
+def write_own_rows(
+    entry: int, place: int, rows: Rows, first: Integers, leaf: Integers, jacobian: Floats
+) -> None:
     """Write the rows that the kernel of a constraint wrote as those of a candidate."""
-    its, rubs, own = rows.outside.jacobian, rows.set[entry] == INTERVAL, rows.owner[entry]
-    for j in range(jacobian.shape[1]):
-        jacobian[2 * place, j] = 0.0 if rubs else its[own, 0, j]
-        jacobian[2 * place + 1, j] = its[own, 0 if rubs else 1, j]
+    its, own, row = rows.outside.jacobian, rows.owner[entry], first[place]
+    if rows.set[entry] == INTERVAL:
+        for j in range(jacobian.shape[1]):
+            jacobian[row, j] = 0.0
+            jacobian[row + 1, j] = its[own, 0, j]
+    else:
+        for component in range(first[place + 1] - row):
+            for j in range(jacobian.shape[1]):
+                jacobian[row + component, j] = its[own, component, j]
     leaf[place] = EVERYWHERE
 
 
@@ -127,20 +139,20 @@ def write_rows(
 ) -> None:  # fmt: skip
     """Write the Jacobian rows of the candidates, but for those of loops, which have theirs.
 
-    A stop has a normal row ±1 at its joint and a tangent row of zeros, a dry joint the reverse.
+    A stop has one row, ±1 at its joint; a dry joint such a tangent, and a normal row of zeros.
     """
+    first, leaf, jacobian = assembly.problem.first, assembly.leaf, assembly.jacobian
     for place in range(assembly.begin[POINT], assembly.until[POINT]):
         contact_rows(model, tree, contacts, rows.owner[assembly.candidate[place]], place, assembly)
     for place in range(assembly.begin[STOP], assembly.until[STOP]):
         stop = assembly.candidate[place]
-        side = rows.side[stop]
-        write_unit_row(rows.owner[stop], 2 * place, side, assembly.leaf, assembly.jacobian)
+        write_unit_row(rows.owner[stop], place, 0, rows.side[stop], first, leaf, jacobian)
     for place in range(assembly.begin[CONSTRAINT], assembly.until[CONSTRAINT]):
         entry = assembly.candidate[place]
-        write_own_rows(entry, place, rows, assembly.leaf, assembly.jacobian)
+        write_own_rows(entry, place, rows, first, leaf, jacobian)
     for place in range(assembly.begin[DRY_JOINT], assembly.until[DRY_JOINT]):
         joint = rows.owner[assembly.candidate[place]]
-        write_unit_row(joint, 2 * place + 1, 1.0, assembly.leaf, assembly.jacobian)
+        write_unit_row(joint, place, 1, 1.0, first, leaf, jacobian)
     for place in range(assembly.begin[SECOND_FACE], assembly.until[SECOND_FACE]):
         contact_rows(model, tree, seconds, rows.owner[assembly.candidate[place]], place, assembly)
 
@@ -154,7 +166,7 @@ def note_answer(model: Model, span: float, memory: Memory) -> None:
     assembly, answer, rows = memory.assembly, memory.assembly.answer, memory.rows
     candidate, begin, until = assembly.candidate, assembly.begin, assembly.until
     impulse, force, reaction = answer.impulse, memory.contacts.force, memory.reaction
-    problem = assembly.problem
+    problem, first = assembly.problem, assembly.problem.first
     for joint in range(model.nv):
         reaction.stop_torque[joint] = 0.0
     for contact in range(model.nc):
@@ -164,14 +176,15 @@ def note_answer(model: Model, span: float, memory: Memory) -> None:
     for entry in range(rows.first[DRY_JOINT]):
         reaction.mode[entry] = OPEN
     for place in range(begin[POINT], until[POINT]):
-        contact = candidate[place]
-        force[contact, 0] = impulse[2 * place] / span
-        force[contact, 1] = impulse[2 * place + 1] / span
-        reaction.slip[contact] = answer.velocity[2 * place + 1]
+        contact, row = candidate[place], row_of(place, first)
+        force[contact, 0] = impulse[row] / span
+        force[contact, 1] = impulse[row + 1] / span
+        reaction.slip[contact] = answer.velocity[row + 1]
         reaction.mode[contact] = answer.mode[place]
     for place in range(begin[STOP], until[STOP]):
         stop = candidate[place]
-        reaction.stop_torque[rows.owner[stop]] += rows.side[stop] * impulse[2 * place] / span
+        pressing = rows.side[stop] * impulse[row_of(place, first)]
+        reaction.stop_torque[rows.owner[stop]] += pressing / span
         reaction.mode[stop] = answer.mode[place] != OPEN
     for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
         memory.loops.constraint_force[rows.owner[entry], 0] = 0.0
@@ -179,18 +192,19 @@ def note_answer(model: Model, span: float, memory: Memory) -> None:
     for place in range(begin[CONSTRAINT], until[CONSTRAINT]):
         entry = candidate[place]
         constraint = memory.loops.constraint_force[rows.owner[entry]]
-        rubs = problem.set[place] == INTERVAL
-        constraint[0] = impulse[2 * place + (1 if rubs else 0)] / span
-        constraint[1] = 0.0 if rubs else impulse[2 * place + 1] / span
+        rubs, row = problem.set[place] == INTERVAL, first[place]
+        constraint[0] = impulse[row + (1 if rubs else 0)] / span
+        alone = rubs or first[place + 1] == row + 1
+        constraint[1] = 0.0 if alone else impulse[row + 1] / span
         reaction.mode[entry] = answer.mode[place]
     for place in range(begin[DRY_JOINT], until[DRY_JOINT]):
         dry = candidate[place]
-        reaction.friction_torque[rows.owner[dry]] = impulse[2 * place + 1] / span
+        reaction.friction_torque[rows.owner[dry]] = impulse[first[place] + 1] / span
         reaction.mode[dry] = answer.mode[place]
     for place in range(begin[SECOND_FACE], until[SECOND_FACE]):
         second = candidate[place]
-        contact = rows.owner[second]
-        memory.seconds.force[contact, 0] = impulse[2 * place] / span
-        memory.seconds.force[contact, 1] = impulse[2 * place + 1] / span
+        contact, row = rows.owner[second], first[place]
+        memory.seconds.force[contact, 0] = impulse[row] / span
+        memory.seconds.force[contact, 1] = impulse[row + 1] / span
         reaction.mode[second] = answer.mode[place]
-    note_loops(rows, until[LOOP], span, impulse, memory.loops)
+    note_loops(rows, until[LOOP], span, first, impulse, memory.loops)

@@ -86,7 +86,7 @@ def contact_rows(
     assembly.leaf[place] = link
     write_point_rows(
         model, tree, link, contacts.position[contact], contacts.normal[contact],
-        2 * place, assembly.jacobian,
+        assembly.problem.first[place], assembly.jacobian,
     )  # fmt: skip
 
 
@@ -100,24 +100,26 @@ def row_product(jacobian: Floats, row: int, v: Floats) -> float:
 
 
 @kernel
-def write_unit_row(joint: int, row: int, sign: float, leaf: Integers, jacobian: Floats) -> None:
-    """Write the Jacobian rows of the candidate of `row`, of which this is the velocity of a joint.
+def write_unit_row(
+    joint: int, place: int, component: int, sign: float, first: Integers, leaf: Integers,
+    jacobian: Floats,
+) -> None:  # fmt: skip
+    """Write the Jacobian rows of a candidate, a component of which is the velocity of a joint.
 
-    The other row of the two is zero.
+    Another one is zero.
     """
-    place = row // 2
-    for j in range(jacobian.shape[1]):
-        jacobian[2 * place, j] = 0.0
-        jacobian[2 * place + 1, j] = 0.0
-    jacobian[row, joint] = sign
+    for row in range(first[place], first[place + 1]):
+        for j in range(jacobian.shape[1]):
+            jacobian[row, j] = 0.0
+    jacobian[first[place] + component, joint] = sign
     leaf[place] = joint
 
 
 @dissolved_kernel
 def halve_by_factor(model: Model, factor: Floats, place: int, assembly: Assembly) -> None:
-    """Write the columns of ``assembly.half`` that belong to a candidate, by A = Lᵀ D L."""
+    """Write the two columns of ``assembly.half`` that belong to a candidate, by A = Lᵀ D L."""
     parents, half = model.parent, assembly.half
-    row = 2 * place
+    row = assembly.problem.first[place]
     j = assembly.leaf[place]
     while j >= 0:
         half[j, row] = assembly.jacobian[row, j]
@@ -139,13 +141,14 @@ def halve_by_factor(model: Model, factor: Floats, place: int, assembly: Assembly
 
 @dissolved_kernel
 def halve_by_bodies(model: Model, equations: Equations, place: int, assembly: Assembly) -> None:
-    """Write the columns of ``assembly.half`` that belong to a candidate, by articulated bodies.
+    """Write the two columns of ``assembly.half`` of a candidate, by articulated bodies.
 
     They are what a force along its rows leaves to each joint on the way to the root.
     """
     parents, motion, momentum = model.parent, equations.tree.motion, equations.bodies.momentum
     jacobian, root, half = assembly.jacobian, assembly.root, assembly.half
-    for row in range(2 * place, 2 * place + 2):
+    first = assembly.problem.first[place]
+    for row in range(first, first + 2):
         left = 0.0, 0.0, 0.0
         j = assembly.leaf[place]
         while j >= 0:
@@ -198,16 +201,17 @@ def assemble_delassus(model: Model, count: int, equations: Equations, assembly: 
     half, delassus = assembly.half, assembly.problem.delassus
     factor, inverse = equations.factor, equations.bodies.inverse
     straight = equations.programs[EQUATIONS] != 0
-    nv = model.nv
-    rows = 2 * count
+    nv, first = model.nv, assembly.problem.first
+    rows = first[count]
     for j in range(nv):
         assembly.root[j] = math.sqrt(factor[j, j] if straight else inverse[j])
         for row in range(rows):
             half[j, row] = 0.0
     for place in range(count):
-        if assembly.leaf[place] == EVERYWHERE:
+        alone = first[place + 1] == first[place] + 1
+        if alone or assembly.leaf[place] == EVERYWHERE:
             rubs = assembly.problem.set[place] in (CONE, INTERVAL)
-            for row in range(2 * place, 2 * place + (2 if rubs else 1)):
+            for row in range(first[place], first[place] + (2 if rubs else 1)):
                 if straight:
                     halve_all_by_factor(model, factor, row, assembly)
                 else:
@@ -242,7 +246,7 @@ def add_impulse(
     change, half, impulse = equations.force, assembly.half, assembly.answer.impulse
     for j in range(model.nv):
         total = 0.0
-        for row in range(2 * count):
+        for row in range(assembly.problem.first[count]):
             total += half[j, row] * impulse[row]
         change[j] = assembly.root[j] * total
     if equations.programs[EQUATIONS] != 0:

@@ -2,7 +2,7 @@
 
 Their equations (:mod:`heelstrike.dynamics.loops`) are rows of the contact problem like those of
 points and stops, with the whole line as the set of their forces. They come last among the
-candidates, one a row, on the normal; the tangent is empty. Accelerations that solve the problem
+candidates, one a row, on the normal; there is no tangent. Accelerations that solve the problem
 keep ``J v̇ + J̇ v`` at zero, velocities after an impact ``J v``. Those of a time step h keep
 ``J v⁺ + h/2 J̇ v`` at zero: to second order that is the chord between two poses that fit the loops,
 as in the method SHAKE. With the tangent of either pose in its place, loops would brake or drive
@@ -24,7 +24,7 @@ from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.geometry import EVERYWHERE, row_product, solve_mass_matrix, weigh
 from heelstrike.sim.contacts.rows import COUPLING, LOOP, TIE, Rows
 from heelstrike.sim.memory import Assembly, Equations, Loops
@@ -125,10 +125,13 @@ def leave_one(loop: int, loops: Loops) -> None:
 
 
 @dissolved_kernel
-def append_loops(count: int, loops: Loops, assembly: Assembly) -> int:
-    """Append the rows of the loops to the candidates; return how many there are with them."""
+def append_loops(count: int, components: int, loops: Loops, assembly: Assembly) -> int:
+    """Append the rows of the loops to the candidates; return how many there are with them.
+
+    A second component of each would be empty.
+    """
     for row in range(rows_of(loops)):
-        append_loop(row, count, loops, assembly)
+        append_loop(row, count, components, loops, assembly)
         count += 1
     return count
 
@@ -144,17 +147,22 @@ def free_loops(count: int, loops: Loops, rate: Floats, time: float, assembly: As
     for place in range(first, count):
         row = place - first
         ahead = time * loops.rows.bias[row]
-        assembly.problem.free[2 * place] = speed_along(row, loops, rate) + ahead
+        problem = assembly.problem
+        problem.free[problem.first[place]] = speed_along(row, loops, rate) + ahead
 
 
 @kernel
-def append_loop(row: int, count: int, loops: Loops, assembly: Assembly) -> None:
+def append_loop(row: int, count: int, components: int, loops: Loops, assembly: Assembly) -> None:
     """Write what a row of the loops brings to the contact problem, but for its free term."""
     jacobian, problem = assembly.jacobian, assembly.problem
+    first = problem.first[count]
+    problem.first[count + 1] = first + components
     for j in range(jacobian.shape[1]):
-        jacobian[2 * count, j] = loops.rows.jacobian[row, j]
-        jacobian[2 * count + 1, j] = 0.0
-    problem.free[2 * count + 1] = 0.0
+        jacobian[first, j] = loops.rows.jacobian[row, j]
+    if components == 2:
+        problem.free[first + 1] = 0.0
+        for j in range(jacobian.shape[1]):
+            jacobian[first + 1, j] = 0.0
     problem.set[count] = LINE
     problem.friction[count] = 0.0
     assembly.leaf[count] = EVERYWHERE
@@ -172,11 +180,13 @@ def speed_along(row: int, loops: Loops, v: Floats) -> float:
 
 
 @dissolved_kernel
-def note_loops(table: Rows, count: int, span: float, impulse: Floats, loops: Loops) -> None:
+def note_loops(
+    table: Rows, count: int, span: float, first: Integers, impulse: Floats, loops: Loops
+) -> None:
     """Keep the forces of the loops, whose impulses over a span of time are the last of `count`."""
     rows = rows_of(loops)
     for row in range(rows):
-        note_loop(table, row, impulse[2 * (count - rows + row)] / span, loops)
+        note_loop(table, row, impulse[first[count - rows + row]] / span, loops)
 
 
 @dissolved_kernel

@@ -7,7 +7,7 @@ a set in which their impulses lie (:mod:`heelstrike.contact.sets`)::
     POINT          cone        2            contact point  to the nearest face of the ground
     STOP           half-line   1            joint          to that end of its range
     CONSTRAINT     its own     1 or 2       constraint     as its kernel says, or none
-    DRY_JOINT      interval    1            joint          none
+    DRY_JOINT      interval    2            joint          none
     SECOND_FACE    cone        2            contact point  to the other face of a concave corner
     LOOP           line        1            closed loop    none: along x, then along z
     COUPLING       line        1            coupled joint  none
@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, part
 from heelstrike.compiler.compilation import dissolved_kernel
-from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
+from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE, components_of
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Model
@@ -75,6 +75,8 @@ class Rows(Bundle):
     """first, end: The first entry of each kind, and the one after its last."""
     set: Integers = array("entries", of=int)
     """Where impulses of each entry lie."""
+    components: Integers = array("entries", of=int)
+    """How many rows each brings to a contact problem. The first of an interval is the solvers'."""
     kind: Integers = array("entries", of=int)
     owner: Integers = array("entries", of=int)
     """kind, owner: What each entry is, and of what: the contact point, joint, constraint, loop,
@@ -170,6 +172,7 @@ def lay_out_rows(robot: Robot) -> Rows:
     rows.limit[stops] = ends[joint, upper]
     rows.set[first[CONSTRAINT] : end[CONSTRAINT]] = [robot.constraints[i].set for i in others]
     rows.limit[first[CONSTRAINT] : end[CONSTRAINT]] = [robot.constraints[i].bound for i in others]
+    rows.components[:] = [components_of(each) for each in rows.set]
     rows.axis[first[LOOP] : end[LOOP]] = np.tile((0, 1), model.loops)
     rows.axis[first[TIE] : end[TIE]] = [row for each in count for row in range(each)]
     rows.gap[:] = np.inf

@@ -114,17 +114,15 @@ class ReadyLaw:
         own, laid = _numbers_of(law, robot, log)
         self.parameters, self.memory, self.log = own.parameters, own.kept.memory, own.kept.log
         self._spare = own.spare
+        ours = law.function.is_ours and tree is not None and contacts is not None
+        sees = {"kinematics": tree} if ours and not believes else {}
         shown: dict[str, Any] = {
-            "state": ControlState.allocate(extents),
-            "contacts": Contacts.allocate(extents),
+            "state": ControlState.allocate(extents, **sees),
+            "contacts": contacts if ours else Contacts.allocate(extents),
             "robot": robot_view(robot),
         }
         self._shown: dict[str, Bundle] = {}
-        if law.function.is_ours and tree is not None and contacts is not None:
-            if not believes:
-                shown["state"] = ControlState.allocate(extents, kinematics=tree)
-            shown["contacts"] = contacts
-        else:
+        if not ours:
             shown = self._shown = {name: guarded_bundle(each) for name, each in shown.items()}
         self.control = Control(
             function=np.zeros(VALUE, dtype=np.int64), parameters=own.parameter_words,

@@ -107,7 +107,7 @@ def gather_near(
         passes = is_of_ground(contact, rows) and modes.passing[owner] == 1
         if passes or (kind == SECOND_FACE and gap == np.inf):
             continue
-        gap_rows(contact, count, model, tree, rows, leaf, jacobian)
+        gap_rows(contact, count, model, tree, rows, problem.first, leaf, jacobian)
         normal = row_product(jacobian, 2 * count, after)
         if not is_dry and gap > length * max(CLOSING_SPEED, -2.0 * normal):
             continue
@@ -356,7 +356,7 @@ def find_impulses(
         equations.tree, rows, modes, assembly.candidate, assembly.leaf, assembly.jacobian,
         assembly.problem, bridge.added,
     )  # fmt: skip
-    total = append_loops(count, loops, assembly)
+    total = append_loops(count, 2, loops, assembly)
     free_loops(total, loops, free_end[model.nq :], 0.5 * length, assembly)
     for place in range(count, total):
         bridge.added[place] = 0.0

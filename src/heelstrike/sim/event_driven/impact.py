@@ -109,7 +109,10 @@ def collide(model: Model, nudge: float, memory: Memory, work: Motion) -> tuple[b
     count = list_hit(rows, modes, impact.hit, candidate)
     if count + rows_of(loops) == 0:
         return True, 0.0, 0.0
-    write_candidates(count, candidate, model, equations.tree, rows, assembly.leaf, jacobian)
+    write_candidates(
+        count, candidate, model, equations.tree, rows, assembly.problem.first, assembly.leaf,
+        jacobian,
+    )  # fmt: skip
     for place in range(count):
         contact = candidate[place]
         normal = row_product(jacobian, 2 * place, v)
@@ -118,7 +121,7 @@ def collide(model: Model, nudge: float, memory: Memory, work: Motion) -> tuple[b
         free[2 * place] = normal - nudge
         free[2 * place + 1] = row_product(jacobian, 2 * place + 1, v)
     find_loops(model, begin[: model.nq], v, equations.tree, loops)
-    total = append_loops(count, loops, assembly)
+    total = append_loops(count, 2, loops, assembly)
     free_loops(total, loops, v, 0.0, assembly)
     clear_rounding(count, total, free)
     assemble_delassus(model, total, equations, assembly)
@@ -130,7 +133,7 @@ def collide(model: Model, nudge: float, memory: Memory, work: Motion) -> tuple[b
         added = impulse[row] * row_product(jacobian, row, v)
         made += added
         through += abs(added)
-    note_loops(rows, total, 1.0, impulse, loops)
+    note_loops(rows, total, 1.0, assembly.problem.first, impulse, loops)
     if saddle.used == 1:
         for j in range(model.nv):
             v[j] += saddle.unknown[j]
@@ -179,11 +182,14 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
     )  # fmt: skip
     find_loops(model, q, v, tree, loops)
     count = list_closed(rows, modes, candidate, assembly.problem.bound)
-    write_candidates(count, candidate, model, tree, rows, assembly.leaf, jacobian)
+    write_candidates(
+        count, candidate, model, tree, rows, assembly.problem.first, assembly.leaf,
+        jacobian,
+    )  # fmt: skip
     for place in range(count):
         contact = candidate[place]
         free_gap_acceleration(contact, place, model, tree, rows, face, bend, rate, jacobian, free)
-    total = append_loops(count, loops, assembly)
+    total = append_loops(count, 2, loops, assembly)
     free_loops(total, loops, rate, 1.0, assembly)
     if total > 0:  # the forces of what is closed act on the rest
         assemble_delassus(model, total, equations, assembly)
@@ -197,7 +203,8 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
         touched = hit[contact] == 1 or was_closed[contact] == 1
         if modes.closed[contact] == 1 or not touched:
             continue
-        gap_rows(contact, total, model, tree, rows, assembly.leaf, jacobian)
+        first = assembly.problem.first
+        gap_rows(contact, total, model, tree, rows, first, assembly.leaf, jacobian)
         free_gap_acceleration(contact, total, model, tree, rows, face, bend, rate, jacobian, free)
         normal, _ = gap_velocity(contact, model, tree, rows, v)
         pull = -free[2 * total]

@@ -137,7 +137,8 @@ def write_right(
                 count, memory.surface.friction, modes.slide, phase.watch.value, force, assembly
             )
     if loop_rows > 0:
-        note_loops(rows, count + loop_rows, 1.0, impulse, loops)
+        first = assembly.problem.first
+        note_loops(rows, count + loop_rows, 1.0, first, impulse, loops)
     for contact in range(modes.watched):
         force[contact, 0], force[contact, 1] = 0.0, 0.0
     for place in range(count):

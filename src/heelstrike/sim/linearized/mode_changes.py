@@ -44,7 +44,9 @@ def other_modes(simulation: Simulation, wanted: Mapping[str, str]) -> tuple[Mode
     assembly, answer = memory.assembly, memory.assembly.answer
     changes, left = [], dict(wanted)
     usual = simulation.robot.weight * (simulation.method.step_length or 0.0)
-    scale = float(np.abs(answer.impulse[: 2 * assembly.problem.count]).max(initial=usual))
+    scale = float(
+        np.abs(answer.impulse[: assembly.problem.first[assembly.problem.count]]).max(initial=usual)
+    )
     for place in range(assembly.begin[POINT], assembly.until[POINT]):
         others = _others(simulation, place, scale)
         contact = names[assembly.candidate[place]]

@@ -39,8 +39,13 @@ from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
-from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
+from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE, row_of
+from heelstrike.contact.workspace import (
+    ContactAnswer,
+    ContactProblem,
+    ContactWorkspace,
+    contact_problem,
+)
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
@@ -123,7 +128,7 @@ def allocate_impact(robot: Robot, *, bounded: bool = False) -> Impact:
         touching=np.full(entries, NEVER),
         wedged=NEVER,
         bounded=int(bounded),
-        problem=ContactProblem.allocate(nc=entries),
+        problem=contact_problem(entries),
         answer=ContactAnswer.allocate(nc=entries),
     )
 
@@ -202,8 +207,9 @@ def changes(kind: int, assembly: Assembly, before: Integers) -> bool:
 @kernel
 def close_gaps(step: float, count: int, gap: Floats, assembly: Assembly) -> None:
     """Count negative gaps of the candidates as zero."""
+    problem = assembly.problem
     for place in range(count):
-        assembly.problem.free[2 * place] -= min(gap[assembly.candidate[place]], 0.0) / step
+        problem.free[problem.first[place]] -= min(gap[assembly.candidate[place]], 0.0) / step
 
 
 @kernel
@@ -226,18 +232,18 @@ def note_wedge(steps: int, impact: Impact) -> bool:
 
 
 @dissolved_kernel
-def arrives(step: float, place: int, answer: ContactAnswer) -> bool:
+def arrives(step: float, place: int, first: Integers, answer: ContactAnswer) -> bool:
     """Whether a candidate touches at the end of the step.
 
     With the linearised gap in the free term, velocities are gaps at the end divided by the step.
     """
-    return step * answer.velocity[2 * place] <= CLOSED_GAP
+    return step * answer.velocity[row_of(place, first)] <= CLOSED_GAP
 
 
 @dissolved_kernel
 def would_close(step: float, place: int, problem: ContactProblem) -> bool:
     """Whether a candidate would touch at the end of the step if it were free."""
-    return step * problem.free[2 * place] < CLOSED_GAP
+    return step * problem.free[row_of(place, problem.first)] < CLOSED_GAP
 
 
 @dissolved_kernel
@@ -245,8 +251,9 @@ def note_touching(
     step: float, count: int, steps: int, assembly: Assembly, touching: Integers
 ) -> None:
     """Keep which of the candidates touch at the end of this step."""
+    first = assembly.problem.first
     for place in range(count):
-        if arrives(step, place, assembly.answer):
+        if arrives(step, place, first, assembly.answer):
             touching[assembly.candidate[place]] = steps
 
 
@@ -259,10 +266,11 @@ def falls_into(
 
     ``before`` is the step before, at whose end what was touching then had arrived.
     """
+    first = problem.first
     for place in range(problem.count):
         candidate = assembly.candidate[place]
         now = gap[candidate]
-        if now < np.inf and arrives(step, place, assembly.answer):
+        if now < np.inf and arrives(step, place, first, assembly.answer):
             new = touching[candidate] != before and would_close(step, place, problem)
             if now < -CLOSED_GAP or (new and now > CLOSED_GAP):
                 return True
@@ -286,7 +294,9 @@ def find_members(
         if not takes_part:
             touched = touching[candidate] == before
             stays = touched or would_close(step, place, problem)
-            takes_part = now <= CLOSED_GAP or (stays and arrives(step, place, assembly.answer))
+            takes_part = now <= CLOSED_GAP or (
+                stays and arrives(step, place, problem.first, assembly.answer)
+            )
         if takes_part:
             member[members] = place
             members += 1
@@ -318,17 +328,22 @@ def pose_impact(
     its = impact.problem
     for place in range(members):
         source = impact.member[place]
-        for other in range(members):
-            column = 2 * impact.member[other]
-            for i in range(2):
-                for j in range(2):
-                    entry = problem.delassus[2 * source + i, column + j]
-                    its.delassus[2 * place + i, 2 * other + j] = entry
-        normal, now = problem.free[2 * source], gap[candidate[source]]
+        row, size = problem.first[source], problem.first[source + 1] - problem.first[source]
+        own = its.first[place]
+        its.first[place + 1] = own + size
+        for other in range(place + 1):
+            column = problem.first[impact.member[other]]
+            for i in range(size):
+                for j in range(its.first[other + 1] - its.first[other]):
+                    entry = problem.delassus[row + i, column + j]
+                    its.delassus[own + i, its.first[other] + j] = entry
+                    its.delassus[its.first[other] + j, own + i] = entry
+        normal, now = problem.free[row], gap[candidate[source]]
         if now < np.inf:
             normal -= (max(now, 0.0) if impact.relaxed == 1 else now) / step
-        its.free[2 * place] = normal + impact.bounce[place]
-        its.free[2 * place + 1] = problem.free[2 * source + 1]
+        its.free[own] = normal + impact.bounce[place]
+        if size == 2:
+            its.free[own + 1] = problem.free[row + 1]
         its.friction[place] = problem.friction[source]
         its.set[place] = problem.set[source]
         its.bound[place] = problem.bound[source]
@@ -345,20 +360,20 @@ def energy_made(
     A share of ``bounce`` is in the free velocities. What moves a loop as it turns does work by its
     own velocity, which is left out.
     """
-    impulse, made, through = answer.impulse, 0.0, 0.0
-    for row in range(2 * problem.count):
-        place = row // 2
-        normal = row % 2 == 0
-        if normal and problem.set[place] == INTERVAL:
-            continue
-        before = problem.free[row] - (share * bounce[place] if normal else 0.0)
-        after = before
-        for column in range(2 * problem.count):
-            after += problem.delassus[row, column] * impulse[column]
-        if normal and problem.set[place] == LINE:
-            before, after = before - after, 0.0
-        made += 0.5 * impulse[row] * (before + after)
-        through += abs(impulse[row] * before) + abs(impulse[row] * after)
+    impulse, first, made, through = answer.impulse, problem.first, 0.0, 0.0
+    for place in range(problem.count):
+        for row in range(first[place], first[place + 1]):
+            normal = row == first[place]
+            if normal and problem.set[place] == INTERVAL:
+                continue
+            before = problem.free[row] - (share * bounce[place] if normal else 0.0)
+            after = before
+            for column in range(first[problem.count]):
+                after += problem.delassus[row, column] * impulse[column]
+            if normal and problem.set[place] == LINE:
+                before, after = before - after, 0.0
+            made += 0.5 * impulse[row] * (before + after)
+            through += abs(impulse[row] * before) + abs(impulse[row] * after)
     return made if made > NOTICEABLE_ENERGY * through else 0.0
 
 
@@ -381,7 +396,7 @@ def solve_restitution(
         if attempt >= 0:
             another = 0.5 * (least + most) if attempt < HALVINGS else least
             for place in range(problem.count):
-                problem.free[2 * place] += (another - share) * bounce[place]
+                problem.free[problem.first[place]] += (another - share) * bounce[place]
                 answer.mode[place] = kept[place]
             share = another
         status = solve_contact_kernel(order, problem, solver, answer)
@@ -420,18 +435,19 @@ def pose_way_out(
     Without friction; `problem` is that of the positions, solved with negative gaps counted as zero.
     """
     its = impact.problem
-    rows = 2 * problem.count
+    rows = problem.first[problem.count]
     for row in range(rows):
         its.free[row] = 0.0
         for column in range(rows):
             its.delassus[row, column] = problem.delassus[row, column]
     for place in range(problem.count):
-        deep = min(gap[candidate[place]], 0.0)
+        deep, row = min(gap[candidate[place]], 0.0), problem.first[place]
+        its.first[place + 1] = problem.first[place + 1]
         its.friction[place] = its.bound[place] = 0.0
         its.set[place] = LINE if problem.set[place] == LINE else HALF_LINE
         impact.answer.mode[place] = STICK if problem.set[place] == LINE else OPEN
         if problem.set[place] in (CONE, HALF_LINE):
-            its.free[2 * place] = velocity[2 * place] + deep / step
+            its.free[row] = velocity[row] + deep / step
             if deep < 0.0:
                 impact.answer.mode[place] = STICK
     its.count = problem.count
@@ -444,25 +460,24 @@ def solve_impact(
 ) -> bool:  # fmt: skip
     """Put the answer of the impact in the place of that of the positions; return success."""
     status = solve_restitution(order, impact.problem, solver, impact, impact.answer)
-    answer, its = assembly.answer, impact.answer
+    answer, its, first = assembly.answer, impact.answer, problem.first
     for place in range(problem.count):
         impact.arriving_mode[place] = answer.mode[place]
-        impact.arriving_impulse[2 * place] = answer.impulse[2 * place]
-        impact.arriving_impulse[2 * place + 1] = answer.impulse[2 * place + 1]
         answer.mode[place] = OPEN
-        answer.impulse[2 * place] = 0.0
-        answer.impulse[2 * place + 1] = 0.0
+    for row in range(first[problem.count]):
+        impact.arriving_impulse[row] = answer.impulse[row]
+        answer.impulse[row] = 0.0
     for place in range(members):
-        source = impact.member[place]
+        source, own = impact.member[place], impact.problem.first[place]
         answer.mode[source] = its.mode[place]
-        answer.impulse[2 * source] = its.impulse[2 * place]
-        answer.impulse[2 * source + 1] = its.impulse[2 * place + 1]
+        for row in range(first[source], first[source + 1]):
+            answer.impulse[row] = its.impulse[own + row - first[source]]
     for place in range(problem.count):
-        row = 2 * place + 1
-        slip = problem.free[row]
-        for column in range(2 * problem.count):
-            slip += problem.delassus[row, column] * answer.impulse[column]
-        answer.velocity[row] = slip
+        for row in range(first[place] + 1, first[place + 1]):
+            slip = problem.free[row]
+            for column in range(first[problem.count]):
+                slip += problem.delassus[row, column] * answer.impulse[column]
+            answer.velocity[row] = slip
     for i in range(3):
         answer.residual[i] = max(answer.residual[i], its.residual[i])
     return status == SOLVED

@@ -457,9 +457,9 @@ def select_candidates(model: Model, curved: bool, work: Stepping, memory: Memory
             if work.impact.relaxed == 0:
                 work.impact.bounce[count] = memory.surface.restitution[contact] * before
                 normal += work.impact.bounce[count]
-        list_candidate(contact, count, memory)
-        problem.free[2 * count] = normal
-        problem.free[2 * count + 1] = velocity[contact, 1]
+        row = list_candidate(contact, count, 2, memory)
+        problem.free[row] = normal
+        problem.free[row + 1] = velocity[contact, 1]
         count += 1
     return count
 
@@ -495,9 +495,7 @@ def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> in
                 continue
         elif not gap <= work.activation:
             continue
-        list_candidate(stop, count, memory)
-        problem.free[2 * count] = normal
-        problem.free[2 * count + 1] = 0.0
+        problem.free[list_candidate(stop, count, 1, memory)] = normal
         count += 1
     return count
 
@@ -512,13 +510,14 @@ def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> 
         if gap > FAR_STEPS * CLOSING_SPEED * step:
             continue
         contact_rows(model, tree, memory.seconds, rows.owner[second], count, assembly)
-        normal = row_product(assembly.jacobian, 2 * count, memory.next_v)
+        row = problem.first[count]
+        normal = row_product(assembly.jacobian, row, memory.next_v)
         if is_linearised(work.scheme):
             if gap > step * max(CLOSING_SPEED, -2.0 * normal):
                 continue
             normal += gap / step
         elif work.scheme == MOREAU_JEAN:
-            before = row_product(assembly.jacobian, 2 * count, memory.v)
+            before = row_product(assembly.jacobian, row, memory.v)
             if gap + 0.5 * step * before > work.activation:
                 continue
             if work.impact.relaxed == 0:
@@ -526,10 +525,9 @@ def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> 
                 normal += work.impact.bounce[count]
         elif gap > work.activation:
             continue
-        list_candidate(second, count, memory)
-        problem.free[2 * count] = normal
-        tangent = row_product(assembly.jacobian, 2 * count + 1, memory.next_v)
-        problem.free[2 * count + 1] = tangent
+        row = list_candidate(second, count, 2, memory)
+        problem.free[row] = normal
+        problem.free[row + 1] = row_product(assembly.jacobian, row + 1, memory.next_v)
         count += 1
     return count
 
@@ -547,8 +545,8 @@ def select_constraints(count: int, work: Stepping, memory: Memory) -> int:
         own = rows.owner[entry]
         normal = rate_of(own, 0, memory.next_v, outside)
         if rows.set[entry] == INTERVAL:
-            list_candidate(entry, count, memory)
-            problem.free[2 * count + 1] = normal
+            row = list_candidate(entry, count, 2, memory)
+            problem.free[row + 1] = normal
             problem.bound[count] = step * rows.limit[entry]
             count += 1
             continue
@@ -568,9 +566,10 @@ def select_constraints(count: int, work: Stepping, memory: Memory) -> int:
                 normal += work.impact.bounce[count]
         elif gap > work.activation:
             continue
-        list_candidate(entry, count, memory)
-        problem.free[2 * count] = normal
-        problem.free[2 * count + 1] = rate_of(own, 1, memory.next_v, outside)
+        row = list_candidate(entry, count, rows.components[entry], memory)
+        problem.free[row] = normal
+        if rows.components[entry] == 2:
+            problem.free[row + 1] = rate_of(own, 1, memory.next_v, outside)
         count += 1
     return count
 
@@ -579,7 +578,7 @@ def select_constraints(count: int, work: Stepping, memory: Memory) -> int:
 def joint_row(rows: Rows, assembly: Assembly, place: int) -> tuple[int, int, float]:
     """Row of a candidate that is a stop or a dry joint, its joint, and the sign of the two."""
     entry = assembly.candidate[place]
-    row = 2 * place + 1 if rows.kind[entry] == DRY_JOINT else 2 * place
+    row = assembly.problem.first[place + 1] - 1
     return row, rows.owner[entry], rows.side[entry]
 
 
@@ -625,7 +624,7 @@ def add_joint(
     """Add the stop or dry joint at a place to the Delassus matrix of the candidates before.
 
     What a unit impulse along its row does to the joint velocities, A⁻¹ e, goes to that row of
-    ``assembly.jacobian``.
+    ``assembly.jacobian``. The other row of a dry joint is the solvers'.
     """
     candidate, delassus = assembly.candidate, assembly.problem.delassus
     row, joint, sign = joint_row(rows, assembly, place)
@@ -634,10 +633,6 @@ def add_joint(
         change[j] = 0.0
     change[joint] = sign
     solve_mass_matrix(model, equations, change)
-    empty = 4 * place + 1 - row
-    for other in range(2 * place + 2):
-        delassus[empty, other] = 0.0
-        delassus[other, empty] = 0.0
     if near > 0:
         find_velocities(model, contacts, change, True, equations.tree, usual)
     for other in range(near):
@@ -647,12 +642,9 @@ def add_joint(
             delassus[2 * other + i, row] = entry
     for other in range(near, place + 1):
         column, its_joint, its_sign = joint_row(rows, assembly, other)
-        its_empty = 4 * other + 1 - column
         entry = its_sign * change[its_joint]
         delassus[row, column] = entry
         delassus[column, row] = entry
-        delassus[row, its_empty] = 0.0
-        delassus[its_empty, row] = 0.0
 
 
 @kernel
@@ -661,14 +653,11 @@ def add_loop(model: Model, near: int, joints: int, place: int, memory: Memory) -
 
     As with joints, A⁻¹ Jᵀ goes to that row of ``assembly.jacobian``.
     """
-    assembly, usual, row = memory.assembly, memory.usual, 2 * place
+    assembly, usual, first = memory.assembly, memory.usual, memory.assembly.problem.first
     candidate, delassus = assembly.candidate, assembly.problem.delassus
+    row = first[place]
     change = assembly.jacobian[row]
     solve_mass_matrix(model, memory.equations, change)
-    for other in range(2 * place + 2):
-        for own in range(row, row + 2):
-            delassus[own, other] = 0.0
-            delassus[other, own] = 0.0
     if near > 0:
         find_velocities(model, memory.contacts, change, True, memory.equations.tree, usual)
     for other in range(near):
@@ -677,7 +666,7 @@ def add_loop(model: Model, near: int, joints: int, place: int, memory: Memory) -
             delassus[row, 2 * other + i] = entry
             delassus[2 * other + i, row] = entry
     for other in range(near, place + 1):
-        column = 2 * other
+        column = first[other]
         if other < joints:
             column, joint, sign = joint_row(memory.rows, assembly, other)
             entry = sign * change[joint]
@@ -724,9 +713,9 @@ def push_all(
     if straight:
         joints = count - rows_of(memory.loops)
         push_candidates(model, contacts, memory.rows, assembly, near, joints, equations, usual, v)
-        for place in range(joints, count):
+        for row in range(assembly.problem.first[joints], assembly.problem.first[count]):
             for j in range(model.nv):
-                v[j] += assembly.answer.impulse[2 * place] * assembly.jacobian[2 * place, j]
+                v[j] += assembly.answer.impulse[row] * assembly.jacobian[row, j]
     else:
         add_impulse(model, assembly, count, equations, v)
 
@@ -796,7 +785,7 @@ def push_out(
     )
     solver, its = memory.solver, impact.answer
     if solve_contact_kernel(work.order, impact.problem, solver, its) == SOLVED:
-        for row in range(2 * count):
+        for row in range(problem.first[count]):
             answer.impulse[row] = its.impulse[row]
         push_all(model, near, count, straight, memory, impact.arriving)
 
@@ -915,7 +904,7 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
         if impact.corner.near > 0:
             count = select_corners(model, count, work, memory)
         first = note_group(SECOND_FACE, first, count, assembly)
-        count = append_loops(count, memory.loops, assembly)
+        count = append_loops(count, 1, memory.loops, assembly)
         note_group(LOOP, first, count, assembly)
         free_loops(count, memory.loops, memory.next_v, 0.5 * work.step, assembly)
         if at_once:

@@ -314,8 +314,11 @@ def evaluate(
     if rows_of(loops) > 0:
         find_loops(model, q, v, tree, loops)
     count = list_closed(rows, modes, assembly.candidate, assembly.problem.bound)
-    write_candidates(count, assembly.candidate, model, tree, rows, assembly.leaf, assembly.jacobian)
-    total = append_loops(count, loops, assembly)
+    write_candidates(
+        count, assembly.candidate, model, tree, rows, assembly.problem.first, assembly.leaf,
+        assembly.jacobian,
+    )  # fmt: skip
+    total = append_loops(count, 2, loops, assembly)
     forces.count = count
     saddle.needed = 0
     if total > 0:

@@ -36,31 +36,31 @@ def gap_velocity(
 
 @kernel
 def gap_rows(
-    entry: int, place: int, model: Model, tree: Workspace, rows: Rows, leaf: Integers,
-    jacobian: Floats,
+    entry: int, place: int, model: Model, tree: Workspace, rows: Rows, first: Integers,
+    leaf: Integers, jacobian: Floats,
 ) -> None:  # fmt: skip
     """Write the Jacobian rows (normal, tangent) of an entry as a candidate."""
     kind, owner = rows.kind[entry], rows.owner[entry]
     if kind == STOP:
-        write_unit_row(owner, 2 * place, rows.side[entry], leaf, jacobian)
+        write_unit_row(owner, place, 0, rows.side[entry], first, leaf, jacobian)
     elif kind == CONSTRAINT:
-        write_own_rows(entry, place, rows, leaf, jacobian)
+        write_own_rows(entry, place, rows, first, leaf, jacobian)
     elif kind == DRY_JOINT:
-        write_unit_row(owner, 2 * place + 1, 1.0, leaf, jacobian)
+        write_unit_row(owner, place, 1, 1.0, first, leaf, jacobian)
     else:
         link, position, normal = model.contact_link[owner], rows.position[entry], rows.normal[entry]
         leaf[place] = link
-        write_point_rows(model, tree, link, position, normal, 2 * place, jacobian)
+        write_point_rows(model, tree, link, position, normal, first[place], jacobian)
 
 
 @kernel
 def write_candidates(
-    count: int, candidate: Integers, model: Model, tree: Workspace, rows: Rows, leaf: Integers,
-    jacobian: Floats,
+    count: int, candidate: Integers, model: Model, tree: Workspace, rows: Rows, first: Integers,
+    leaf: Integers, jacobian: Floats,
 ) -> None:  # fmt: skip
     """Write the Jacobian rows of the first `count` candidates."""
     for place in range(count):
-        gap_rows(candidate[place], place, model, tree, rows, leaf, jacobian)
+        gap_rows(candidate[place], place, model, tree, rows, first, leaf, jacobian)
 
 
 @dissolved_kernel

@@ -138,8 +138,9 @@ def project(
         count = list_closed(rows, modes, candidate, assembly.problem.bound)
         if attempt < 4:
             count = list_sunk(count, rows, modes, phase.watch.fired, candidate)
-        write_candidates(count, candidate, model, tree, rows, assembly.leaf, jacobian)
-        total = append_loops(count, loops, assembly)
+        first = assembly.problem.first
+        write_candidates(count, candidate, model, tree, rows, first, assembly.leaf, jacobian)
+        total = append_loops(count, 2, loops, assembly)
         if total == 0:
             return 0.0, strayed, 0.0
         assemble_delassus(model, total, equations, assembly)

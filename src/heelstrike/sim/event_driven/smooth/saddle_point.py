@@ -31,7 +31,7 @@ from heelstrike.contact.modes import (
     STICK,
 )
 from heelstrike.contact.sets import INTERVAL, LINE
-from heelstrike.contact.workspace import ContactAnswer, Tally
+from heelstrike.contact.workspace import ContactAnswer, ContactProblem, Tally
 from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import mass_matrix
 from heelstrike.dynamics.workspace import Workspace
@@ -168,9 +168,10 @@ def solve_saddle_point(size: int, saddle: SaddlePoint) -> int:
 
 
 @kernel
-def list_rows(count: int, total: int, assembly: Assembly, held: HeldRows) -> int:
-    """List the rows in which the modes of the answer allow no velocity; return how many."""
-    problem, mode = assembly.problem, assembly.answer.mode
+def list_rows(
+    count: int, total: int, problem: ContactProblem, mode: Integers, held: HeldRows
+) -> int:
+    """List the rows in which some modes allow no velocity; return how many."""
     size = 0
     for place in range(total):
         does, friction = mode[place], problem.friction[place]
@@ -197,9 +198,9 @@ def list_rows(count: int, total: int, assembly: Assembly, held: HeldRows) -> int
 
 
 @kernel
-def begin_impulses(total: int, assembly: Assembly) -> None:
+def begin_impulses(total: int, problem: ContactProblem, answer: ContactAnswer) -> None:
     """Put the impulses of the answer on what its modes allow: these are corrected then."""
-    problem, mode, impulse = assembly.problem, assembly.answer.mode, assembly.answer.impulse
+    mode, impulse = answer.mode, answer.impulse
     for place in range(total):
         does = mode[place]
         limit = problem.friction[place] * impulse[2 * place]
@@ -215,16 +216,16 @@ def begin_impulses(total: int, assembly: Assembly) -> None:
 
 @kernel
 def solve_modes(
-    count: int, total: int, matrix: Floats, assembly: Assembly, held: HeldRows, saddle: SaddlePoint
-) -> int:
+    count: int, total: int, matrix: Floats, jacobian: Floats, problem: ContactProblem,
+    answer: ContactAnswer, held: HeldRows, saddle: SaddlePoint,
+) -> int:  # fmt: skip
     """Correct the impulses of the answer, and find velocities, by the modes; return how many rows.
 
     The motion goes to ``saddle.unknown``, the units of coordinates and rows to ``saddle.scale``.
     """
-    nv = matrix.shape[0]
-    answer, jacobian, bias = assembly.answer, assembly.jacobian, saddle.bias
-    begin_impulses(total, assembly)
-    size = list_rows(count, total, assembly, held)
+    nv, bias = matrix.shape[0], saddle.bias
+    begin_impulses(total, problem, answer)
+    size = list_rows(count, total, problem, answer.mode, held)
     write_equations(size, nv, matrix, jacobian, held, saddle.system)
     for j in range(nv):
         pushed = saddle.force[j]
@@ -242,7 +243,7 @@ def solve_modes(
     for row in range(2 * total):
         answer.velocity[row] = bias[row] + row_product(jacobian, row, saddle.unknown[:nv])
     for place in range(total):
-        if assembly.problem.set[place] == INTERVAL:
+        if problem.set[place] == INTERVAL:
             answer.velocity[2 * place] = 0.0
     return size
 
@@ -361,7 +362,9 @@ def solve_by_saddle_point(
     """
     nv, scale = matrix.shape[0], saddle.scale
     for _ in range(ROUNDS):
-        size = solve_modes(count, total, matrix, assembly, held, saddle)
+        size = solve_modes(
+            count, total, matrix, assembly.jacobian, assembly.problem, assembly.answer, held, saddle
+        )
         data = size_of_data(total, nv, assembly.jacobian, saddle)
         if not amend_modes(total, accelerations, nv, data, slide, scale, assembly):
             return is_proven(size, total, data, matrix, held.row, saddle, assembly)
