@@ -17,6 +17,8 @@ A file is a NumPy archive (``.npz``) without pickled objects, which anything can
 ``bias.i``              one for each row
 ``recurrent.i``         (4 or 3 outputs, outputs) of lstm (gates i, f, g, o) and gru (r, z, n)
 ``recurrent_bias.i``    one for each row
+``reference.NAME``      if it follows a motion: the fields of :class:`Reference`; then commanded
+                        speed, sine and cosine of the phase are observed after the velocities
 ======================  ===========================================================================
 
 Rows and gates are in the order of PyTorch's ``LSTM`` and ``GRU``.
@@ -30,13 +32,14 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.control.policy.reference import OBSERVED, Reference
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
@@ -139,6 +142,8 @@ class Network:
     """Name of the robot it was learned with; empty for any."""
     about: dict[str, str] = field(default_factory=dict)
     """What else is to be told of it."""
+    reference: Reference | None = None
+    """Motion that it follows; torques of the outputs are added to those that do so."""
 
     def __post_init__(self) -> None:
         for name in ("gear", "mean", "deviation"):
@@ -157,6 +162,29 @@ class Network:
             raise ControllerError("deviation of a policy must be positive, as many as the mean")
         if not 0.0 < self.period < np.inf:
             raise ControllerError(f"the period of a policy must be positive, got {self.period}")
+        if self.reference is not None:
+            every = self.period / self.reference.period
+            if self.reference.stiffness.size != self.gear.size or every != round(every, 6):
+                raise ControllerError(
+                    "the reference of a policy must be one of as many joints as it drives, whose "
+                    f"period is a whole part of {self.period} s, got {self.reference.period} s"
+                )
+
+    def observed(self, positions: int, velocities: int) -> int:
+        """Return how many numbers of a robot it observes.
+
+        Parameters
+        ----------
+        positions, velocities : int
+            Those of the robot.
+
+        Returns
+        -------
+        int
+            The number.
+        """
+        own = 0 if self.reference is None else OBSERVED
+        return positions + velocities - self.skipped + own
 
     def begin(self) -> list[NDArray[np.float64]]:
         """Return what the layers remember before the first call: zeros.
@@ -221,6 +249,8 @@ class Network:
                 arrays[f"recurrent.{i}"] = layer.recurrent
                 arrays[f"recurrent_bias.{i}"] = layer.recurrent_bias
         arrays |= {f"about.{name}": text for name, text in self.about.items()}
+        if self.reference is not None:
+            arrays |= {f"reference.{k}": v for k, v in vars(self.reference).items()}
         image = io.BytesIO()
         np.savez(image, allow_pickle=False, **{k: np.asarray(v) for k, v in arrays.items()})
         return write_whole(path, image.getbuffer())
@@ -284,10 +314,14 @@ def _network(arrays: Mapping[str, Any]) -> Network:
             )
         )  # fmt: skip
     about = {k.removeprefix("about."): str(v) for k, v in arrays.items() if k.startswith("about.")}
+    reference = None
+    if "reference.motion" in arrays:
+        named = {each.name: arrays[f"reference.{each.name}"] for each in fields(Reference)}
+        reference = Reference(**named | {"period": float(named["period"])})
     return Network(
         tuple(layers), float(arrays["period"]), arrays["gear"], arrays["mean"],
         arrays["deviation"], float(arrays["observation_limit"]), int(arrays["skipped"]),
-        float(arrays["velocity_limit"]), str(arrays["robot"]), about,
+        float(arrays["velocity_limit"]), str(arrays["robot"]), about, reference,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Environments of Gymnasium on hard contact: ``heelstrike/Walker2d-v0`` and its like.
+"""Environments of Gymnasium on hard contact: ``heelstrike/Walk-v0``, ``Walker2d-v0`` and its like.
 
 Importing this module registers them; so does their name with the module before it::
 
@@ -12,16 +12,15 @@ Importing this module registers them; so does their name with the module before 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import SimulationError
-from heelstrike.experiments.learning.course import TERMS, Course
+from heelstrike.experiments.learning.course import AT_RESET, Course
+from heelstrike.experiments.learning.courses import NAMES, course_of, named_task
 from heelstrike.experiments.learning.pictures import Camera
-from heelstrike.experiments.learning.tasks import RUNNING
 from heelstrike.robot.model import Floats, Integers
 
 try:
@@ -52,18 +51,19 @@ def _refused(wrong: SimulationError) -> Exception:
     return ValueError(str(wrong))
 
 
-class RunningEnv(gymnasium.Env[Floats, Array]):
-    """One robot that is to run; see :mod:`heelstrike.experiments.learning.tasks`.
+class TaskEnv(gymnasium.Env[Floats, Array]):
+    """One robot that is to run or walk.
 
     Parameters
     ----------
     task : str
-        Name of the task: ``"Walker2d"``, ``"Hopper"`` or ``"HalfCheetah"``.
+        Name of the task: ``"Walker2d"``, ``"Hopper"``, ``"HalfCheetah"`` or ``"Walk"``.
     render_mode : str, optional
         ``"rgb_array"`` for pictures.
     **changes
-        Fields of :class:`~heelstrike.experiments.learning.tasks.RunningTask` that are to be others,
-        as ``ctrl_cost_weight=0.01``.
+        Fields of :class:`~heelstrike.experiments.learning.tasks.RunningTask` or
+        :class:`~heelstrike.experiments.learning.walk_task.WalkTask` that are to be others, as
+        ``ctrl_cost_weight=0.01``.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": FRAMES}  # noqa: RUF012
@@ -107,8 +107,7 @@ class RunningEnv(gymnasium.Env[Floats, Array]):
             self._lanes.seed(0, self.np_random)
         self._lanes.begin(self._first)
         self._state = "begun"
-        x, z = self._lanes.terms[0, :2].tolist()
-        return self._lanes.observation[0].copy(), {"x_position": x, "z_distance_from_origin": z}
+        return self._lanes.observation[0].copy(), self._terms(AT_RESET)
 
     def step(self, action: Array) -> tuple[Floats, float, bool, bool, Info]:
         """Make a decision.
@@ -136,7 +135,8 @@ class RunningEnv(gymnasium.Env[Floats, Array]):
         except SimulationError as wrong:
             raise _refused(wrong) from None
         batch = lanes.batch
-        info: Info = dict(zip(TERMS, lanes.terms[0].tolist(), strict=True))
+        info = self._terms(len(lanes.names))
+        info["contact_force"] = batch.contact_force[0].copy()
         info["certificate"] = max(
             batch.complementarity.item(), batch.cone.item(), batch.non_penetration.item()
         )
@@ -144,6 +144,10 @@ class RunningEnv(gymnasium.Env[Floats, Array]):
         if terminated:
             info["cause"] = lanes.cause(0)
         return lanes.observation[0].copy(), float(lanes.reward[0]), terminated, False, info
+
+    def _terms(self, count: int) -> Info:
+        lanes = self._lanes
+        return dict(zip(lanes.names[:count], lanes.terms[0].tolist(), strict=False))
 
     def render(self) -> Any:
         """Return a picture, (height, width, 3) of 8 bits, if that is the mode."""
@@ -160,8 +164,8 @@ class RunningEnv(gymnasium.Env[Floats, Array]):
         self._lanes.batch.close()
 
 
-class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
-    """Many robots that are to run, moved in one call.
+class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
+    """Many robots that are to run or walk, moved in one call.
 
     Parameters
     ----------
@@ -241,9 +245,10 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
         self._begin(chosen)
         self._state = "begun"
         info: Info = {
-            name: self._lanes.terms[:, place].copy() for place, name in enumerate(TERMS[:2])
+            name: self._lanes.terms[:, place].copy()
+            for place, name in enumerate(self._lanes.names[:AT_RESET])
         }
-        info |= {f"_{name}": mask.copy() for name in TERMS[:2]}
+        info |= {f"_{name}": mask.copy() for name in self._lanes.names[:AT_RESET]}
         return self._lanes.observation.copy(), info
 
     def step(self, actions: Array) -> tuple[Floats, Floats, Array, Array, Info]:
@@ -345,9 +350,10 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
     def _info(self, went: Array) -> Info:
         terms, batch = self._lanes.terms.copy(), self._lanes.batch
         certificate = np.maximum(batch.complementarity, batch.cone)
-        info: Info = {name: terms[:, place] for place, name in enumerate(TERMS)}
+        info: Info = {name: terms[:, place] for place, name in enumerate(self._lanes.names)}
+        info["contact_force"] = batch.contact_force.copy()
         info["certificate"] = np.maximum(certificate, batch.non_penetration, out=certificate)
-        info |= {f"_{name}": went for name in (*TERMS, "certificate")}
+        info |= {f"_{name}": went for name in tuple(info)}
         return info
 
     def _tell_ends(self, ended: Array, terminated: Array, info: Info) -> None:
@@ -370,7 +376,7 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
         } | {f"_{name}": ended.copy() for name in names}  # fmt: skip
         info["_final_info"] = ended.copy()
         self._begin(over)
-        for place, name in enumerate(TERMS[:2]):
+        for place, name in enumerate(lanes.names[:AT_RESET]):
             info[name] = lanes.terms[:, place].copy()
 
 
@@ -379,11 +385,9 @@ def _made(kind: Any, arguments: tuple[Any, ...], options: Info) -> Any:
 
 
 def _course(task: str, lanes: int, changes: Info, threads: int = 1) -> Course:
-    if task not in RUNNING:
-        raise ValueError(f"there is no task {task!r}; there are {', '.join(RUNNING)}")
     if not isinstance(lanes, int) or lanes < 1:
         raise ValueError(f"num_envs must be a whole number ≥ 1, got {lanes!r}")
-    return Course(replace(RUNNING[task], **changes), lanes, threads=threads)
+    return course_of(named_task(task, **changes), lanes, threads=threads)
 
 
 def _metadata(course: Course) -> Info:
@@ -411,13 +415,13 @@ def _check_begun(state: str) -> None:
 def register() -> None:
     """Register the environments with Gymnasium, unless they are."""
     module = __name__
-    for task, each in RUNNING.items():
+    for task in NAMES:
         name = f"heelstrike/{task}-v0"
         if name not in gymnasium.registry:
             gymnasium.register(
-                name, entry_point=f"{module}:RunningEnv", kwargs={"task": task},
-                vector_entry_point=f"{module}:RunningVectorEnv",
-                max_episode_steps=each.max_episode_steps,
+                name, entry_point=f"{module}:TaskEnv", kwargs={"task": task},
+                vector_entry_point=f"{module}:TaskVectorEnv",
+                max_episode_steps=named_task(task).max_episode_steps,
             )  # fmt: skip
 
 

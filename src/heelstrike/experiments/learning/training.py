@@ -1,4 +1,4 @@
-"""Proximal policy optimisation (Schulman et al. 2017) of running tasks, in NumPy."""
+"""Proximal policy optimisation (Schulman et al. 2017), in NumPy."""
 
 from __future__ import annotations
 
@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from heelstrike.control.policy.network import Layer, Network
 from heelstrike.errors import SimulationError
-from heelstrike.experiments.learning.course import Course
+from heelstrike.experiments.learning.courses import LearningTask, course_of
 from heelstrike.experiments.learning.perceptron import Adam, Array, Perceptron
-from heelstrike.experiments.learning.tasks import RunningTask
 from heelstrike.field_texts import dataclass
 from heelstrike.whole_file import write_whole
 
@@ -105,7 +104,7 @@ class Trainer:
 
     Parameters
     ----------
-    task : RunningTask
+    task : RunningTask or WalkTask
         The task.
     decisions : int
         Decisions to learn from, over all.
@@ -116,12 +115,12 @@ class Trainer:
     """
 
     def __init__(
-        self, task: RunningTask, decisions: int, recipe: Recipe | None = None, *, threads: int = 1
+        self, task: LearningTask, decisions: int, recipe: Recipe | None = None, *, threads: int = 1
     ) -> None:
         self.task, self.recipe = task, Recipe() if recipe is None else recipe
         recipe = self.recipe
         self.decisions, self.round = int(decisions), 0
-        self.course = Course(task, recipe.lanes, threads=threads)
+        self.course = course_of(task, recipe.lanes, threads=threads)
         self.random = np.random.default_rng(recipe.seed)
         observed, actions = self.course.observation.shape[1], self.course.robot.nu
         self.actor = Perceptron((observed, *recipe.hidden, actions), self.random, 0.01)
@@ -182,7 +181,7 @@ class Trainer:
         Network
             For :class:`heelstrike.Policy`.
         """
-        parameters, task = self.actor.parameters, self.task
+        parameters = self.actor.parameters
         last = len(parameters) - 2
         layers = tuple(
             Layer(
@@ -191,12 +190,13 @@ class Trainer:
             )
             for i in range(0, last + 1, 2)
         )  # fmt: skip
-        return Network(
-            layers, task.decision_period, self.course.gear, self.observations.mean,
-            self.observations.deviation, LIMIT,
-            int(task.exclude_current_positions_from_observation), task.velocity_limit,
-            self.course.robot.name, {"task": task.file, "seed": str(self.recipe.seed)},
-        )  # fmt: skip
+        return self.course.network(
+            layers,
+            self.observations.mean,
+            self.observations.deviation,
+            observation_limit=LIMIT,
+            about={**self.task.about, "seed": str(self.recipe.seed)},
+        )
 
     def keep(self, path: str | os.PathLike[str]) -> Path:
         """Keep everything that the further course hangs on in a file.
