@@ -4,7 +4,8 @@
 native vector and a single environment in a Python loop, the physics alone (the same lanes, which
 begin anew in the same states, without observations, rewards and noise), Gymnasium's own
 environments one by one (sync) and in processes (async), and MuJoCo's ``rollout``. ``... identical``
-compares lanes with single simulations, bit by bit.
+compares lanes with single simulations, bit by bit. ``... endure`` makes many steps and prints how
+memory grows, why episodes ended, and the worst certificates.
 
 Times are processor times of this process but for async, whose work is done by others (clock); of
 each the best of several repetitions is printed, which are interleaved.
@@ -13,10 +14,13 @@ each the best of several repetitions is printed, which are interleaved.
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from importlib.util import find_spec
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -30,7 +34,7 @@ if find_spec("imageio") is None:  # Gymnasium imports it for films, which nobody
 import gymnasium
 
 from heelstrike.experiments.learning import environments
-from heelstrike.experiments.learning.course import Course
+from heelstrike.experiments.learning.running import RunningCourse
 from heelstrike.experiments.learning.tasks import RUNNING
 
 Timed = Callable[[], tuple[int, float]]
@@ -54,12 +58,12 @@ def timed(
 def speed(task: str, lanes: int, decisions: int, repetitions: int, *, peers: bool) -> None:
     """Print steps a second."""
     actions = np.random.default_rng(0).uniform(
-        -1, 1, (decisions, lanes, Course(RUNNING[task]).robot.nu)
+        -1, 1, (decisions, lanes, RunningCourse(RUNNING[task]).robot.nu)
     )
     actions = actions.astype(np.float32)
-    vector = environments.RunningVectorEnv(task, lanes)
-    single = environments.RunningEnv(task)
-    course = Course(RUNNING[task], lanes)
+    vector = environments.TaskVectorEnv(task, lanes)
+    single = environments.TaskEnv(task)
+    course = RunningCourse(RUNNING[task], lanes)
     kept: list[Any] = []
     first: list[Any] = []
 
@@ -195,10 +199,38 @@ def identical(lanes: int, steps: int, seed: int) -> None:
     print(f"{lanes} lanes x {steps} steps, 1, 2 and 5 threads: {different} differ")
 
 
+def endure(task: str, lanes: int, decisions: int) -> None:
+    """Make many steps with random actions; print memory, ends and certificates ten times."""
+    vector = environments.TaskVectorEnv(task, lanes)
+    random = np.random.default_rng(0)
+    vector.reset(seed=0)
+    causes: Counter[str] = Counter()
+    worst, ends, begin = 0.0, 0, time.process_time()
+    for decision in range(1, decisions + 1):
+        action = random.uniform(-1, 1, (lanes, vector.single_action_space.shape[0]))
+        *_, terminated, truncated, info = vector.step(action)
+        worst = max(worst, float(info["certificate"].max()))
+        ends += int(terminated.sum() + truncated.sum())
+        if terminated.any():
+            causes.update(re.sub(r"-?[0-9.]+(e[-+]?[0-9]+)?", "N", each)
+                          for each in info["cause"][terminated])  # fmt: skip
+        if decision % max(decisions // 10, 1) == 0:
+            pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+            seconds = time.process_time() - begin
+            print(
+                f"{decision * lanes:12d} steps, {pages * 4096 / 2**20:7.1f} MB, {ends} ends, worst "
+                f"certificate {worst:.2g}, {decision * lanes / seconds:.0f} steps/s", flush=True,
+            )  # fmt: skip
+    for cause, count in causes.most_common():
+        print(f"  {count:8d} {cause}")
+    going = int(vector._lanes.batch.going.sum())
+    print(f"  {ends - sum(causes.values()):8d} truncated; {going} of {lanes} lanes can go on")
+
+
 def main() -> None:
     """Do what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("what", choices=["speed", "identical"])
+    parser.add_argument("what", choices=["speed", "identical", "endure"])
     parser.add_argument("--task", default="Walker2d", choices=list(RUNNING))
     parser.add_argument("--lanes", type=int, default=0)
     parser.add_argument("--decisions", type=int, default=500)
@@ -211,6 +243,8 @@ def main() -> None:
             given.task, given.lanes or 64, given.decisions, given.repetitions,
             peers=not given.no_peers,
         )  # fmt: skip
+    elif given.what == "endure":
+        endure(given.task, given.lanes or 64, given.decisions)
     else:
         identical(given.lanes or 1000, 200, given.seed)
 

@@ -19,7 +19,7 @@ from gymnasium.vector import AutoresetMode  # noqa: E402
 
 import heelstrike as hs  # noqa: E402
 from heelstrike.experiments.learning import environments  # noqa: E402
-from heelstrike.experiments.learning.environments import RunningEnv, RunningVectorEnv  # noqa: E402
+from heelstrike.experiments.learning.environments import TaskEnv, TaskVectorEnv  # noqa: E402
 
 TASKS = ("Walker2d", "Hopper", "HalfCheetah")
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
@@ -51,7 +51,7 @@ def test_reset_observation_and_reward_are_those_of_gymnasium(
     if find_spec("imageio") is None:  # Gymnasium asks for it, to take pictures
         monkeypatch.setitem(sys.modules, "imageio", ModuleType("imageio"))
     theirs = gymnasium.make(f"{task}-v5").unwrapped
-    ours = RunningEnv(task)
+    ours = TaskEnv(task)
     assert ours.observation_space == theirs.observation_space
     assert ours.action_space == theirs.action_space
     assert ours.metadata["render_fps"] == theirs.metadata["render_fps"]
@@ -78,7 +78,7 @@ def test_reset_observation_and_reward_are_those_of_gymnasium(
     [((0.0, 0.81, 0.99), True), ((0.0, 0.79, 0.0), False), ((0, 1.0, 1.01), False)],
 )
 def test_an_episode_ends_where_gymnasium_ends_it(q: tuple[float, ...], healthy: bool) -> None:
-    environment = RunningEnv("Walker2d")
+    environment = TaskEnv("Walker2d")
     environment.reset(seed=0)
     lanes = environment._lanes
     start = lanes.initial.q.copy()
@@ -145,7 +145,7 @@ def test_three_ways_to_begin_anew() -> None:
 
 
 def test_what_is_wrong_is_said() -> None:
-    lanes, single = vector(), RunningEnv("Walker2d")
+    lanes, single = vector(), TaskEnv("Walker2d")
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
         lanes.step(actions(3, 1)[0])
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
@@ -166,11 +166,11 @@ def test_what_is_wrong_is_said() -> None:
             lanes.reset(seed=seed)
     with pytest.raises(gymnasium.error.Error, match="truth value"):
         lanes.reset(options={"reset_mask": [0, 1, 1]})
-    for make in (lambda: RunningEnv("Ant"), lambda: RunningVectorEnv("Walker2d", 0)):
+    for make in (lambda: TaskEnv("Ant"), lambda: TaskVectorEnv("Walker2d", 0)):
         with pytest.raises(ValueError, match=r"task|num_envs"):
             make()
     with pytest.raises(ValueError, match="render_mode"):
-        RunningEnv("Walker2d", render_mode="human")
+        TaskEnv("Walker2d", render_mode="human")
     copy = pickle.loads(pickle.dumps(single))
     np.testing.assert_array_equal(copy.reset(seed=0)[0], single.reset(seed=0)[0])
     for each in (lanes, single):

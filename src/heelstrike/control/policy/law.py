@@ -13,15 +13,17 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.control.policy.network import ACTIVATIONS, Network, load_network
 from heelstrike.control.policy.reference import (
     Following,
+    between,
     follow,
     nothing_to_follow,
+    spot,
     stride_at,
 )
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.law import Law, controller
-from heelstrike.sim.controller.robot import ControlState
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
 KINDS = ("dense", "lstm", "gru")
 DENSE, LSTM, GRU = range(3)
@@ -180,13 +182,17 @@ def remember(kind: int, outputs: int, place: int, memory: State) -> None:
 def observe(state: ControlState, parameters: Weights, memory: State) -> None:
     """Write what is observed, normalised, to ``x``."""
     x, limit, place = memory.x, parameters.velocity_limit, 0
-    for i in range(parameters.skipped, state.q.shape[0]):
+    nq, nv, following = state.q.shape[0], state.v.shape[0], parameters.following
+    for i in range(parameters.skipped, nq):
         x[place] = state.q[i]
         place += 1
-    for i in range(state.v.shape[0]):
+    for i in range(nv):
         x[place] = min(max(state.v[i], -limit), limit)
         place += 1
-    if parameters.following.speed.shape[0] > 0:
+    if following.speed.shape[0] > 0:
+        at = spot(following.speed, following.motion.shape[1], memory.speed, memory.phase)
+        for i in range(place):
+            x[i] -= between(following.motion, at, parameters.skipped + i)
         x[place] = memory.speed
         x[place + 1] = math.sin(2.0 * math.pi * memory.phase)
         x[place + 2] = math.cos(2.0 * math.pi * memory.phase)
@@ -218,8 +224,9 @@ def think(parameters: Weights, memory: State) -> None:
 
 @controller
 def policy(
-    t: float, state: ControlState, parameters: Weights, memory: State, torque: Floats
-) -> None:
+    t: float, state: ControlState, robot: ControlledRobot, parameters: Weights, memory: State,
+    torque: Floats,
+) -> None:  # fmt: skip
     """Torques that a network decides on, beside those that follow its motion, if it has one."""
     follows = parameters.following.speed.shape[0] > 0
     if memory.calls % parameters.every == 0:
@@ -235,10 +242,8 @@ def policy(
     if follows:
         stride = stride_at(parameters.following, memory.speed)
         phase = memory.phase + (t - memory.since) / stride
-        follow(
-            parameters.following, memory.speed, phase, state.joint_position, state.joint_velocity,
-            torque,
-        )  # fmt: skip
+        joints = robot.model.actuator_joint
+        follow(parameters.following, memory.speed, phase, joints, state.q, state.v, torque)
     else:
         for i in range(torque.shape[0]):
             torque[i] = 0.0
@@ -282,6 +287,9 @@ class Policy(Law):
         if robot is not None:
             observed = network.observed(robot.nq, robot.nv)
             fits = observed == network.mean.size and robot.nu == network.gear.size
+            if network.reference is not None:
+                size = robot.nq + robot.nv + robot.nu
+                fits = fits and network.reference.motion.shape[2] == size
             if not fits or network.robot not in ("", robot.name):
                 raise ControllerError(
                     f"this policy is one of {network.robot or 'a robot'!r} that observes "

@@ -17,8 +17,9 @@ A file is a NumPy archive (``.npz``) without pickled objects, which anything can
 ``bias.i``              one for each row
 ``recurrent.i``         (4 or 3 outputs, outputs) of lstm (gates i, f, g, o) and gru (r, z, n)
 ``recurrent_bias.i``    one for each row
-``reference.NAME``      if it follows a motion: the fields of :class:`Reference`; then commanded
-                        speed, sine and cosine of the phase are observed after the velocities
+``reference.NAME``      if it follows a motion: the fields of :class:`Reference`; how far positions
+                        and velocities are off the motion is observed then, and after them
+                        commanded speed, sine and cosine of the phase
 ======================  ===========================================================================
 
 Rows and gates are in the order of PyTorch's ``LSTM`` and ``GRU``.
@@ -26,11 +27,7 @@ Rows and gates are in the order of PyTorch's ``LSTM`` and ``GRU``.
 
 from __future__ import annotations
 
-import io
 import os
-import struct
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import field, fields
 from pathlib import Path
@@ -39,11 +36,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.array_file import read_arrays, write_arrays
 from heelstrike.control.policy.reference import OBSERVED, Reference
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
-from heelstrike.whole_file import write_whole
 
 FORMAT = "heelstrike policy 1"
 
@@ -251,9 +248,7 @@ class Network:
         arrays |= {f"about.{name}": text for name, text in self.about.items()}
         if self.reference is not None:
             arrays |= {f"reference.{k}": v for k, v in vars(self.reference).items()}
-        image = io.BytesIO()
-        np.savez(image, allow_pickle=False, **{k: np.asarray(v) for k, v in arrays.items()})
-        return write_whole(path, image.getbuffer())
+        return write_arrays(path, arrays)
 
 
 def load_network(path: str | os.PathLike[str]) -> Network:
@@ -274,16 +269,7 @@ def load_network(path: str | os.PathLike[str]) -> Network:
     ControllerError
         If there is no such file, or it is no policy, or damaged.
     """
-    try:
-        with zipfile.ZipFile(Path(path)) as archive:
-            if sum(each.file_size for each in archive.infolist()) > 8 * MOST:
-                raise ControllerError(f"{path}: too large for a policy")
-        with np.load(Path(path), allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-    except OSError as error:
-        raise ControllerError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except _DAMAGED as error:
-        raise ControllerError(f"{path}: not a policy, or damaged ({error})") from error
+    arrays = read_arrays(path, "a policy", ControllerError, 8 * MOST)
     if str(arrays.get("format")) != FORMAT:
         raise ControllerError(f"{path}: not a policy in the layout {FORMAT!r}")
     try:
@@ -292,12 +278,6 @@ def load_network(path: str | os.PathLike[str]) -> Network:
         raise ControllerError(f"{path}: damaged, {error} is missing or no number") from error
     except ControllerError as error:
         raise ControllerError(f"{path}: {error}") from error
-
-
-_DAMAGED = (
-    ValueError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error,
-    struct.error, MemoryError,
-)  # fmt: skip
 
 
 def _network(arrays: Mapping[str, Any]) -> Network:

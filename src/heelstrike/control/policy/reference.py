@@ -1,7 +1,8 @@
-"""A motion that a policy follows: what joints do over a stride, for each of some speeds.
+"""A motion that a policy follows: what a robot does over a stride, for each of some speeds.
 
 Actions of such a policy are added to the torques that follow the motion: those of the motion
-itself, and of springs and dampers between the joints and where they should be.
+itself, and of springs and dampers between the joints and where they should be. It observes how far
+the robot is off the motion.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from heelstrike.compiler.bundle import Bundle, array, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.model import Floats
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.controller.law import Law, controller
-from heelstrike.sim.controller.robot import ControlState
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
 Spot = tuple[int, int, float, int, int, float]
 """Rows of the speeds below and above and the share of the latter; the same of phases."""
@@ -30,7 +31,7 @@ TOLD = 3
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Motion of the actuated joints over a stride of two steps, which repeats itself.
+    """Motion of a robot over a stride of two steps, which repeats itself.
 
     Raises
     ------
@@ -44,8 +45,8 @@ class Reference:
     stride: Floats
     """(k,) Duration of a stride at each (s)."""
     motion: Floats
-    """(k, m, 3 nu) At m evenly spaced phases of a stride the joints' positions (rad), velocities
-    (rad/s), and torques (N m)."""
+    """(k, m, nq + nv + nu) At m evenly spaced phases of a stride positions and velocities of all
+    coordinates and torques of the actuators (m, rad; m/s, rad/s; N m)."""
     stiffness: Floats
     damping: Floats
     """stiffness, damping: (nu,) Of springs and dampers between joints and motion (N m/rad,
@@ -62,10 +63,10 @@ class Reference:
         count, nu = self.speed.size, self.stiffness.size
         shapes = [each.shape for each in (self.speed, self.stride, self.damping)]
         fits = shapes == [(count,), (count,), (nu,)] and self.stiffness.ndim == 1
-        if not fits or self.motion.ndim != 3 or self.motion.shape[::2] != (count, 3 * nu):
+        if not fits or self.motion.ndim != 3 or len(self.motion) != count:
             raise ControllerError(
                 f"a reference of {count} speeds and {nu} joints has motions of shape ({count}, m, "
-                f"{3 * nu}), got {self.motion.shape} with {shapes[1]} strides"
+                f"nq + nv + {nu}), got {self.motion.shape} with {shapes[1]} strides"
             )
         rises, lasts = (np.diff(self.speed) > 0.0).all(), (self.stride > 0.0).all()
         if not (rises and lasts and 0.0 < self.period < np.inf):
@@ -92,7 +93,7 @@ class Following(Bundle):
 
     speed: Floats = array("speeds")
     stride: Floats = array("speeds")
-    motion: Floats = array("speeds", "phases", "3 nu")
+    motion: Floats = array("speeds", "phases", "numbers")
     stiffness: Floats = array("nu")
     damping: Floats = array("nu")
     """speed, stride, motion, stiffness, damping: As of :class:`Reference`."""
@@ -100,7 +101,7 @@ class Following(Bundle):
 
 def nothing_to_follow(nu: int) -> Following:
     """Return the numbers of no motion."""
-    return Following.allocate(speeds=0, phases=0, nu=nu)
+    return Following.allocate(speeds=0, phases=0, numbers=0, nu=nu)
 
 
 @kernel
@@ -139,17 +140,18 @@ def stride_at(following: Following, speed: float) -> float:
 
 @kernel
 def follow(
-    following: Following, speed: float, phase: float, position: Floats, velocity: Floats,
+    following: Following, speed: float, phase: float, joints: Integers, q: Floats, v: Floats,
     torque: Floats,
 ) -> None:  # fmt: skip
-    """Write the torques that make joints follow the motion."""
+    """Write the torques that make actuated joints follow the motion."""
     at = spot(following.speed, following.motion.shape[1], speed, phase)
-    nu = torque.shape[0]
-    for i in range(nu):
+    nq, nv = q.shape[0], v.shape[0]
+    for i in range(torque.shape[0]):
+        joint = joints[i]
         torque[i] = (
-            between(following.motion, at, 2 * nu + i)
-            + following.stiffness[i] * (between(following.motion, at, i) - position[i])
-            + following.damping[i] * (between(following.motion, at, nu + i) - velocity[i])
+            between(following.motion, at, nq + nv + i)
+            + following.stiffness[i] * (between(following.motion, at, joint) - q[joint])
+            + following.damping[i] * (between(following.motion, at, nq + joint) - v[joint])
         )
 
 
@@ -165,14 +167,15 @@ class Followed(Bundle):
 
 
 @controller
-def held_action(t: float, state: ControlState, parameters: Followed, torque: Floats) -> None:
+def held_action(
+    t: float, state: ControlState, robot: ControlledRobot, parameters: Followed, torque: Floats
+) -> None:
     """Follow a motion; add the actions that were commanded last."""
     nu, command = torque.shape[0], parameters.command
     speed, phase, since = command[nu], command[nu + 1], command[nu + 2]
     phase += (t - since) / stride_at(parameters.following, speed)
-    follow(
-        parameters.following, speed, phase, state.joint_position, state.joint_velocity, torque
-    )  # fmt: skip
+    joints = robot.model.actuator_joint
+    follow(parameters.following, speed, phase, joints, state.q, state.v, torque)
     for i in range(nu):
         torque[i] += parameters.gear[i] * min(max(command[i], -1.0), 1.0)
 

@@ -200,7 +200,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         limit = course.task.max_episode_steps if max_episode_steps is None else max_episode_steps
-        self._limit = limit if limit > 0 else np.iinfo(np.int64).max
+        self.limit = limit if limit > 0 else np.iinfo(np.int64).max
         self._given: Info = {
             "task": task, "num_envs": num_envs, "max_episode_steps": max_episode_steps,
             "autoreset_mode": self.autoreset_mode, "threads": threads, "render_mode": render_mode,
@@ -251,6 +251,11 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         info |= {f"_{name}": mask.copy() for name in self._lanes.names[:AT_RESET]}
         return self._lanes.observation.copy(), info
 
+    def check_begun(self) -> None:
+        """Raise what says so if this is closed, or not reset yet."""
+        if self._state != "begun":
+            _check_begun(self._state)
+
     def step(self, actions: Array) -> tuple[Floats, Floats, Array, Array, Info]:
         """Make a decision in every lane.
 
@@ -269,8 +274,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         ValueError
             If the actions are of another shape, no numbers, or not finite.
         """
-        if self._state != "begun":
-            _check_begun(self._state)
+        self.check_begun()
         lanes, over = self._lanes, self._over
         waits = bool(over.any())
         went = ~over if waits else self._all
@@ -288,7 +292,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
             self._begin(np.flatnonzero(over))
             lanes.reward[~went] = 0.0
         terminated = lanes.terminated & went
-        truncated = (self._decisions >= self._limit) & went & ~terminated
+        truncated = (self._decisions >= self.limit) & went & ~terminated
         reward = lanes.reward.copy()
         info = self._info(went)
         ended = terminated | truncated

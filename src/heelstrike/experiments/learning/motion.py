@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -32,26 +31,11 @@ SWING_STIFFNESS, SWING_DAMPING = 0.2, 0.4
 period and inertia by the period: half of what a free link bears that is told once a period."""
 
 
-class Motion(NamedTuple):
-    """What walkers follow.
-
-    Attributes
-    ----------
-    reference : Reference
-        Of the joints.
-    states : (k, m, nq + nv) float
-        Positions and velocities of all coordinates at the same phases, x from zero.
-    """
-
-    reference: Reference
-    states: Floats
-
-
 @cache
 def motion_of(
     file: str, reference: str, speeds: tuple[float, float], gaits: int, friction: float,
     stiffness: float, period: float,
-) -> Motion:  # fmt: skip
+) -> Reference:  # fmt: skip
     """Return the motion that a robot is to follow.
 
     Parameters
@@ -74,7 +58,7 @@ def motion_of(
 
     Returns
     -------
-    Motion
+    Reference
         The motion, which must not be written to.
 
     Raises
@@ -99,15 +83,10 @@ def motion_of(
         strides = [2.0 * gait.step_duration for gait in designed]
         values = [gait.step_length / gait.step_duration for gait in designed]
         found = [_walked(robot, gait, friction, period) for gait in designed]
-    joints = [*robot.model.actuator_joint, *(robot.nq + robot.model.actuator_joint)]
-    states = np.array([each[0] for each in found])
-    torques = np.array([each[1] for each in found])
     springs, dampers = _gains(robot, stiffness, period)
-    motion = np.concatenate((states[..., joints], torques), axis=2)
-    whole = Reference(
-        np.array(values), np.array(strides), motion, springs, dampers, period
+    return Reference(
+        np.array(values), np.array(strides), np.array(found), springs, dampers, period
     )  # fmt: skip
-    return Motion(whole, states)
 
 
 def _designed(robot: Robot, speeds: tuple[float, float], gaits: int, friction: float) -> list[Gait]:
@@ -126,8 +105,8 @@ def _designed(robot: Robot, speeds: tuple[float, float], gaits: int, friction: f
     return found
 
 
-def _walked(robot: Robot, gait: Gait, friction: float, period: float) -> tuple[Floats, Floats]:
-    """Return states and torques over a stride of a gait, as it is walked."""
+def _walked(robot: Robot, gait: Gait, friction: float, period: float) -> Floats:
+    """Return positions, velocities and torques over a stride of a gait, as it is walked."""
     stride = 2.0 * gait.step_duration
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -141,18 +120,15 @@ def _walked(robot: Robot, gait: Gait, friction: float, period: float) -> tuple[F
     return _sampled(run, (WHOLE_STRIDES - 1) * stride, stride, period)
 
 
-def _sampled(run: Run, begin: float, stride: float, period: float) -> tuple[Floats, Floats]:
+def _sampled(run: Run, begin: float, stride: float, period: float) -> Floats:
     count = max(round(stride / SPACING), 1)
     times = begin + np.arange(count) * stride / count
     rows = np.rint(times / period).astype(int)
-    states = np.concatenate((run.position[rows], run.velocity[rows]), axis=1)
-    states[:, 0] -= states[0, 0]
-    return states, run.torque[rows]
+    return np.hstack((run.position[rows], run.velocity[rows], run.torque[rows]))
 
 
-def _posture(robot: Robot) -> tuple[Floats, Floats]:
-    state = robot.reference_state()
-    return state.vector[None], np.zeros((1, robot.nu))
+def _posture(robot: Robot) -> Floats:
+    return np.concatenate((robot.reference_state().vector, np.zeros(robot.nu)))[None]
 
 
 def _gains(robot: Robot, stiffness: float, period: float) -> tuple[Floats, Floats]:

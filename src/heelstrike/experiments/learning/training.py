@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
-import struct
-import zipfile
-import zlib
 from collections.abc import Callable
 from dataclasses import asdict, field
 from pathlib import Path
@@ -16,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.array_file import DAMAGED, read_arrays, write_arrays
 from heelstrike.control.policy.network import Layer, Network
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.learning.courses import LearningTask, course_of
 from heelstrike.experiments.learning.perceptron import Adam, Array, Perceptron
 from heelstrike.field_texts import dataclass
-from heelstrike.whole_file import write_whole
 
 Floats = NDArray[np.float64]
 
@@ -218,9 +214,7 @@ class Trainer:
             "count": [self.observations.count, self.returns.count],
         }  # fmt: skip
         arrays = {f"array.{i}": each for i, each in enumerate(self._arrays())}
-        image = io.BytesIO()
-        np.savez(image, allow_pickle=False, state=np.array(json.dumps(state)), **arrays)
-        return write_whole(path, image.getbuffer())
+        return write_arrays(path, {"state": json.dumps(state), **arrays})
 
     def restore(self, path: str | os.PathLike[str]) -> None:
         """Go on from a file, as if there had been no break.
@@ -235,9 +229,8 @@ class Trainer:
         SimulationError
             If it is another, damaged, or cannot be read.
         """
+        arrays = read_arrays(path, _KEPT, SimulationError)
         try:
-            with np.load(Path(path), allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
             state = json.loads(str(arrays["state"]))
             mine = json.loads(json.dumps([asdict(self.recipe), asdict(self.task), self.decisions]))
             same = [state["recipe"], state["task"], state["decisions"]] == mine
@@ -248,10 +241,8 @@ class Trainer:
             self._lately = [tuple(each) for each in state["lately"]]
             self.curve = Curve(**state["curve"])
             self.observations.count, self.returns.count = state["count"]
-        except OSError as error:
-            raise SimulationError(f"{path}: cannot be read ({error.strerror or error})") from error
-        except (ValueError, KeyError, TypeError, EOFError, *_DAMAGED) as error:
-            raise SimulationError(f"{path}: not what a trainer keeps, or damaged") from error
+        except DAMAGED as error:
+            raise SimulationError(f"{path}: not {_KEPT}, or damaged") from error
         if not same:
             raise SimulationError(
                 f"{path}: kept of another task, recipe or number of decisions; begin afresh, or "
@@ -379,4 +370,4 @@ class Trainer:
         self.best = max(self.best, curve.mean_return[-1])
 
 
-_DAMAGED = (zipfile.BadZipFile, zlib.error, struct.error, AssertionError)
+_KEPT = "what a trainer keeps"

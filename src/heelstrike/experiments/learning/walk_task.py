@@ -7,10 +7,13 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from heelstrike.control.policy.reference import Reference
 from heelstrike.errors import SimulationError
-from heelstrike.experiments.learning.motion import Motion, motion_of
+from heelstrike.experiments.learning.motion import motion_of
 from heelstrike.experiments.learning.ranges import Ranges
 from heelstrike.field_texts import dataclass
+from heelstrike.robot import load_robot
+from heelstrike.robot.robot import Robot
 
 WALK = "walk"
 """What policies tell of their task, beside its fields."""
@@ -33,7 +36,7 @@ class WalkTask:
         If a number is out of range.
     """  # noqa: E501 - a name
 
-    robot: str = "bravo7"
+    file: str = "bravo7"
     """Name of a built-in robot, or its file."""
     reference: str = "gait"
     """What is followed: ``"gait"`` for gaits that are designed over `speeds`, ``"posture"`` for the
@@ -138,12 +141,27 @@ class WalkTask:
         except (KeyError, TypeError, ValueError) as error:
             raise SimulationError(f"this policy does not tell its task: {error}") from error
 
-    def motion(self) -> Motion:
+    def robot(self) -> Robot:
+        """Load the robot.
+
+        Returns
+        -------
+        Robot
+            The robot.
+
+        Raises
+        ------
+        RobotError
+            If there is none.
+        """
+        return load_robot(self.file)
+
+    def motion(self) -> Reference:
         """Return the motion that is followed.
 
         Returns
         -------
-        Motion
+        Reference
             The motion; the same object for the same fields.
 
         Raises
@@ -152,6 +170,6 @@ class WalkTask:
             If there is none.
         """
         return motion_of(
-            self.robot, self.reference, self.speeds, self.gaits, self.friction, self.stiffness,
+            self.file, self.reference, self.speeds, self.gaits, self.friction, self.stiffness,
             self.step,
         )  # fmt: skip

@@ -16,9 +16,7 @@ from heelstrike.control.policy.reference import OBSERVED, HeldAction, between, s
 from heelstrike.experiments.learning.course import Course
 from heelstrike.experiments.learning.ranges import FACES
 from heelstrike.experiments.learning.walk_task import WalkTask
-from heelstrike.robot import load_robot
 from heelstrike.robot.model import Floats, Integers
-from heelstrike.robot.state import State
 from heelstrike.sim import Batch, Method, Push, TimeStepping
 
 TERMS = ("x_position", "x_velocity", "commanded_speed", "reward_alive", "reward_speed",
@@ -50,15 +48,14 @@ class WalkingCourse(Course):
     def __init__(
         self, task: WalkTask, lanes: int = 1, *, threads: int = 1, method: Method | None = None
     ) -> None:
-        robot = load_robot(task.robot)
+        robot = task.robot()
         self.task: WalkTask = task
-        self.motion = motion = task.motion()
-        reference = motion.reference
+        self.motion = reference = task.motion()
         gear = task.action_size * reference.stiffness
         self._pushes = task.randomise.pushes(task.max_episode_steps * task.decision_period)
         batch = Batch(
             robot, HeldAction(reference, gear), lanes=lanes, threads=threads,
-            state=self._state(motion.states[0, 0]),
+            state=robot.reference_state(),
             method=TimeStepping(step=task.step) if method is None else method,
             ground=self._first_ground(), stop_when_fallen=False,
             pushes=[Push(PUSHED, force=(0.0, 0.0), start=0.0, duration=0.0)] * self._pushes,
@@ -94,22 +91,18 @@ class WalkingCourse(Course):
         ranges, friction = self.task.randomise, self.task.friction
         return ranges.ground(np.random.default_rng(0), friction)[0]
 
-    def _state(self, row: Floats) -> State:
-        nq = len(row) // 2
-        return State(row[:nq], row[nq:])
-
     def begin(self, chosen: Integers) -> None:
         """See :meth:`Course.begin`: somewhere in a stride, at some speed, with some noise."""
         task, motion, robot = self.task, self.motion, self.robot
-        nu, phases = robot.nu, motion.states.shape[1]
+        nu, phases = robot.nu, motion.motion.shape[1]
         states = np.empty((len(chosen), robot.nq + robot.nv))
         for place, lane in enumerate(chosen.tolist()):
             random = self._randoms[lane]
             self._disturb(lane, random)
             speed = random.uniform(*task.speeds)
-            row = int(np.argmin(np.abs(motion.reference.speed - speed)))
+            row = int(np.argmin(np.abs(motion.speed - speed)))
             column = int(random.integers(phases))
-            states[place] = motion.states[row, column]
+            states[place] = motion.motion[row, column, : states.shape[1]]
             states[place, 0] = 0.0
             noise = random.uniform(-1.0, 1.0, robot.nv)
             states[place, robot.nq :] += task.reset_noise_scale * noise
@@ -190,17 +183,17 @@ class WalkingCourse(Course):
         return Network(
             layers, task.decision_period, self.gear, mean, deviation, skipped=SKIPPED,
             velocity_limit=task.velocity_limit, robot=self.robot.name,
-            reference=self.motion.reference, **more,
+            reference=self.motion, **more,
         )  # fmt: skip
 
     def _assess(self, begun: Integers | None) -> None:
         """See :meth:`Course._assess`."""
-        batch, reference = self.batch, self.motion.reference
+        batch, reference = self.batch, self.motion
         if begun is not None:
             self._before[begun] = batch.position[begun, 0]
             self._moved[:] = False
         self._judge(
-            self._numbers, reference.speed, reference.stride, self.motion.states,
+            self._numbers, reference.speed, reference.stride, reference.motion,
             self.robot.model.actuator_joint, self._profile, batch._q, batch._v, batch._outcome,
             batch.torque, self._before, self._action, self._speed, self._moved, self._next_phase,
             self.terms, self.observation, self.reward, self.terminated,
@@ -228,10 +221,11 @@ def _judge() -> Any:
             at = spot(speeds, states.shape[1], command[lane], phase[lane])
             place = 0
             for i in range(2, nq):
-                observation[lane, place] = q[lane, i]
+                observation[lane, place] = q[lane, i] - between(states, at, i)
                 place += 1
             for i in range(nv):
-                observation[lane, place] = min(max(v[lane, i], -limit), limit)
+                seen = min(max(v[lane, i], -limit), limit)
+                observation[lane, place] = seen - between(states, at, nq + i)
                 place += 1
             observation[lane, place] = command[lane]
             observation[lane, place + 1] = np.sin(2.0 * np.pi * phase[lane])
