@@ -5,7 +5,9 @@ native vector and a single environment in a Python loop, the physics alone (the 
 begin anew in the same states, without observations, rewards and noise), Gymnasium's own
 environments one by one (sync) and in processes (async), and MuJoCo's ``rollout``. ``... identical``
 compares lanes with single simulations, bit by bit. ``... endure`` makes many steps and prints how
-memory grows, why episodes ended, and the worst certificates.
+memory grows, why episodes ended, and the worst certificates. ``... walk --policy FILE`` commands
+speeds to a policy of Walk-v0 and to footstep feedback, pushes both, and prints who is upright after
+20 s and how far mean speeds are off.
 
 Times are processor times of this process but for async, whose work is done by others (clock); of
 each the best of several repetitions is printed, which are interleaved.
@@ -33,9 +35,13 @@ if find_spec("imageio") is None:  # Gymnasium imports it for films, which nobody
 
 import gymnasium
 
+from heelstrike.control.policy.network import load_network
 from heelstrike.experiments.learning import environments
+from heelstrike.experiments.learning.courses import told_task
 from heelstrike.experiments.learning.running import RunningCourse
 from heelstrike.experiments.learning.tasks import RUNNING
+from heelstrike.experiments.learning.walk_task import WalkTask
+from heelstrike.experiments.walk import design
 
 Timed = Callable[[], tuple[int, float]]
 
@@ -227,15 +233,73 @@ def endure(task: str, lanes: int, decisions: int) -> None:
     print(f"  {ends - sum(causes.values()):8d} truncated; {going} of {lanes} lanes can go on")
 
 
+def walk(policy: Path, count: int, impulse: float, seed: int) -> None:
+    """Command speeds to a policy and to footstep feedback, under the same pushes."""
+    duration, settled, every = 20.0, 2.0, 3.5
+    network = load_network(policy)
+    task = told_task(network.about)
+    assert isinstance(task, WalkTask)
+    assert network.reference is not None
+    robot, reference, random = task.robot(), network.reference, np.random.default_rng(seed)
+    gait = design(robot, friction=task.friction)
+    options: Any = {"duration": duration, "ground": hs.Ground(friction=task.friction)}
+    nominal = gait.step_length / gait.step_duration
+    for what, speeds, push in (
+        (f"track {nominal:.2f} m/s", np.full(count, nominal), 0.0),
+        (f"{task.speeds[0]:g} to {task.speeds[1]:g} m/s, pushes of {impulse:g} N s",
+         random.uniform(*task.speeds, count), impulse),
+    ):  # fmt: skip
+        pushes = [
+            [hs.Push("trunk", force=(10.0 * push * random.choice((-1.0, 1.0)), 0.0), duration=0.1,
+                     start=begin + random.uniform(0.0, 1.4))
+             for begin in np.arange(settled, duration - every / 2, every)]
+            for _ in range(count)
+        ]  # fmt: skip
+        rows = [int(np.argmin(np.abs(reference.speed - speed))) for speed in speeds]
+        begins = [reference.motion[row, 0] for row in rows]
+        states = [
+            hs.State(each[: robot.nq], each[robot.nq : robot.nq + robot.nv]) for each in begins
+        ]
+        tried: dict[str, tuple[Any, Any, Any]] = {
+            "policy": (
+                [hs.Policy(network, robot, speed=speed) for speed in speeds], states,
+                hs.TimeStepping(step=task.step),
+            ),
+            "footstep feedback": (
+                [hs.FootstepFeedback(robot, gait, speed=speed) for speed in speeds],
+                gait.initial_state, hs.TimeStepping(step=1e-3),
+            ),
+        }  # fmt: skip
+        for name, (laws, state, method) in tried.items():
+            begin = time.process_time()
+            found = hs.simulate_batch(
+                robot, laws, state=state, pushes=pushes, method=method, record_every=50, **options
+            )
+            stood = np.array([each is hs.RunStatus.COMPLETED for each in found.status])
+            runs = [found.run(i) for i in np.flatnonzero(stood)]
+            mean = np.array([
+                (run.position[-1, 0] - run.position[k, 0]) / (run.time[-1] - run.time[k])
+                for run in runs for k in [int(np.searchsorted(run.time, settled))]
+            ])  # fmt: skip
+            off = mean - speeds[stood]
+            print(
+                f"{what}: {name:18s} upright {stood.mean():4.0%} of {count}, mean speed off by "
+                f"{np.sqrt(np.mean(off**2)):.3f} m/s rms ({time.process_time() - begin:.1f} s)",
+                flush=True,
+            )  # fmt: skip
+
+
 def main() -> None:
     """Do what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("what", choices=["speed", "identical", "endure"])
+    parser.add_argument("what", choices=["speed", "identical", "endure", "walk"])
     parser.add_argument("--task", default="Walker2d", choices=list(RUNNING))
     parser.add_argument("--lanes", type=int, default=0)
     parser.add_argument("--decisions", type=int, default=500)
     parser.add_argument("--repetitions", type=int, default=5)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--policy", type=Path, default=Path("policy.npz"))
+    parser.add_argument("--impulse", type=float, default=20.0)
     parser.add_argument("--no-peers", action="store_true")
     given = parser.parse_args()
     if given.what == "speed":
@@ -243,6 +307,8 @@ def main() -> None:
             given.task, given.lanes or 64, given.decisions, given.repetitions,
             peers=not given.no_peers,
         )  # fmt: skip
+    elif given.what == "walk":
+        walk(given.policy, given.lanes or 100, given.impulse, given.seed)
     elif given.what == "endure":
         endure(given.task, given.lanes or 64, given.decisions)
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -83,10 +84,11 @@ def train(
     with stage("loading"):
         from heelstrike.experiments.learning.courses import named_task
         from heelstrike.experiments.learning.tasks import task_of
-        from heelstrike.experiments.learning.training import Recipe, Trainer
+        from heelstrike.experiments.learning.training import WALKING, Recipe, Trainer
         from heelstrike.experiments.learning.writing import KEPT, write_all
 
         learned: Any = None
+        recipe = WALKING if task is Learned.WALK else Recipe()
         if task is Learned.WALK:
             learned = named_task(
                 "Walk", file=robot, reference=reference, speeds=range_called(speeds, "--speeds"),
@@ -98,7 +100,9 @@ def train(
             learned = task_of(robot)
         folder = out or Path(f"train-{Path(robot).stem}")
         folder.mkdir(parents=True, exist_ok=True)
-        trainer = Trainer(learned, decisions, Recipe(seed=seed, lanes=lanes), threads=threads)
+        trainer = Trainer(
+            learned, decisions, replace(recipe, seed=seed, lanes=lanes), threads=threads
+        )
         kept = folder / KEPT
         if kept.exists() and not afresh:
             trainer.restore(kept)

@@ -209,6 +209,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         self._decisions = np.zeros(num_envs, dtype=np.int64)
         self._over = np.zeros(num_envs, dtype=np.bool_)
         self._all = np.ones(num_envs, dtype=np.bool_)
+        self._masks = [f"_{name}" for name in (*course.names, "contact_force", "certificate")]
         self._cameras: list[Camera] = []
         self._state = "new"
 
@@ -357,7 +358,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         info: Info = {name: terms[:, place] for place, name in enumerate(self._lanes.names)}
         info["contact_force"] = batch.contact_force.copy()
         info["certificate"] = np.maximum(certificate, batch.non_penetration, out=certificate)
-        info |= {f"_{name}": went for name in tuple(info)}
+        info |= dict.fromkeys(self._masks, went)
         return info
 
     def _tell_ends(self, ended: Array, terminated: Array, info: Info) -> None:

@@ -63,8 +63,10 @@ class RunningCourse(Course):
             *task.healthy_state_range, task.velocity_limit, self.initial.q[1],
             float(task.terminate_when_unhealthy),
         ])  # fmt: skip
-        self._judge = _judge()
-        self._assess(np.arange(lanes))
+        self._new_q, self._new_v = np.zeros((lanes, robot.nq)), np.zeros((lanes, robot.nv))
+        self._judge, self._take = _judge(), _take()
+        self._all = np.arange(lanes)
+        self._assess(self._all)
 
     def seed(self, lane: int, random: np.random.Generator) -> None:
         """See :meth:`Course.seed`; noise is drawn for several episodes at once."""
@@ -79,15 +81,12 @@ class RunningCourse(Course):
         chosen : (k,) int
             Which lanes.
         """
-        drawn = self._drawn[chosen]
-        for lane in chosen[drawn == AT_ONCE].tolist():
+        count = len(chosen)
+        q, v = self._new_q[:count], self._new_v[:count]
+        while (lane := self._take(chosen, self._start, self._noise, self._drawn, q, v)) >= 0:
             self._draw(lane)
-        drawn %= AT_ONCE
-        noise = self._noise[chosen, drawn]
-        self._drawn[chosen] = drawn + 1
-        noise += self._start
-        nq = self.robot.nq
-        self.batch._begin_anew(chosen, noise[:, :nq], noise[:, nq:])
+            self._drawn[lane] = 0
+        self.batch._begin_anew(chosen, q, v)
         self._assess(chosen)
 
     def cause(self, lane: int) -> str:
@@ -147,12 +146,39 @@ class RunningCourse(Course):
     def _assess(self, begun: Integers | None) -> None:
         """Observe and judge all lanes, or those that have just begun."""
         batch = self.batch
-        if begun is not None:
-            self._before[begun] = batch.position[begun, 0]
         self._judge(
-            self._skipped, self._numbers, batch._q, batch._v, batch._outcome, self._before,
-            self._action, self.terms, self.observation, self.reward, self.terminated,
+            self._all if begun is None else begun, begun is not None, self._skipped, self._numbers,
+            batch._q, batch._v, batch._outcome, self._before, self._action, self.terms,
+            self.observation, self.reward, self.terminated,
         )  # fmt: skip
+
+
+@cache
+def _take() -> Any:
+    """Return what takes noise that was drawn before; see `take` within."""
+
+    def take(
+        chosen: Integers, start: Floats, noise: Floats, drawn: Integers, q: Floats, v: Floats
+    ) -> int:
+        """Write states to begin in, or return a lane for which noise has to be drawn first."""
+        for lane in chosen:
+            if drawn[lane] == noise.shape[1]:
+                return int(lane)
+        nq = q.shape[1]
+        for place in range(chosen.shape[0]):
+            lane = chosen[place]
+            for i in range(nq):
+                q[place, i] = start[i] + noise[lane, drawn[lane], i]
+            for i in range(v.shape[1]):
+                v[place, i] = start[nq + i] + noise[lane, drawn[lane], nq + i]
+            drawn[lane] += 1
+        return -1
+
+    cube, table = types.float64[:, :, ::1], types.float64[:, ::1]
+    whole = types.int64[::1]
+    return loop_for(
+        types.int64(whole, types.float64[::1], cube, whole, table, table), take
+    )  # fmt: skip
 
 
 @cache
@@ -160,8 +186,9 @@ def _judge() -> Any:
     """Return what observes and judges; see `judge` within."""
 
     def judge(
-        skipped: int, numbers: Floats, q: Floats, v: Floats, outcome: Integers, before: Floats,
-        action: Floats, terms: Floats, observation: Floats, reward: Floats, terminated: Any,
+        lanes: Integers, begun: bool, skipped: int, numbers: Floats, q: Floats, v: Floats,
+        outcome: Integers, before: Floats, action: Floats, terms: Floats, observation: Floats,
+        reward: Floats, terminated: Any,
     ) -> int:  # fmt: skip
         """Write observations, rewards with their terms, and which episodes are over."""
         period, forward_weight, action_weight, alive = (
@@ -171,8 +198,10 @@ def _judge() -> Any:
             numbers[3],
         )
         limit, origin = numbers[10], numbers[11]
-        for lane in range(q.shape[0]):
+        for lane in lanes:
             place = 0
+            if begun:
+                before[lane] = q[lane, 0]
             healthy = goes_on = outcome[lane] <= 1
             for i in range(q.shape[1]):
                 if i >= skipped:
@@ -204,8 +233,8 @@ def _judge() -> Any:
     vector, integers = types.float64[::1], types.int64[::1]
     return loop_for(
         types.int64(
-            types.int64, vector, columns, columns, integers, vector, table, table, table, vector,
-            types.boolean[::1],
+            integers, types.boolean, types.int64, vector, columns, columns, integers, vector, table,
+            table, table, vector, types.boolean[::1],
         ),
         judge,
     )  # fmt: skip

@@ -57,6 +57,10 @@ class Recipe:
     """Of everything that is random."""
 
 
+WALKING = Recipe(epochs=8, rate=1e-3, first_deviation=0.25)
+"""How walking is learned, from a motion that is followed already."""
+
+
 @dataclass
 class Curve:
     """How learning went, round by round."""

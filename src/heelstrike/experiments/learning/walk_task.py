@@ -49,13 +49,13 @@ class WalkTask:
     """Seconds from one command to the next."""
     step: float = 1e-3
     """Time step (s), and seconds between two readings of the joints."""
-    frame_skip: int = 10
+    frame_skip: int = 20
     """Steps a decision."""
     friction: float = 0.75
     """Of the ground."""
     stiffness: float = 0.4
     """Stiffness of the joints, over weight by height of the trunk."""
-    action_size: float = 0.15
+    action_size: float = 0.25
     """Deflection of a joint's spring (rad) that an action of 1 makes good."""
     alive_weight: float = 0.5
     """Reward for a step in which the robot is upright."""
@@ -82,7 +82,7 @@ class WalkTask:
     """Velocities are observed up to this (m/s, rad/s)."""
     reset_noise_scale: float = 0.05
     """Size of the noise of the velocities (m/s, rad/s) that an episode begins with."""
-    max_episode_steps: int = 1000
+    max_episode_steps: int = 500
     """Decisions after which an episode is truncated."""
     randomise: Ranges = Ranges()
     """What is drawn anew for each episode."""
