@@ -7,7 +7,8 @@ environments one by one (sync) and in processes (async), and MuJoCo's ``rollout`
 compares lanes with single simulations, bit by bit. ``... endure`` makes many steps and prints how
 memory grows, why episodes ended, and the worst certificates. ``... walk --policy FILE`` commands
 speeds to a policy of Walk-v0 and to footstep feedback, pushes both, and prints who is upright after
-20 s and how far mean speeds are off.
+20 s and how far mean speeds are off. ``... defects --policy FILE`` runs a policy in MuJoCo at
+several time steps and on floors of several coefficients of friction, and here likewise.
 
 Times are processor times of this process but for async, whose work is done by others (clock); of
 each the best of several repetitions is printed, which are interleaved.
@@ -21,6 +22,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
@@ -37,9 +39,10 @@ import gymnasium
 
 from heelstrike.control.policy.network import load_network
 from heelstrike.experiments.learning import environments
+from heelstrike.experiments.learning import transfer as worlds
 from heelstrike.experiments.learning.courses import told_task
 from heelstrike.experiments.learning.running import RunningCourse
-from heelstrike.experiments.learning.tasks import RUNNING
+from heelstrike.experiments.learning.tasks import RUNNING, RunningTask
 from heelstrike.experiments.learning.walk_task import WalkTask
 from heelstrike.experiments.walk import design
 
@@ -289,10 +292,38 @@ def walk(policy: Path, count: int, impulse: float, seed: int) -> None:
             )  # fmt: skip
 
 
+def defects(policy: Path, count: int) -> None:
+    """Print what hangs on the time step, and on the friction of the floor."""
+    network = load_network(policy)
+    task = told_task(network.about)
+    assert isinstance(task, RunningTask)
+
+    def told(where: str, found: worlds.Outcome) -> None:
+        row = found.row()
+        print(
+            f"{where:44s} return {row['return']:5.0f} ± {row['interval']:4.0f}, fell "
+            f"{row['fell']:4.0%}, force {row['force']:5.2f} weights", flush=True,
+        )  # fmt: skip
+
+    for part in (0.25, 0.5, 1.0, 2.0):
+        step = part * task.step
+        told(
+            f"MuJoCo, {1e3 * step:g} ms", worlds.episodes_in_mujoco(network, task, count, step=step)
+        )
+        method = hs.TimeStepping(step=step)
+        told(f"here, {1e3 * step:g} ms", worlds.episodes(network, task, method, count))
+    for friction in (1.0, 0.5, 0.1):
+        found = worlds.episodes_in_mujoco(network, task, count, floor_friction=friction)
+        told(f"MuJoCo, floor's friction {friction:g}", found)
+        method = hs.TimeStepping(step=task.step)
+        own = replace(task, friction=friction)
+        told(f"here, friction {friction:g}", worlds.episodes(network, own, method, count))
+
+
 def main() -> None:
     """Do what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("what", choices=["speed", "identical", "endure", "walk"])
+    parser.add_argument("what", choices=["speed", "identical", "endure", "walk", "defects"])
     parser.add_argument("--task", default="Walker2d", choices=list(RUNNING))
     parser.add_argument("--lanes", type=int, default=0)
     parser.add_argument("--decisions", type=int, default=500)
@@ -309,6 +340,8 @@ def main() -> None:
         )  # fmt: skip
     elif given.what == "walk":
         walk(given.policy, given.lanes or 100, given.impulse, given.seed)
+    elif given.what == "defects":
+        defects(given.policy, given.lanes or 20)
     elif given.what == "endure":
         endure(given.task, given.lanes or 64, given.decisions)
     else:

@@ -198,6 +198,19 @@ def test_what_cannot_be_is_refused(fields: Any, words: str) -> None:
         WalkTask(**fields).motion()
 
 
+def test_lanes_are_commanded_with_as_many_numbers() -> None:
+    motion = STANDS.motion()
+    robot = STANDS.robot()
+    law = HeldAction(motion, np.ones(robot.nu))
+    state = robot.reference_state()
+    batch = hs.Batch(robot, law, state=state, lanes=2)
+    assert batch.command.shape == (2, robot.nu + 3)
+    with pytest.raises(hs.SimulationError, match="as many numbers"):
+        batch.lay(1, controller=hs.HeldTorque(robot))
+    with pytest.raises(hs.SimulationError, match="as many numbers"):
+        hs.Batch(robot, [law, hs.HeldTorque(robot)], state=state)
+
+
 def test_names() -> None:
     assert isinstance(named_task("Walk", gaits=2), WalkTask)
     with pytest.raises(ValueError, match="has the fields"):

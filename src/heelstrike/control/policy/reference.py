@@ -172,8 +172,8 @@ def held_action(
 ) -> None:
     """Follow a motion; add the actions that were commanded last."""
     nu, command = torque.shape[0], parameters.command
-    speed, phase, since = command[nu], command[nu + 1], command[nu + 2]
-    phase += (t - since) / stride_at(parameters.following, speed)
+    speed, since = float(command[nu]), float(command[nu + 2])
+    phase = float(command[nu + 1]) + (t - since) / stride_at(parameters.following, speed)
     joints = robot.model.actuator_joint
     follow(parameters.following, speed, phase, joints, state.q, state.v, torque)
     for i in range(nu):

@@ -78,7 +78,8 @@ def worlds_of(task: LearningTask) -> dict[str, Method]:
     Parameters
     ----------
     task : RunningTask or WalkTask
-        The task; its own step is among those of time stepping.
+        The task; its own step is among those of time stepping. A walker's joints are read once a
+        step of it, which is therefore the longest.
 
     Returns
     -------
@@ -88,7 +89,8 @@ def worlds_of(task: LearningTask) -> dict[str, Method]:
     period, worlds = task.decision_period, dict[str, Method]()
     for part in (0.25, 0.5, 1.0, 2.0):
         step = part * task.step
-        if abs(period / step - round(period / step)) < 1e-9:
+        whole = abs(period / step - round(period / step)) < 1e-9
+        if whole and (part <= 1.0 or isinstance(task, RunningTask)):
             worlds[f"time stepping, {1e3 * step:g} ms"] = TimeStepping(step=step)
     return worlds | {"event-driven": EventDriven(), "compliant": Compliant()}
 
@@ -161,8 +163,9 @@ def episodes(
 
 
 def episodes_in_mujoco(
-    network: Network, task: RunningTask, count: int, *, seed: int = 0
-) -> Outcome:
+    network: Network, task: RunningTask, count: int, *, seed: int = 0, step: float | None = None,
+    floor_friction: float | None = None,
+) -> Outcome:  # fmt: skip
     """Try a policy in Gymnasium's own environment of the task, on MuJoCo.
 
     Parameters
@@ -175,6 +178,10 @@ def episodes_in_mujoco(
         Episodes.
     seed : int
         Of the noise that they begin with: as in :func:`episodes`.
+    step : float, optional
+        Time step (s), a whole part of a decision; that of its file by default.
+    floor_friction : float, optional
+        Coefficient of friction of the floor; that of its file by default.
 
     Returns
     -------
@@ -189,6 +196,10 @@ def episodes_in_mujoco(
     environment: Any = gymnasium.make(f"{name}-v5").unwrapped
     rows = []
     model, data = environment.model, environment.data
+    if step is not None:
+        model.opt.timestep, environment.frame_skip = step, round(task.decision_period / step)
+    if floor_friction is not None:
+        model.geom("floor").friction[0] = floor_friction
     weight = -float(model.opt.gravity[2] * model.body_mass.sum())
     motors = model.jnt_dofadr[model.actuator_trnid[:, 0]]
     for lane in range(count):

@@ -13,6 +13,7 @@ from heelstrike.compiler.compilation import loop_for
 from heelstrike.contact.ground import Ground
 from heelstrike.control.policy.network import Layer, Network
 from heelstrike.control.policy.reference import OBSERVED, HeldAction, between, spot
+from heelstrike.errors import SimulationError
 from heelstrike.experiments.learning.course import Course
 from heelstrike.experiments.learning.ranges import FACES
 from heelstrike.experiments.learning.walk_task import WalkTask
@@ -60,7 +61,10 @@ class WalkingCourse(Course):
             ground=self._first_ground(), stop_when_fallen=False,
             pushes=[Push(PUSHED, force=(0.0, 0.0), start=0.0, duration=0.0)] * self._pushes,
         )  # fmt: skip
-        nu = robot.nu
+        nu, step = robot.nu, batch.method.step_length
+        if step is None and task.randomise.delay is not None:
+            raise SimulationError("delays are steps: take a method that has a fixed step")
+        self._step = step or task.step
         size = robot.nq + robot.nv - SKIPPED + OBSERVED
         super().__init__(task, batch, size, TERMS, gear, np.ones(nu))
         self._speed, self._phase = batch.command[:, nu], batch.command[:, nu + 1]
@@ -124,7 +128,7 @@ class WalkingCourse(Course):
         if self._pushes:
             given["pushes"] = ranges.drawn_pushes(random, self._pushes, PUSHED)
         if ranges.delay is not None:
-            self._delay[lane] = ranges.drawn_delay(random, task.step, task.frame_skip)
+            self._delay[lane] = ranges.drawn_delay(random, self._step, self._steps)
         if ranges.mass is not None:
             batch.lay(lane, robot=ranges.robot(random, self.robot), **given)
         elif given:
@@ -144,7 +148,7 @@ class WalkingCourse(Course):
         batch, moved = self.batch, self._moved
         moved[:] = True if mask is None else mask
         self._phase[moved], self._since[moved] = self._next_phase[moved], batch.time[moved]
-        if not self._delay.any() or not self._steps:
+        if not self._delay.any():
             super()._move(mask)
             return
         commanded, before = batch.command.copy(), self._commanded

@@ -102,7 +102,9 @@ class Batch:
         How each lane came back, 0 or 1 of those that can go on: an
         :class:`~heelstrike.sim.frame.Outcome`.
     command : (n, nu) float
-        Torques (N m) that :class:`~heelstrike.HeldTorque` holds; write into it.
+        Torques (N m) that :class:`~heelstrike.HeldTorque` holds; write into it. Laws that are
+        commanded with something else (:attr:`~heelstrike.control.Law.commanded`) have as many
+        columns as that.
 
     Raises
     ------
