@@ -208,6 +208,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         }  # fmt: skip
         self._decisions = np.zeros(num_envs, dtype=np.int64)
         self._over = np.zeros(num_envs, dtype=np.bool_)
+        self._waiting = self._over.nonzero()[0]
         self._all = np.ones(num_envs, dtype=np.bool_)
         self._masks = [f"_{name}" for name in (*course.names, "contact_force", "certificate")]
         self._cameras: list[Camera] = []
@@ -276,12 +277,12 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
             If the actions are of another shape, no numbers, or not finite.
         """
         self.check_begun()
-        lanes, over = self._lanes, self._over
-        waits = bool(over.any())
-        went = ~over if waits else self._all
+        lanes, waiting = self._lanes, self._waiting
+        waits = waiting.size > 0
+        went = ~self._over if waits else self._all
         if waits and self.autoreset_mode is AutoresetMode.DISABLED:
             raise error.ResetNeeded(
-                f"episodes of lanes {np.flatnonzero(over).tolist()} are over: call "
+                f"episodes of lanes {waiting.tolist()} are over: call "
                 "reset(options={'reset_mask': terminated | truncated})"
             )
         try:
@@ -290,15 +291,15 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
             raise _refused(wrong) from None
         self._decisions += 1
         if waits:  # what was over begins anew with this step, whatever its action
-            self._begin(np.flatnonzero(over))
-            lanes.reward[~went] = 0.0
+            self._begin(waiting)
+            lanes.reward[waiting] = 0.0
         terminated = lanes.terminated & went
         truncated = (self._decisions >= self.limit) & went & ~terminated
         reward = lanes.reward.copy()
         info = self._info(went)
         ended = terminated | truncated
-        self._over = ended
-        if ended.any():
+        self._over, self._waiting = ended, ended.nonzero()[0]
+        if self._waiting.size:
             self._tell_ends(ended, terminated, info)
         return lanes.observation.copy(), reward, terminated, truncated, info
 
@@ -324,6 +325,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         self._lanes.begin(chosen)
         self._decisions[chosen] = 0
         self._over[chosen] = False
+        self._waiting = self._over.nonzero()[0]
 
     def _seed(self, seed: int | Sequence[int | None] | None) -> None:
         if seed is None:
@@ -363,14 +365,15 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
 
     def _tell_ends(self, ended: Array, terminated: Array, info: Info) -> None:
         """Tell why episodes have ended; begin anew what does so with the same step."""
-        lanes, over = self._lanes, np.flatnonzero(ended)
-        causes = np.full(self.num_envs, None, dtype=object)
-        for lane in np.flatnonzero(terminated).tolist():
-            causes[lane] = lanes.cause(lane)
-        if terminated.any():
+        lanes, fell = self._lanes, terminated.nonzero()[0].tolist()
+        if fell:
+            causes = np.full(self.num_envs, None, dtype=object)
+            for lane in fell:
+                causes[lane] = lanes.cause(lane)
             info["cause"], info["_cause"] = causes, terminated.copy()
         if self.autoreset_mode is not AutoresetMode.SAME_STEP:
             return
+        over = self._waiting
         final = np.full(self.num_envs, None, dtype=object)
         for lane in over.tolist():
             final[lane] = lanes.observation[lane].copy()
