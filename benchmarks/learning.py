@@ -4,7 +4,11 @@
 native vector and a single environment in a Python loop, the physics alone (the same lanes, which
 begin anew in the same states, without observations, rewards and noise), Gymnasium's own
 environments one by one (sync) and in processes (async), and MuJoCo's ``rollout``. ``... identical``
-compares lanes with single simulations, bit by bit.
+compares lanes with single simulations, bit by bit. ``... endure`` makes many steps and prints how
+memory grows, why episodes ended, and the worst certificates. ``... walk --policy FILE`` commands
+speeds to a policy of Walk-v0 and to footstep feedback, pushes both, and prints who is upright after
+20 s and how far mean speeds are off. ``... defects --policy FILE`` runs a policy in MuJoCo at
+several time steps and on floors of several coefficients of friction, and here likewise.
 
 Times are processor times of this process but for async, whose work is done by others (clock); of
 each the best of several repetitions is printed, which are interleaved.
@@ -13,10 +17,14 @@ each the best of several repetitions is printed, which are interleaved.
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.util import find_spec
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -29,9 +37,14 @@ if find_spec("imageio") is None:  # Gymnasium imports it for films, which nobody
 
 import gymnasium
 
+from heelstrike.control.policy.network import load_network
 from heelstrike.experiments.learning import environments
-from heelstrike.experiments.learning.course import Course
-from heelstrike.experiments.learning.tasks import RUNNING
+from heelstrike.experiments.learning import transfer as worlds
+from heelstrike.experiments.learning.courses import told_task
+from heelstrike.experiments.learning.running import RunningCourse
+from heelstrike.experiments.learning.tasks import RUNNING, RunningTask
+from heelstrike.experiments.learning.walk_task import WalkTask
+from heelstrike.experiments.walk import design
 
 Timed = Callable[[], tuple[int, float]]
 
@@ -54,12 +67,12 @@ def timed(
 def speed(task: str, lanes: int, decisions: int, repetitions: int, *, peers: bool) -> None:
     """Print steps a second."""
     actions = np.random.default_rng(0).uniform(
-        -1, 1, (decisions, lanes, Course(RUNNING[task]).robot.nu)
+        -1, 1, (decisions, lanes, RunningCourse(RUNNING[task]).robot.nu)
     )
     actions = actions.astype(np.float32)
-    vector = environments.RunningVectorEnv(task, lanes)
-    single = environments.RunningEnv(task)
-    course = Course(RUNNING[task], lanes)
+    vector = environments.TaskVectorEnv(task, lanes)
+    single = environments.TaskEnv(task)
+    course = RunningCourse(RUNNING[task], lanes)
     kept: list[Any] = []
     first: list[Any] = []
 
@@ -195,15 +208,129 @@ def identical(lanes: int, steps: int, seed: int) -> None:
     print(f"{lanes} lanes x {steps} steps, 1, 2 and 5 threads: {different} differ")
 
 
+def endure(task: str, lanes: int, decisions: int) -> None:
+    """Make many steps with random actions; print memory, ends and certificates ten times."""
+    vector = environments.TaskVectorEnv(task, lanes)
+    random = np.random.default_rng(0)
+    vector.reset(seed=0)
+    causes: Counter[str] = Counter()
+    worst, ends, begin = 0.0, 0, time.process_time()
+    for decision in range(1, decisions + 1):
+        action = random.uniform(-1, 1, (lanes, vector.single_action_space.shape[0]))
+        *_, terminated, truncated, info = vector.step(action)
+        worst = max(worst, float(info["certificate"].max()))
+        ends += int(terminated.sum() + truncated.sum())
+        if terminated.any():
+            causes.update(re.sub(r"-?[0-9.]+(e[-+]?[0-9]+)?", "N", each)
+                          for each in info["cause"][terminated])  # fmt: skip
+        if decision % max(decisions // 10, 1) == 0:
+            pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+            seconds = time.process_time() - begin
+            print(
+                f"{decision * lanes:12d} steps, {pages * 4096 / 2**20:7.1f} MB, {ends} ends, worst "
+                f"certificate {worst:.2g}, {decision * lanes / seconds:.0f} steps/s", flush=True,
+            )  # fmt: skip
+    for cause, count in causes.most_common():
+        print(f"  {count:8d} {cause}")
+    going = int(vector._lanes.batch.going.sum())
+    print(f"  {ends - sum(causes.values()):8d} truncated; {going} of {lanes} lanes can go on")
+
+
+def walk(policy: Path, count: int, impulse: float, seed: int) -> None:
+    """Command speeds to a policy and to footstep feedback, under the same pushes."""
+    duration, settled, every = 20.0, 2.0, 3.5
+    network = load_network(policy)
+    task = told_task(network.about)
+    assert isinstance(task, WalkTask)
+    assert network.reference is not None
+    robot, reference, random = task.robot(), network.reference, np.random.default_rng(seed)
+    gait = design(robot, friction=task.friction)
+    options: Any = {"duration": duration, "ground": hs.Ground(friction=task.friction)}
+    nominal = gait.step_length / gait.step_duration
+    for what, speeds, push in (
+        (f"track {nominal:.2f} m/s", np.full(count, nominal), 0.0),
+        (f"{task.speeds[0]:g} to {task.speeds[1]:g} m/s, pushes of {impulse:g} N s",
+         random.uniform(*task.speeds, count), impulse),
+    ):  # fmt: skip
+        pushes = [
+            [hs.Push("trunk", force=(10.0 * push * random.choice((-1.0, 1.0)), 0.0), duration=0.1,
+                     start=begin + random.uniform(0.0, 1.4))
+             for begin in np.arange(settled, duration - every / 2, every)]
+            for _ in range(count)
+        ]  # fmt: skip
+        rows = [int(np.argmin(np.abs(reference.speed - speed))) for speed in speeds]
+        begins = [reference.motion[row, 0] for row in rows]
+        states = [
+            hs.State(each[: robot.nq], each[robot.nq : robot.nq + robot.nv]) for each in begins
+        ]
+        tried: dict[str, tuple[Any, Any, Any]] = {
+            "policy": (
+                [hs.Policy(network, robot, speed=speed) for speed in speeds], states,
+                hs.TimeStepping(step=task.step),
+            ),
+            "footstep feedback": (
+                [hs.FootstepFeedback(robot, gait, speed=speed) for speed in speeds],
+                gait.initial_state, hs.TimeStepping(step=1e-3),
+            ),
+        }  # fmt: skip
+        for name, (laws, state, method) in tried.items():
+            begin = time.process_time()
+            found = hs.simulate_batch(
+                robot, laws, state=state, pushes=pushes, method=method, record_every=50, **options
+            )
+            stood = np.array([each is hs.RunStatus.COMPLETED for each in found.status])
+            runs = [found.run(i) for i in np.flatnonzero(stood)]
+            mean = np.array([
+                (run.position[-1, 0] - run.position[k, 0]) / (run.time[-1] - run.time[k])
+                for run in runs for k in [int(np.searchsorted(run.time, settled))]
+            ])  # fmt: skip
+            off = mean - speeds[stood]
+            print(
+                f"{what}: {name:18s} upright {stood.mean():4.0%} of {count}, mean speed off by "
+                f"{np.sqrt(np.mean(off**2)):.3f} m/s rms ({time.process_time() - begin:.1f} s)",
+                flush=True,
+            )  # fmt: skip
+
+
+def defects(policy: Path, count: int) -> None:
+    """Print what hangs on the time step, and on the friction of the floor."""
+    network = load_network(policy)
+    task = told_task(network.about)
+    assert isinstance(task, RunningTask)
+
+    def told(where: str, found: worlds.Outcome) -> None:
+        row = found.row()
+        print(
+            f"{where:44s} return {row['return']:5.0f} ± {row['interval']:4.0f}, fell "
+            f"{row['fell']:4.0%}, force {row['force']:5.2f} weights", flush=True,
+        )  # fmt: skip
+
+    for part in (0.25, 0.5, 1.0, 2.0):
+        step = part * task.step
+        told(
+            f"MuJoCo, {1e3 * step:g} ms", worlds.episodes_in_mujoco(network, task, count, step=step)
+        )
+        method = hs.TimeStepping(step=step)
+        told(f"here, {1e3 * step:g} ms", worlds.episodes(network, task, method, count))
+    for friction in (1.0, 0.5, 0.1):
+        found = worlds.episodes_in_mujoco(network, task, count, floor_friction=friction)
+        told(f"MuJoCo, floor's friction {friction:g}", found)
+        method = hs.TimeStepping(step=task.step)
+        own = replace(task, friction=friction)
+        told(f"here, friction {friction:g}", worlds.episodes(network, own, method, count))
+
+
 def main() -> None:
     """Do what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("what", choices=["speed", "identical"])
+    parser.add_argument("what", choices=["speed", "identical", "endure", "walk", "defects"])
     parser.add_argument("--task", default="Walker2d", choices=list(RUNNING))
     parser.add_argument("--lanes", type=int, default=0)
     parser.add_argument("--decisions", type=int, default=500)
     parser.add_argument("--repetitions", type=int, default=5)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--policy", type=Path, default=Path("policy.npz"))
+    parser.add_argument("--impulse", type=float, default=20.0)
     parser.add_argument("--no-peers", action="store_true")
     given = parser.parse_args()
     if given.what == "speed":
@@ -211,6 +338,12 @@ def main() -> None:
             given.task, given.lanes or 64, given.decisions, given.repetitions,
             peers=not given.no_peers,
         )  # fmt: skip
+    elif given.what == "walk":
+        walk(given.policy, given.lanes or 100, given.impulse, given.seed)
+    elif given.what == "defects":
+        defects(given.policy, given.lanes or 20)
+    elif given.what == "endure":
+        endure(given.task, given.lanes or 64, given.decisions)
     else:
         identical(given.lanes or 1000, 200, given.seed)
 

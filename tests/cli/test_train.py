@@ -52,3 +52,24 @@ def test_refusals(tmp_path: Path) -> None:
     refused = invoke(*SHORT, "--out", tmp_path / "b")
     assert refused.exit_code == 2
     assert "damaged" in " ".join(refused.output.split())
+
+
+def test_walkers(tmp_path: Path) -> None:
+    walk = ("bravo7", "--task", "walk", "--reference", "posture", "--lanes", "4", "--decisions")
+    drawn = ("--speeds", "0:0", "--randomise", "push=0:5", "--randomise", "friction=0.5:0.9")
+    result = invoke(*walk, "600", *drawn, "--no-film", "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    network = hs.control.load_network(tmp_path / "policy.npz")
+    assert network.reference is not None
+    task = json.loads(network.about["walk"])
+    assert task["randomise"]["push"] == [0.0, 5.0]
+    assert task["speeds"] == [0.0, 0.0]
+    for wrong, words in (
+        ((*walk, "600", "--randomise", "push"), "NAME=LOW:HIGH"),
+        ((*walk, "600", "--randomise", "wind=0:1"), "by name"),
+        ((*walk, "600", "--speeds", "fast"), "LOW:HIGH"),
+        ((*SHORT, "--randomise", "push=0:5"), "--task walk"),
+    ):  # fmt: skip
+        refused = invoke(*wrong, "--out", tmp_path / "other")
+        assert refused.exit_code == 2
+        assert words in " ".join(refused.output.split())

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from heelstrike.cli.options import AsJson
 from heelstrike.cli.terminal import many, output, spoken, stage, tell, wrote
+from heelstrike.cli.values import range_called, ranges_called
+from heelstrike.errors import SimulationError
+
+
+class Learned(StrEnum):
+    """What is learned."""
+
+    RUN = "run"
+    WALK = "walk"
 
 
 @spoken
@@ -22,6 +33,29 @@ def train(
             "a file whose trunk moves freely."
         ),
     ],
+    task: Annotated[
+        Learned, typer.Option(help="To run as far as it can, or to walk at a commanded speed.")
+    ] = Learned.RUN,
+    speeds: Annotated[
+        str,
+        typer.Option(metavar="LOW:HIGH", help="Speeds in m/s that a walker is commanded."),
+    ] = "0.2:0.6",
+    reference: Annotated[
+        str,
+        typer.Option(
+            metavar="gait|posture|FILE.json",
+            help="What a walker follows: gaits that are designed over the speeds, the robot as it "
+            "stands in its file, or a gait of yours.",
+        ),
+    ] = "gait",
+    randomise: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=LOW:HIGH",
+            help="What is drawn anew for each episode of a walker: friction, mass (factor), push "
+            "(N s), push_period (s), delay (s), slope (rad), roughness (m); repeat the option.",
+        ),
+    ] = None,
     decisions: Annotated[int, typer.Option(min=1, help="Decisions to learn from.")] = 1_000_000,
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is random.")] = 0,
     lanes: Annotated[int, typer.Option(min=1, help="Robots that learn at once.")] = 64,
@@ -41,21 +75,34 @@ def train(
     ] = False,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
-    """Learn to run, by proximal policy optimisation.
+    """Learn to run, or to walk at a commanded speed, by proximal policy optimisation.
 
     Everything is kept in training.npz from time to time: after Ctrl-C, or worse, the same command
     goes on, and what it comes to is the same. Writes policy.npz, for hs.Policy; curve.csv and
     curve.svg; and run.mp4 and run.html of a run.
     """
     with stage("loading"):
+        from heelstrike.experiments.learning.courses import named_task
         from heelstrike.experiments.learning.tasks import task_of
-        from heelstrike.experiments.learning.training import Recipe, Trainer
+        from heelstrike.experiments.learning.training import WALKING, Recipe, Trainer
         from heelstrike.experiments.learning.writing import KEPT, write_all
 
-        task = task_of(robot)
+        learned: Any = None
+        recipe = WALKING if task is Learned.WALK else Recipe()
+        if task is Learned.WALK:
+            learned = named_task(
+                "Walk", file=robot, reference=reference, speeds=range_called(speeds, "--speeds"),
+                randomise=ranges_called(randomise),
+            )  # fmt: skip
+        elif randomise:
+            raise SimulationError("--randomise is for walkers: add --task walk")
+        else:
+            learned = task_of(robot)
         folder = out or Path(f"train-{Path(robot).stem}")
         folder.mkdir(parents=True, exist_ok=True)
-        trainer = Trainer(task, decisions, Recipe(seed=seed, lanes=lanes), threads=threads)
+        trainer = Trainer(
+            learned, decisions, replace(recipe, seed=seed, lanes=lanes), threads=threads
+        )
         kept = folder / KEPT
         if kept.exists() and not afresh:
             trainer.restore(kept)

@@ -15,6 +15,7 @@ from heelstrike.cli.terminal import output, spoken, stage
 COLUMNS = {
     "episodes": "{:.0f}", "return": "{:.0f}", "interval": "± {:.0f}", "fell": "{:.0%}",
     "decisions": "{:.0f}", "distance": "{:.1f} m", "effort": "{:.2f}",
+    "work": "{:.2f}", "force": "{:.1f}",
 }  # fmt: skip
 """What is told of each world, and how."""
 
@@ -34,8 +35,9 @@ def transfer(
 
     Time stepping at several steps, event-driven, compliant ground, and Gymnasium's own environment
     if the task is one of its: mean return with its interval of 95 %, share of falls, decisions and
-    distance an episode, and effort (mean of the sum of the squared actions). Episodes begin with
-    the same noise everywhere.
+    distance an episode, effort (mean of the sum of the squared actions), work of the motors over
+    weight and distance, and the 95th percentile of the normal force over the weight (medians).
+    Episodes begin with the same noise everywhere.
     """
     rows: list[dict[str, Any]] = []
     with stage("loading") as doing:

@@ -113,6 +113,40 @@ def pushes_called(several: Sequence[str] | None) -> tuple[Push, ...]:
     return tuple(found)
 
 
+def range_called(words: str, where: str) -> tuple[float, float]:
+    """Make a range of ``LOW:HIGH``.
+
+    Raises
+    ------
+    SimulationError
+        If it is written otherwise, or a number is none.
+    """
+    low, colon, high = words.partition(":")
+    if not colon:
+        raise SimulationError(f"{where}: write LOW:HIGH, as 0.2:0.6, not {words!r}.")
+    return _number(low, where, SimulationError), _number(high, where, SimulationError)
+
+
+def ranges_called(several: Sequence[str] | None) -> dict[str, tuple[float, float]]:
+    """Make named ranges of ``NAME=LOW:HIGH``.
+
+    Raises
+    ------
+    SimulationError
+        If one is written otherwise, or is there twice.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    for words in several or ():
+        name, equals, values = words.partition("=")
+        where = f"--randomise {words}"
+        if not (name and equals):
+            raise SimulationError(f"{where}: write NAME=LOW:HIGH, as push=0:20.")
+        if name in found:
+            raise SimulationError(f"--randomise: {name!r} is there twice.")
+        found[name] = range_called(values, where)
+    return found
+
+
 def pose_called(several: Sequence[str] | None) -> dict[str, float]:
     """Make a pose of ``joint=value,...``: rad, m, or degrees where a value ends in ``deg``.
 

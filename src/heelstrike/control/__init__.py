@@ -11,6 +11,7 @@ from heelstrike.control.motion_tracking import MotionTracking
 from heelstrike.control.noise import RandomNumbers
 from heelstrike.control.policy.law import Policy
 from heelstrike.control.policy.network import Layer, Network, load_network
+from heelstrike.control.policy.reference import Reference
 from heelstrike.control.preview import PreviewControl, preview_control
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import Program
@@ -50,6 +51,7 @@ __all__ = [
     "Program",
     "QuadraticSolution",
     "RandomNumbers",
+    "Reference",
     "Sensed",
     "StandingLQR",
     "SteppingConstraints",

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
-import struct
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
@@ -17,16 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.arguments import takes
+from heelstrike.array_file import DAMAGED, read_arrays, write_arrays
 from heelstrike.errors import RunFileError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.state import State
 from heelstrike.sim.image import Image
-from heelstrike.whole_file import write_whole
 
 _IDENTITY = "identity"
 _FORMAT = 6
-# What reading an archive raises when its bytes are others.
-_DAMAGED = (ValueError, KeyError, AttributeError, TypeError, EOFError, RuntimeError, OverflowError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,10 +174,8 @@ class Snapshot:
         WriteError
             If it cannot be written.
         """
-        image = io.BytesIO()
         identity = json.dumps({"format": _FORMAT, **self.identity})
-        np.savez(image, allow_pickle=False, **{_IDENTITY: np.array(identity), **self.arrays})
-        return write_whole(path, image.getbuffer())
+        return write_arrays(path, {_IDENTITY: identity, **self.arrays})
 
 
 @takes(RunFileError)
@@ -205,15 +197,13 @@ def load_snapshot(path: str | os.PathLike[str]) -> Snapshot:
     SimulationError
         If there is no such file, or it is none of a simulation, or damaged.
     """
+    what = "a snapshot of a simulation"
+    arrays = read_arrays(path, what, SimulationError)
     try:
-        with np.load(Path(path), allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
         identity = json.loads(str(arrays.pop(_IDENTITY)))
         layout = identity.pop("format")
-    except OSError as error:
-        raise SimulationError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (*_DAMAGED, zipfile.BadZipFile, zlib.error, struct.error) as error:
-        raise SimulationError(f"{path}: not a snapshot of a simulation, or damaged") from error
+    except DAMAGED as error:
+        raise SimulationError(f"{path}: not {what}, or damaged") from error
     if layout != _FORMAT:
         raise SimulationError(
             f"{path}: written in layout {layout}, this version of heelstrike reads {_FORMAT}"

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import sys
 import warnings
 from importlib.util import find_spec
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+from fresh_python import fresh_python
 
 gymnasium = pytest.importorskip("gymnasium", minversion="1.1")
 
@@ -19,7 +22,7 @@ from gymnasium.vector import AutoresetMode  # noqa: E402
 
 import heelstrike as hs  # noqa: E402
 from heelstrike.experiments.learning import environments  # noqa: E402
-from heelstrike.experiments.learning.environments import RunningEnv, RunningVectorEnv  # noqa: E402
+from heelstrike.experiments.learning.environments import TaskEnv, TaskVectorEnv  # noqa: E402
 
 TASKS = ("Walker2d", "Hopper", "HalfCheetah")
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
@@ -51,7 +54,7 @@ def test_reset_observation_and_reward_are_those_of_gymnasium(
     if find_spec("imageio") is None:  # Gymnasium asks for it, to take pictures
         monkeypatch.setitem(sys.modules, "imageio", ModuleType("imageio"))
     theirs = gymnasium.make(f"{task}-v5").unwrapped
-    ours = RunningEnv(task)
+    ours = TaskEnv(task)
     assert ours.observation_space == theirs.observation_space
     assert ours.action_space == theirs.action_space
     assert ours.metadata["render_fps"] == theirs.metadata["render_fps"]
@@ -78,7 +81,7 @@ def test_reset_observation_and_reward_are_those_of_gymnasium(
     [((0.0, 0.81, 0.99), True), ((0.0, 0.79, 0.0), False), ((0, 1.0, 1.01), False)],
 )
 def test_an_episode_ends_where_gymnasium_ends_it(q: tuple[float, ...], healthy: bool) -> None:
-    environment = RunningEnv("Walker2d")
+    environment = TaskEnv("Walker2d")
     environment.reset(seed=0)
     lanes = environment._lanes
     start = lanes.initial.q.copy()
@@ -145,7 +148,7 @@ def test_three_ways_to_begin_anew() -> None:
 
 
 def test_what_is_wrong_is_said() -> None:
-    lanes, single = vector(), RunningEnv("Walker2d")
+    lanes, single = vector(), TaskEnv("Walker2d")
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
         lanes.step(actions(3, 1)[0])
     with pytest.raises(gymnasium.error.ResetNeeded, match="reset"):
@@ -166,17 +169,64 @@ def test_what_is_wrong_is_said() -> None:
             lanes.reset(seed=seed)
     with pytest.raises(gymnasium.error.Error, match="truth value"):
         lanes.reset(options={"reset_mask": [0, 1, 1]})
-    for make in (lambda: RunningEnv("Ant"), lambda: RunningVectorEnv("Walker2d", 0)):
+    for make in (lambda: TaskEnv("Ant"), lambda: TaskVectorEnv("Walker2d", 0)):
         with pytest.raises(ValueError, match=r"task|num_envs"):
             make()
     with pytest.raises(ValueError, match="render_mode"):
-        RunningEnv("Walker2d", render_mode="human")
+        TaskEnv("Walker2d", render_mode="human")
     copy = pickle.loads(pickle.dumps(single))
     np.testing.assert_array_equal(copy.reset(seed=0)[0], single.reset(seed=0)[0])
     for each in (lanes, single):
         each.close()
         with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="closed"):
             each.reset()
+
+
+def observed_by(lanes: Any, seed: int = 5) -> list[str]:
+    seen = [lanes.reset(seed=seed)[0]]
+    seen += [lanes.step(action)[0] for action in actions(2, 3, 3)]
+    return [float(each).hex() for each in np.array(seen).ravel()]
+
+
+def test_environments_go_on_in_a_fork_and_in_another_process(tmp_path: Path) -> None:
+    """Threads of the first process are not there in the second; a pickle begins anew."""
+    lanes = TaskVectorEnv("Hopper", 2, threads=2)
+    expected = observed_by(lanes)
+    if hasattr(os, "fork"):
+        told = tmp_path / "told"
+        child = os.fork()
+        if not child:
+            told.write_text(" ".join(observed_by(lanes)), encoding="ascii")
+            os._exit(0)
+        os.waitpid(child, 0)
+        assert told.read_text(encoding="ascii").split() == expected
+    assert observed_by(lanes) == expected
+    kept = tmp_path / "kept"
+    kept.write_bytes(pickle.dumps(lanes))
+    program = (
+        "import pickle, sys, pathlib, numpy as np\n"
+        "lanes = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes())\n"
+        "seen = [lanes.reset(seed=5)[0]]\n"
+        "given = np.random.default_rng(0).uniform(-1, 1, (3, 2, 3)).astype(np.float32)\n"
+        "seen += [lanes.step(action)[0] for action in given]\n"
+        "print(*[float(each).hex() for each in np.array(seen).ravel()])"
+    )
+    assert fresh_python("-c", program, str(kept)).stdout.split() == expected
+
+
+def test_walks_are_environments_too() -> None:
+    options: Any = {"reference": "posture", "randomise": {"push": (5.0, 10.0)}}
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*(maximum|minimum|infinity|Box).*")
+        walk = gymnasium.make("heelstrike/Walk-v0", render_mode="rgb_array", **options)
+        check_env(walk.unwrapped)
+    lanes = vector("Walk", 2, **options)
+    lanes.reset(seed=1)
+    *_, info = lanes.step(np.zeros((2, 6)))
+    assert info["contact_force"].shape == (2, walk.unwrapped._lanes.robot.nc, 2)
+    assert (info["reward_speed"] > 0.0).all()
+    with pytest.raises(ValueError, match="fields"):
+        gymnasium.make("heelstrike/Walk-v0", colour="red")
 
 
 def test_fields_of_the_task_can_be_others_and_pictures_are_taken() -> None:

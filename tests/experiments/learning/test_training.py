@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -85,7 +87,8 @@ def test_running_mean_and_variance_are_those_of_all_rows() -> None:
     np.testing.assert_allclose(running.variance, rows.var(axis=0), rtol=1e-5)
 
 
-def test_training_that_was_cut_comes_to_the_same(tmp_path: Path) -> None:
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="a process is killed here, a fork")
+def test_training_that_was_killed_comes_to_the_same(tmp_path: Path) -> None:
     kept, rounds = tmp_path / "training.npz", 13
     decisions = rounds * SMALL.lanes * SMALL.horizon
     whole = Trainer(TASK, decisions, SMALL)
@@ -94,10 +97,13 @@ def test_training_that_was_cut_comes_to_the_same(tmp_path: Path) -> None:
 
     def break_off(trainer: Trainer) -> None:
         if trainer.round == 12:
-            raise KeyboardInterrupt
+            os.kill(os.getpid(), signal.SIGKILL)
 
-    with pytest.raises(KeyboardInterrupt):
+    child = os.fork()
+    if not child:
         cut.learn(kept, break_off)
+        os._exit(0)
+    assert os.WTERMSIG(os.waitpid(child, 0)[1]) == signal.SIGKILL
     again = Trainer(TASK, decisions, SMALL)
     again.restore(kept)
     assert again.round == 10

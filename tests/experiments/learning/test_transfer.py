@@ -17,7 +17,7 @@ import heelstrike as hs  # noqa: E402
 from heelstrike.cli.main import app  # noqa: E402
 from heelstrike.control.policy.network import Layer, Network  # noqa: E402
 from heelstrike.experiments.learning import transfer  # noqa: E402
-from heelstrike.experiments.learning.environments import RunningEnv  # noqa: E402
+from heelstrike.experiments.learning.environments import TaskEnv  # noqa: E402
 from heelstrike.experiments.learning.tasks import RUNNING  # noqa: E402
 
 TASK = replace(RUNNING["Hopper"], max_episode_steps=15)
@@ -36,7 +36,7 @@ def test_episodes_are_those_of_an_environment() -> None:
     policy, count = network(), 3
     found = transfer.episodes(policy, TASK, hs.TimeStepping(step=TASK.step), count, seed=4)
     for lane in range(count):
-        environment: Any = RunningEnv("Hopper")
+        environment: Any = TaskEnv("Hopper")
         environment._np_random = np.random.default_rng([4, lane])
         observation, _ = environment.reset()
         gained, begin, length, fell = 0.0, environment._lanes.batch.position[0, 0], 0, False

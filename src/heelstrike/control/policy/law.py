@@ -8,9 +8,17 @@ import os
 import numpy as np
 
 from heelstrike.arguments import takes
-from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.policy.network import ACTIVATIONS, Network, load_network
+from heelstrike.control.policy.reference import (
+    Following,
+    between,
+    follow,
+    nothing_to_follow,
+    spot,
+    stride_at,
+)
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
@@ -57,6 +65,14 @@ class Weights(Bundle):
     that are not observed; up to what velocities are."""
     gear: Floats = array("nu")
     """Torque for an output of 1 (N m)."""
+    following: Following = part(Following)
+    """The motion that it follows."""
+    every: int = number(int)
+    """Calls a decision."""
+    period: float = number(float)
+    """Seconds from one decision to the next."""
+    speed: float = cell(float)
+    """Commanded speed (m/s), which may be set at any time."""
 
 
 class State(Bundle):
@@ -68,6 +84,16 @@ class State(Bundle):
     y: Floats = array("4 width")
     z: Floats = array("4 width")
     """x, y, z: What goes into a layer; what comes of it, and of what it remembers."""
+    action: Floats = array("nu")
+    """What was decided last, from -1 to 1."""
+    calls: int = cell(int)
+    """Calls so far."""
+    phase: float = cell(float)
+    speed: float = cell(float)
+    since: float = cell(float)
+    next_phase: float = cell(float)
+    """phase, speed, since, next_phase: Phase (strides), speed (m/s) and time (s) of the last
+    decision; phase of the next."""
 
 
 @kernel
@@ -152,23 +178,35 @@ def remember(kind: int, outputs: int, place: int, memory: State) -> None:
         kept[place + i] = x[i]
 
 
-@controller
-def policy(
-    state: ControlState, robot: ControlledRobot, parameters: Weights, memory: State, torque: Floats
-) -> None:
-    """Torques that a network decides on."""
+@kernel
+def observe(state: ControlState, parameters: Weights, memory: State) -> None:
+    """Write what is observed, normalised, to ``x``."""
     x, limit, place = memory.x, parameters.velocity_limit, 0
-    for i in range(parameters.skipped, robot.nq):
+    nq, nv, following = state.q.shape[0], state.v.shape[0], parameters.following
+    for i in range(parameters.skipped, nq):
         x[place] = state.q[i]
         place += 1
-    for i in range(robot.nv):
+    for i in range(nv):
         x[place] = min(max(state.v[i], -limit), limit)
         place += 1
+    if following.speed.shape[0] > 0:
+        at = spot(following.speed, following.motion.shape[1], memory.speed, memory.phase)
+        for i in range(place):
+            x[i] -= between(following.motion, at, parameters.skipped + i)
+        x[place] = memory.speed
+        x[place + 1] = math.sin(2.0 * math.pi * memory.phase)
+        x[place + 2] = math.cos(2.0 * math.pi * memory.phase)
+        place += 3
     limit = parameters.observation_limit
     for i in range(place):
         normal = (x[i] - parameters.mean[i]) * parameters.scale[i]
         x[i] = min(max(normal, -limit), limit)
-    weights = parameters.weights
+
+
+@kernel
+def think(parameters: Weights, memory: State) -> None:
+    """Let what is in ``x`` go through all layers; the last one's outputs are in ``x`` then."""
+    x, weights = memory.x, parameters.weights
     for layer in range(parameters.layers.shape[0]):
         kind, outputs = parameters.layers[layer, KIND], parameters.layers[layer, OUTPUTS]
         inputs, begin = parameters.layers[layer, INPUTS], parameters.layers[layer, WEIGHTS]
@@ -182,8 +220,35 @@ def policy(
                 x[i] = memory.kept[own + i]
             multiply(weights, begin, outputs, gates * outputs, x, memory.z)
             remember(kind, outputs, own, memory)
-    for i in range(robot.nu):
-        torque[i] = parameters.gear[i] * min(max(x[i], -1.0), 1.0)
+
+
+@controller
+def policy(
+    t: float, state: ControlState, robot: ControlledRobot, parameters: Weights, memory: State,
+    torque: Floats,
+) -> None:  # fmt: skip
+    """Torques that a network decides on, beside those that follow its motion, if it has one."""
+    follows = parameters.following.speed.shape[0] > 0
+    if memory.calls % parameters.every == 0:
+        if follows:
+            memory.speed, memory.phase, memory.since = parameters.speed, memory.next_phase, t
+            stride = stride_at(parameters.following, memory.speed)
+            memory.next_phase = memory.phase + parameters.period / stride
+        observe(state, parameters, memory)
+        think(parameters, memory)
+        for i in range(torque.shape[0]):
+            memory.action[i] = min(max(memory.x[i], -1.0), 1.0)
+    memory.calls += 1
+    if follows:
+        stride = stride_at(parameters.following, memory.speed)
+        phase = memory.phase + (t - memory.since) / stride
+        joints = robot.model.actuator_joint
+        follow(parameters.following, memory.speed, phase, joints, state.q, state.v, torque)
+    else:
+        for i in range(torque.shape[0]):
+            torque[i] = 0.0
+    for i in range(torque.shape[0]):
+        torque[i] += parameters.gear[i] * memory.action[i]
 
 
 class Policy(Law):
@@ -196,6 +261,11 @@ class Policy(Law):
         :mod:`heelstrike.control.policy.network`; or the network itself.
     robot : Robot, optional
         The robot, to see at once whether it fits.
+    speed : float, optional
+        Speed (m/s) that is commanded to a policy which follows a motion; the lowest of its motions
+        by default. ``simulation.parameters.speed`` changes it at any time.
+    phase : float
+        Where in the stride it begins, from 0 to 1.
 
     Raises
     ------
@@ -209,29 +279,44 @@ class Policy(Law):
     """
 
     @takes(ControllerError)
-    def __init__(self, file: str | os.PathLike[str] | Network, robot: Robot | None = None) -> None:
+    def __init__(
+        self, file: str | os.PathLike[str] | Network, robot: Robot | None = None, *,
+        speed: float | None = None, phase: float = 0.0,
+    ) -> None:  # fmt: skip
         network = file if isinstance(file, Network) else load_network(file)
         if robot is not None:
-            observed = robot.nq + robot.nv - network.skipped
+            observed = network.observed(robot.nq, robot.nv)
             fits = observed == network.mean.size and robot.nu == network.gear.size
+            if network.reference is not None:
+                size = robot.nq + robot.nv + robot.nu
+                fits = fits and network.reference.motion.shape[2] == size
             if not fits or network.robot not in ("", robot.name):
                 raise ControllerError(
                     f"this policy is one of {network.robot or 'a robot'!r} that observes "
                     f"{network.mean.size} numbers and drives {network.gear.size} actuators; robot "
                     f"{robot.name!r} has {observed} and {robot.nu}"
                 )
+        reference = network.reference
+        if speed is not None and reference is None:
+            raise ControllerError("this policy follows no motion: it cannot be told a speed")
+        if speed is None:
+            speed = 0.0 if reference is None else float(reference.speed[0])
+        if not (np.isfinite(speed) and np.isfinite(phase)):
+            raise ControllerError(f"speed and phase must be finite, got {speed} and {phase}")
         self.network = network
         width = max(network.mean.size, *(layer.outputs for layer in network.layers))
         kept = sum(REMEMBERS[layer.kind] * layer.outputs for layer in network.layers)
         super().__init__(
-            policy, _weights(network), memory={"remembered": kept, "width": width},
-            period=network.period,
+            policy, _weights(network, speed),
+            memory={"remembered": kept, "width": width, "next_phase": float(phase)},
+            period=network.period if reference is None else reference.period,
         )  # fmt: skip
 
 
-def _weights(network: Network) -> Weights:
+def _weights(network: Network, speed: float) -> Weights:
     """Lay the numbers of a network out as the kernels read them."""
     table, words, place, own = [], [], 0, 0
+    reference = network.reference
     for layer in network.layers:
         own_words = [layer.weight.T, layer.bias[None]]
         if layer.recurrent is not None and layer.recurrent_bias is not None:
@@ -251,4 +336,8 @@ def _weights(network: Network) -> Weights:
         mean=network.mean, scale=1.0 / network.deviation,
         observation_limit=network.observation_limit, skipped=network.skipped,
         velocity_limit=network.velocity_limit, gear=network.gear,
+        following=nothing_to_follow(len(network.gear)) if reference is None
+        else reference.numbers(),
+        every=1 if reference is None else round(network.period / reference.period),
+        period=network.period, speed=float(speed),
     )  # fmt: skip

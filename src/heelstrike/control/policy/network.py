@@ -17,6 +17,9 @@ A file is a NumPy archive (``.npz``) without pickled objects, which anything can
 ``bias.i``              one for each row
 ``recurrent.i``         (4 or 3 outputs, outputs) of lstm (gates i, f, g, o) and gru (r, z, n)
 ``recurrent_bias.i``    one for each row
+``reference.NAME``      if it follows a motion: the fields of :class:`Reference`; how far positions
+                        and velocities are off the motion is observed then, and after them
+                        commanded speed, sine and cosine of the phase
 ======================  ===========================================================================
 
 Rows and gates are in the order of PyTorch's ``LSTM`` and ``GRU``.
@@ -24,23 +27,20 @@ Rows and gates are in the order of PyTorch's ``LSTM`` and ``GRU``.
 
 from __future__ import annotations
 
-import io
 import os
-import struct
-import zipfile
-import zlib
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.array_file import read_arrays, write_arrays
+from heelstrike.control.policy.reference import OBSERVED, Reference
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
-from heelstrike.whole_file import write_whole
 
 FORMAT = "heelstrike policy 1"
 
@@ -139,6 +139,8 @@ class Network:
     """Name of the robot it was learned with; empty for any."""
     about: dict[str, str] = field(default_factory=dict)
     """What else is to be told of it."""
+    reference: Reference | None = None
+    """Motion that it follows; torques of the outputs are added to those that do so."""
 
     def __post_init__(self) -> None:
         for name in ("gear", "mean", "deviation"):
@@ -157,6 +159,29 @@ class Network:
             raise ControllerError("deviation of a policy must be positive, as many as the mean")
         if not 0.0 < self.period < np.inf:
             raise ControllerError(f"the period of a policy must be positive, got {self.period}")
+        if self.reference is not None:
+            every = self.period / self.reference.period
+            if self.reference.stiffness.size != self.gear.size or every != round(every, 6):
+                raise ControllerError(
+                    "the reference of a policy must be one of as many joints as it drives, whose "
+                    f"period is a whole part of {self.period} s, got {self.reference.period} s"
+                )
+
+    def observed(self, positions: int, velocities: int) -> int:
+        """Return how many numbers of a robot it observes.
+
+        Parameters
+        ----------
+        positions, velocities : int
+            Those of the robot.
+
+        Returns
+        -------
+        int
+            The number.
+        """
+        own = 0 if self.reference is None else OBSERVED
+        return positions + velocities - self.skipped + own
 
     def begin(self) -> list[NDArray[np.float64]]:
         """Return what the layers remember before the first call: zeros.
@@ -221,9 +246,9 @@ class Network:
                 arrays[f"recurrent.{i}"] = layer.recurrent
                 arrays[f"recurrent_bias.{i}"] = layer.recurrent_bias
         arrays |= {f"about.{name}": text for name, text in self.about.items()}
-        image = io.BytesIO()
-        np.savez(image, allow_pickle=False, **{k: np.asarray(v) for k, v in arrays.items()})
-        return write_whole(path, image.getbuffer())
+        if self.reference is not None:
+            arrays |= {f"reference.{k}": v for k, v in vars(self.reference).items()}
+        return write_arrays(path, arrays)
 
 
 def load_network(path: str | os.PathLike[str]) -> Network:
@@ -244,16 +269,7 @@ def load_network(path: str | os.PathLike[str]) -> Network:
     ControllerError
         If there is no such file, or it is no policy, or damaged.
     """
-    try:
-        with zipfile.ZipFile(Path(path)) as archive:
-            if sum(each.file_size for each in archive.infolist()) > 8 * MOST:
-                raise ControllerError(f"{path}: too large for a policy")
-        with np.load(Path(path), allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-    except OSError as error:
-        raise ControllerError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except _DAMAGED as error:
-        raise ControllerError(f"{path}: not a policy, or damaged ({error})") from error
+    arrays = read_arrays(path, "a policy", ControllerError, 8 * MOST)
     if str(arrays.get("format")) != FORMAT:
         raise ControllerError(f"{path}: not a policy in the layout {FORMAT!r}")
     try:
@@ -262,12 +278,6 @@ def load_network(path: str | os.PathLike[str]) -> Network:
         raise ControllerError(f"{path}: damaged, {error} is missing or no number") from error
     except ControllerError as error:
         raise ControllerError(f"{path}: {error}") from error
-
-
-_DAMAGED = (
-    ValueError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error,
-    struct.error, MemoryError,
-)  # fmt: skip
 
 
 def _network(arrays: Mapping[str, Any]) -> Network:
@@ -284,10 +294,14 @@ def _network(arrays: Mapping[str, Any]) -> Network:
             )
         )  # fmt: skip
     about = {k.removeprefix("about."): str(v) for k, v in arrays.items() if k.startswith("about.")}
+    reference = None
+    if "reference.motion" in arrays:
+        named = {each.name: arrays[f"reference.{each.name}"] for each in fields(Reference)}
+        reference = Reference(**named | {"period": float(named["period"])})
     return Network(
         tuple(layers), float(arrays["period"]), arrays["gear"], arrays["mean"],
         arrays["deviation"], float(arrays["observation_limit"]), int(arrays["skipped"]),
-        float(arrays["velocity_limit"]), str(arrays["robot"]), about,
+        float(arrays["velocity_limit"]), str(arrays["robot"]), about, reference,
     )  # fmt: skip
 
 

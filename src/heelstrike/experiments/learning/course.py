@@ -1,111 +1,107 @@
-"""Lanes in which robots run for a reward: what environments and the trainer are made of."""
+"""Lanes in which robots do something for a reward: of them environments and trainers are made."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.compilation import loop_for
-from heelstrike.contact.ground import Ground
+from heelstrike.control.policy.network import Layer, Network
 from heelstrike.errors import SimulationError
-from heelstrike.experiments.learning.tasks import RunningTask
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim import Batch, HeldTorque, Method, TimeStepping
+from heelstrike.sim import Batch
 
-TERMS = ("x_position", "z_distance_from_origin", "x_velocity", "reward_forward", "reward_ctrl",
-         "reward_survive")  # fmt: skip
-"""What is told of a step beside its reward."""
-
-AT_ONCE = 16
-"""Episodes for which noise is drawn at once."""
+AT_RESET = 2
+"""Terms, the first ones, that are told when an episode begins."""
 
 
-class Course:
+class Task(Protocol):
+    """What is to be learned, as a trainer knows it."""
+
+    @property
+    def max_episode_steps(self) -> int:
+        """Decisions after which an episode is truncated."""
+
+    @property
+    def decision_period(self) -> float:
+        """Seconds from one decision to the next."""
+
+    @property
+    def about(self) -> Mapping[str, str]:
+        """What a policy tells of the task that it was trained for."""
+
+
+class Course(ABC):
     """Lanes of a task, with actions, observations, rewards and ends.
 
     Parameters
     ----------
-    task : RunningTask
+    task : Task
         What is to be learned.
-    lanes : int
-        How many.
-    threads : int
-        Threads that move them.
-    method : Method, optional
-        Way through time; time stepping at the step of the task by default.
+    batch : Batch
+        The robots.
+    observed : int
+        Numbers that are observed.
+    names : sequence of str
+        What is told of a step beside its reward; the first two also when an episode begins.
+    gear : (nu,) float
+        Torque (N m) for an action of 1.
+    scale : (nu,) float, optional
+        What is commanded for an action of 1; the torque by default.
 
     Attributes
     ----------
-    batch : Batch
-        The robots.
     observation : (n, no) float
         What is observed now.
     reward : (n,) float
         Of the last step.
     terminated : (n,) bool
         Which episodes are over: the robot is not healthy, or cannot be simulated any further.
-    terms : (n, 6) float
-        What :data:`TERMS` names.
+    terms : (n, names) float
+        What `names` says.
     """
 
     def __init__(
-        self, task: RunningTask, lanes: int = 1, *, threads: int = 1, method: Method | None = None
-    ) -> None:
-        robot = task.robot()
-        self.task, self.robot = task, robot
-        self.initial = robot.reference_state()
-        self.batch = Batch(
-            robot, HeldTorque(robot), state=self.initial, lanes=lanes, threads=threads,
-            method=TimeStepping(step=task.step) if method is None else method,
-            ground=Ground(friction=task.friction),
-            stop_when_fallen=False,
-        )  # fmt: skip
-        step = self.batch.method.step_length
+        self, task: Task, batch: Batch, observed: int, names: tuple[str, ...], gear: Floats,
+        scale: Floats | None = None,
+    ) -> None:  # fmt: skip
+        lanes = len(batch)
+        self.task: Any = task
+        self.batch, self.names, self.gear = batch, names, gear
+        self.robot: Robot = batch.robot
+        step = batch.method.step_length
         self._steps = 0 if step is None else max(round(task.decision_period / step), 1)
-        self.gear = task.gear(robot)
-        self._skipped = int(task.exclude_current_positions_from_observation)
-        size = robot.nq + robot.nv - self._skipped
-        self.observation = np.zeros((lanes, size))
+        self.observation = np.zeros((lanes, observed))
         self.reward = np.zeros(lanes)
         self.terminated = np.zeros(lanes, dtype=np.bool_)
-        self.terms = np.zeros((lanes, len(TERMS)))
-        self._start = self.initial.vector
+        self.terms = np.zeros((lanes, len(names)))
         self._randoms = [np.random.default_rng() for _ in range(lanes)]
-        self._noise = np.zeros((lanes, AT_ONCE, robot.nq + robot.nv))
-        self._drawn = np.full(lanes, AT_ONCE, dtype=np.int64)
         self._before = np.zeros(lanes)
-        self._action = np.zeros((lanes, robot.nu))
-        self._numbers = np.array([
-            task.decision_period, task.forward_reward_weight, task.ctrl_cost_weight,
-            task.healthy_reward, *task.healthy_z_range, *task.healthy_angle_range,
-            *task.healthy_state_range, task.velocity_limit, self.initial.q[1],
-            float(task.terminate_when_unhealthy),
-        ])  # fmt: skip
-        self._command, self._judge = _command(), _judge()
-        self._assess(self._every)
-
-    @property
-    def _every(self) -> Integers:
-        return np.arange(len(self.batch))
+        self._action = np.zeros((lanes, self.robot.nu))
+        self._scale = gear if scale is None else scale
+        self._command = _command()
 
     def seed(self, lane: int, random: np.random.Generator) -> None:
-        """Have the noise of a lane drawn from other random numbers from now on.
+        """Have everything random in a lane drawn from other numbers from now on.
 
         Parameters
         ----------
         lane : int
             Which.
         random : Generator
-            What it is drawn from, positions first. It is drawn for several episodes at once.
+            What it is drawn from.
         """
         self._randoms[lane] = random
-        self._drawn[lane] = AT_ONCE
 
+    @abstractmethod
     def begin(self, chosen: Integers) -> None:
         """Let lanes begin anew, each with noise of its own.
 
@@ -114,16 +110,46 @@ class Course:
         chosen : (k,) int
             Which lanes.
         """
-        drawn = self._drawn[chosen]
-        for lane in chosen[drawn == AT_ONCE].tolist():
-            self._draw(lane)
-        drawn %= AT_ONCE
-        noise = self._noise[chosen, drawn]
-        self._drawn[chosen] = drawn + 1
-        noise += self._start
-        nq = self.robot.nq
-        self.batch._begin_anew(chosen, noise[:, :nq], noise[:, nq:])
-        self._assess(chosen)
+
+    @abstractmethod
+    def cause(self, lane: int) -> str:
+        """Say why an episode is over.
+
+        Parameters
+        ----------
+        lane : int
+            Of which lane.
+
+        Returns
+        -------
+        str
+            In a person's words.
+        """
+
+    @abstractmethod
+    def network(
+        self, layers: tuple[Layer, ...], mean: Floats, deviation: Floats, **more: Any
+    ) -> Network:
+        """Return a policy of this task.
+
+        Parameters
+        ----------
+        layers : tuple of Layer
+            From observation to action.
+        mean, deviation : (no,) float
+            What observations are normalised with.
+        **more
+            Further fields of :class:`~heelstrike.control.policy.network.Network`.
+
+        Returns
+        -------
+        Network
+            The policy.
+        """
+
+    @abstractmethod
+    def _assess(self, begun: Integers | None) -> None:
+        """Observe and judge all lanes, or those that have just begun."""
 
     def step(self, action: ArrayLike, mask: NDArray[np.bool_] | None = None) -> None:
         """Make a decision in all lanes.
@@ -149,67 +175,24 @@ class Course:
             )
         self._action[:] = given
         batch = self.batch
-        wrong = self._command(self._action, self.gear, batch._q, self._before, batch.command)
+        wrong = self._command(self._action, self._scale, batch._q, self._before, batch.command)
         if wrong >= 0:
             raise SimulationError(f"the action of lane {wrong} is not finite: {given[wrong]}")
+        self._move(mask)
+        self._assess(None)
+
+    def _move(self, mask: NDArray[np.bool_] | None) -> None:
+        """Move on until the next decision."""
+        batch = self.batch
         if self._steps:
             batch.step(self._steps, mask)
         else:
             moves = np.ones(len(batch)) if mask is None else mask
             batch.advance(batch.time + moves * self.task.decision_period)
-        self._assess(None)
 
     def state_of(self, lane: int) -> State:
         """Return where a robot is."""
         return State(self.batch.position[lane], self.batch.velocity[lane])
-
-    def cause(self, lane: int) -> str:
-        """Say why an episode is over.
-
-        Parameters
-        ----------
-        lane : int
-            Of which lane.
-
-        Returns
-        -------
-        str
-            In a person's words.
-        """
-        batch, task = self.batch, self.task
-        if batch.outcome[lane] > 1:
-            return batch.message(lane)
-        q, v = batch.position[lane].tolist(), batch.velocity[lane].tolist()
-        for name, unit, values, (low, high) in (
-            ("the height of the trunk", " m", q[1:2], task.healthy_z_range),
-            ("its pitch", " rad", q[2:3], task.healthy_angle_range),
-            ("a position or velocity", "", q[2:] + v, task.healthy_state_range),
-        ):
-            for value in values:
-                if not low < value < high:
-                    return f"{name} is {value:.3g}{unit}, out of {low:g} to {high:g}"
-        return "it is healthy"
-
-    def _draw(self, lane: int) -> None:
-        """Draw the noise of the next episodes of a lane."""
-        task, robot, random = self.task, self.robot, self._randoms[lane]
-        scale, noise = task.reset_noise_scale, self._noise[lane]
-        if not task.normal_noise:
-            noise[:] = random.uniform(-scale, scale, noise.shape)
-            return
-        for row in noise:
-            row[: robot.nq] = random.uniform(-scale, scale, robot.nq)
-            row[robot.nq :] = scale * random.standard_normal(robot.nv)
-
-    def _assess(self, begun: Integers | None) -> None:
-        """Observe and judge all lanes, or those that have just begun."""
-        batch = self.batch
-        if begun is not None:
-            self._before[begun] = batch.position[begun, 0]
-        self._judge(
-            self._skipped, self._numbers, batch._q, batch._v, batch._outcome, self._before,
-            self._action, self.terms, self.observation, self.reward, self.terminated,
-        )  # fmt: skip
 
 
 @cache
@@ -233,59 +216,3 @@ def _command() -> Any:
     table, vector = types.float64[:, ::1], types.float64[::1]
     signature = types.int64(table, vector, types.float64[:, :], vector, table)
     return loop_for(signature, command)
-
-
-@cache
-def _judge() -> Any:
-    """Return what observes and judges; see `judge` within."""
-
-    def judge(
-        skipped: int, numbers: Floats, q: Floats, v: Floats, outcome: Integers, before: Floats,
-        action: Floats, terms: Floats, observation: Floats, reward: Floats, terminated: Any,
-    ) -> int:  # fmt: skip
-        """Write observations, rewards with their terms, and which episodes are over."""
-        period, forward_weight, action_weight, alive = (
-            numbers[0],
-            numbers[1],
-            numbers[2],
-            numbers[3],
-        )
-        limit, origin = numbers[10], numbers[11]
-        for lane in range(q.shape[0]):
-            place = 0
-            healthy = goes_on = outcome[lane] <= 1
-            for i in range(q.shape[1]):
-                if i >= skipped:
-                    observation[lane, place] = q[lane, i]
-                    place += 1
-                if i >= 2:
-                    healthy = healthy and numbers[8] < q[lane, i] < numbers[9]
-            for i in range(v.shape[1]):
-                observation[lane, place] = min(max(v[lane, i], -limit), limit)
-                place += 1
-                healthy = healthy and numbers[8] < v[lane, i] < numbers[9]
-            healthy = healthy and numbers[4] < q[lane, 1] < numbers[5]
-            healthy = healthy and numbers[6] < q[lane, 2] < numbers[7]
-            cost = 0.0
-            for i in range(action.shape[1]):
-                cost += action[lane, i] * action[lane, i]
-            speed = (q[lane, 0] - before[lane]) / period
-            terms[lane, 0] = q[lane, 0]
-            terms[lane, 1] = q[lane, 1] - origin
-            terms[lane, 2] = speed
-            terms[lane, 3] = forward_weight * speed
-            terms[lane, 4] = -action_weight * cost
-            terms[lane, 5] = alive if healthy else 0.0
-            reward[lane] = terms[lane, 3] + terms[lane, 5] + terms[lane, 4]
-            terminated[lane] = not goes_on or (not healthy and numbers[12] != 0.0)
-        return 0
-
-    table, columns = types.float64[:, ::1], types.float64[:, :]
-    vector, integers = types.float64[::1], types.int64[::1]
-    return loop_for(
-        types.int64(
-            types.int64, vector, columns, columns, integers, vector, table, table, table, vector,
-            types.boolean[::1],
-        ),
-        judge,
-    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Environments of Gymnasium on hard contact: ``heelstrike/Walker2d-v0`` and its like.
+"""Environments of Gymnasium on hard contact: ``heelstrike/Walk-v0``, ``Walker2d-v0`` and its like.
 
 Importing this module registers them; so does their name with the module before it::
 
@@ -12,16 +12,15 @@ Importing this module registers them; so does their name with the module before 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import SimulationError
-from heelstrike.experiments.learning.course import TERMS, Course
+from heelstrike.experiments.learning.course import AT_RESET, Course
+from heelstrike.experiments.learning.courses import NAMES, course_of, named_task
 from heelstrike.experiments.learning.pictures import Camera
-from heelstrike.experiments.learning.tasks import RUNNING
 from heelstrike.robot.model import Floats, Integers
 
 try:
@@ -52,18 +51,19 @@ def _refused(wrong: SimulationError) -> Exception:
     return ValueError(str(wrong))
 
 
-class RunningEnv(gymnasium.Env[Floats, Array]):
-    """One robot that is to run; see :mod:`heelstrike.experiments.learning.tasks`.
+class TaskEnv(gymnasium.Env[Floats, Array]):
+    """One robot that is to run or walk.
 
     Parameters
     ----------
     task : str
-        Name of the task: ``"Walker2d"``, ``"Hopper"`` or ``"HalfCheetah"``.
+        Name of the task: ``"Walker2d"``, ``"Hopper"``, ``"HalfCheetah"`` or ``"Walk"``.
     render_mode : str, optional
         ``"rgb_array"`` for pictures.
     **changes
-        Fields of :class:`~heelstrike.experiments.learning.tasks.RunningTask` that are to be others,
-        as ``ctrl_cost_weight=0.01``.
+        Fields of :class:`~heelstrike.experiments.learning.tasks.RunningTask` or
+        :class:`~heelstrike.experiments.learning.walk_task.WalkTask` that are to be others, as
+        ``ctrl_cost_weight=0.01``.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": FRAMES}  # noqa: RUF012
@@ -107,8 +107,7 @@ class RunningEnv(gymnasium.Env[Floats, Array]):
             self._lanes.seed(0, self.np_random)
         self._lanes.begin(self._first)
         self._state = "begun"
-        x, z = self._lanes.terms[0, :2].tolist()
-        return self._lanes.observation[0].copy(), {"x_position": x, "z_distance_from_origin": z}
+        return self._lanes.observation[0].copy(), self._terms(AT_RESET)
 
     def step(self, action: Array) -> tuple[Floats, float, bool, bool, Info]:
         """Make a decision.
@@ -136,7 +135,8 @@ class RunningEnv(gymnasium.Env[Floats, Array]):
         except SimulationError as wrong:
             raise _refused(wrong) from None
         batch = lanes.batch
-        info: Info = dict(zip(TERMS, lanes.terms[0].tolist(), strict=True))
+        info = self._terms(len(lanes.names))
+        info["contact_force"] = batch.contact_force[0].copy()
         info["certificate"] = max(
             batch.complementarity.item(), batch.cone.item(), batch.non_penetration.item()
         )
@@ -144,6 +144,10 @@ class RunningEnv(gymnasium.Env[Floats, Array]):
         if terminated:
             info["cause"] = lanes.cause(0)
         return lanes.observation[0].copy(), float(lanes.reward[0]), terminated, False, info
+
+    def _terms(self, count: int) -> Info:
+        lanes = self._lanes
+        return dict(zip(lanes.names[:count], lanes.terms[0].tolist(), strict=False))
 
     def render(self) -> Any:
         """Return a picture, (height, width, 3) of 8 bits, if that is the mode."""
@@ -160,8 +164,8 @@ class RunningEnv(gymnasium.Env[Floats, Array]):
         self._lanes.batch.close()
 
 
-class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
-    """Many robots that are to run, moved in one call.
+class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
+    """Many robots that are to run or walk, moved in one call.
 
     Parameters
     ----------
@@ -196,7 +200,7 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         limit = course.task.max_episode_steps if max_episode_steps is None else max_episode_steps
-        self._limit = limit if limit > 0 else np.iinfo(np.int64).max
+        self.limit = limit if limit > 0 else np.iinfo(np.int64).max
         self._given: Info = {
             "task": task, "num_envs": num_envs, "max_episode_steps": max_episode_steps,
             "autoreset_mode": self.autoreset_mode, "threads": threads, "render_mode": render_mode,
@@ -204,7 +208,9 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
         }  # fmt: skip
         self._decisions = np.zeros(num_envs, dtype=np.int64)
         self._over = np.zeros(num_envs, dtype=np.bool_)
+        self._waiting = self._over.nonzero()[0]
         self._all = np.ones(num_envs, dtype=np.bool_)
+        self._masks = [f"_{name}" for name in (*course.names, "contact_force", "certificate")]
         self._cameras: list[Camera] = []
         self._state = "new"
 
@@ -241,10 +247,16 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
         self._begin(chosen)
         self._state = "begun"
         info: Info = {
-            name: self._lanes.terms[:, place].copy() for place, name in enumerate(TERMS[:2])
+            name: self._lanes.terms[:, place].copy()
+            for place, name in enumerate(self._lanes.names[:AT_RESET])
         }
-        info |= {f"_{name}": mask.copy() for name in TERMS[:2]}
+        info |= {f"_{name}": mask.copy() for name in self._lanes.names[:AT_RESET]}
         return self._lanes.observation.copy(), info
+
+    def check_begun(self) -> None:
+        """Raise what says so if this is closed, or not reset yet."""
+        if self._state != "begun":
+            _check_begun(self._state)
 
     def step(self, actions: Array) -> tuple[Floats, Floats, Array, Array, Info]:
         """Make a decision in every lane.
@@ -264,14 +276,13 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
         ValueError
             If the actions are of another shape, no numbers, or not finite.
         """
-        if self._state != "begun":
-            _check_begun(self._state)
-        lanes, over = self._lanes, self._over
-        waits = bool(over.any())
-        went = ~over if waits else self._all
+        self.check_begun()
+        lanes, waiting = self._lanes, self._waiting
+        waits = waiting.size > 0
+        went = ~self._over if waits else self._all
         if waits and self.autoreset_mode is AutoresetMode.DISABLED:
             raise error.ResetNeeded(
-                f"episodes of lanes {np.flatnonzero(over).tolist()} are over: call "
+                f"episodes of lanes {waiting.tolist()} are over: call "
                 "reset(options={'reset_mask': terminated | truncated})"
             )
         try:
@@ -280,15 +291,15 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
             raise _refused(wrong) from None
         self._decisions += 1
         if waits:  # what was over begins anew with this step, whatever its action
-            self._begin(np.flatnonzero(over))
-            lanes.reward[~went] = 0.0
+            self._begin(waiting)
+            lanes.reward[waiting] = 0.0
         terminated = lanes.terminated & went
-        truncated = (self._decisions >= self._limit) & went & ~terminated
+        truncated = (self._decisions >= self.limit) & went & ~terminated
         reward = lanes.reward.copy()
         info = self._info(went)
         ended = terminated | truncated
-        self._over = ended
-        if ended.any():
+        self._over, self._waiting = ended, ended.nonzero()[0]
+        if self._waiting.size:
             self._tell_ends(ended, terminated, info)
         return lanes.observation.copy(), reward, terminated, truncated, info
 
@@ -314,6 +325,7 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
         self._lanes.begin(chosen)
         self._decisions[chosen] = 0
         self._over[chosen] = False
+        self._waiting = self._over.nonzero()[0]
 
     def _seed(self, seed: int | Sequence[int | None] | None) -> None:
         if seed is None:
@@ -345,21 +357,23 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
     def _info(self, went: Array) -> Info:
         terms, batch = self._lanes.terms.copy(), self._lanes.batch
         certificate = np.maximum(batch.complementarity, batch.cone)
-        info: Info = {name: terms[:, place] for place, name in enumerate(TERMS)}
+        info: Info = {name: terms[:, place] for place, name in enumerate(self._lanes.names)}
+        info["contact_force"] = batch.contact_force.copy()
         info["certificate"] = np.maximum(certificate, batch.non_penetration, out=certificate)
-        info |= {f"_{name}": went for name in (*TERMS, "certificate")}
+        info |= dict.fromkeys(self._masks, went)
         return info
 
     def _tell_ends(self, ended: Array, terminated: Array, info: Info) -> None:
         """Tell why episodes have ended; begin anew what does so with the same step."""
-        lanes, over = self._lanes, np.flatnonzero(ended)
-        causes = np.full(self.num_envs, None, dtype=object)
-        for lane in np.flatnonzero(terminated).tolist():
-            causes[lane] = lanes.cause(lane)
-        if terminated.any():
+        lanes, fell = self._lanes, terminated.nonzero()[0].tolist()
+        if fell:
+            causes = np.full(self.num_envs, None, dtype=object)
+            for lane in fell:
+                causes[lane] = lanes.cause(lane)
             info["cause"], info["_cause"] = causes, terminated.copy()
         if self.autoreset_mode is not AutoresetMode.SAME_STEP:
             return
+        over = self._waiting
         final = np.full(self.num_envs, None, dtype=object)
         for lane in over.tolist():
             final[lane] = lanes.observation[lane].copy()
@@ -370,7 +384,7 @@ class RunningVectorEnv(VectorEnv[Floats, Array, Array]):
         } | {f"_{name}": ended.copy() for name in names}  # fmt: skip
         info["_final_info"] = ended.copy()
         self._begin(over)
-        for place, name in enumerate(TERMS[:2]):
+        for place, name in enumerate(lanes.names[:AT_RESET]):
             info[name] = lanes.terms[:, place].copy()
 
 
@@ -379,11 +393,9 @@ def _made(kind: Any, arguments: tuple[Any, ...], options: Info) -> Any:
 
 
 def _course(task: str, lanes: int, changes: Info, threads: int = 1) -> Course:
-    if task not in RUNNING:
-        raise ValueError(f"there is no task {task!r}; there are {', '.join(RUNNING)}")
     if not isinstance(lanes, int) or lanes < 1:
         raise ValueError(f"num_envs must be a whole number ≥ 1, got {lanes!r}")
-    return Course(replace(RUNNING[task], **changes), lanes, threads=threads)
+    return course_of(named_task(task, **changes), lanes, threads=threads)
 
 
 def _metadata(course: Course) -> Info:
@@ -411,13 +423,13 @@ def _check_begun(state: str) -> None:
 def register() -> None:
     """Register the environments with Gymnasium, unless they are."""
     module = __name__
-    for task, each in RUNNING.items():
+    for task in NAMES:
         name = f"heelstrike/{task}-v0"
         if name not in gymnasium.registry:
             gymnasium.register(
-                name, entry_point=f"{module}:RunningEnv", kwargs={"task": task},
-                vector_entry_point=f"{module}:RunningVectorEnv",
-                max_episode_steps=each.max_episode_steps,
+                name, entry_point=f"{module}:TaskEnv", kwargs={"task": task},
+                vector_entry_point=f"{module}:TaskVectorEnv",
+                max_episode_steps=named_task(task).max_episode_steps,
             )  # fmt: skip
 
 

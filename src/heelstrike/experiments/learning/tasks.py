@@ -93,6 +93,11 @@ class RunningTask:
         """Seconds from one decision to the next."""
         return self.step * self.frame_skip
 
+    @property
+    def about(self) -> dict[str, str]:
+        """What a policy tells of the task that it was trained for."""
+        return {"task": self.file}
+
     def robot(self) -> Robot:
         """Load the robot.
 

@@ -1,13 +1,9 @@
-"""Proximal policy optimisation (Schulman et al. 2017) of running tasks, in NumPy."""
+"""Proximal policy optimisation (Schulman et al. 2017), in NumPy."""
 
 from __future__ import annotations
 
-import io
 import json
 import os
-import struct
-import zipfile
-import zlib
 from collections.abc import Callable
 from dataclasses import asdict, field
 from pathlib import Path
@@ -16,13 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.array_file import DAMAGED, read_arrays, write_arrays
 from heelstrike.control.policy.network import Layer, Network
 from heelstrike.errors import SimulationError
-from heelstrike.experiments.learning.course import Course
+from heelstrike.experiments.learning.courses import LearningTask, course_of
 from heelstrike.experiments.learning.perceptron import Adam, Array, Perceptron
-from heelstrike.experiments.learning.tasks import RunningTask
 from heelstrike.field_texts import dataclass
-from heelstrike.whole_file import write_whole
 
 Floats = NDArray[np.float64]
 
@@ -60,6 +55,10 @@ class Recipe:
     """Standard deviation of actions at the beginning."""
     seed: int = 0
     """Of everything that is random."""
+
+
+WALKING = Recipe(epochs=8, rate=1e-3, first_deviation=0.25)
+"""How walking is learned, from a motion that is followed already."""
 
 
 @dataclass
@@ -105,7 +104,7 @@ class Trainer:
 
     Parameters
     ----------
-    task : RunningTask
+    task : RunningTask or WalkTask
         The task.
     decisions : int
         Decisions to learn from, over all.
@@ -116,12 +115,12 @@ class Trainer:
     """
 
     def __init__(
-        self, task: RunningTask, decisions: int, recipe: Recipe | None = None, *, threads: int = 1
+        self, task: LearningTask, decisions: int, recipe: Recipe | None = None, *, threads: int = 1
     ) -> None:
         self.task, self.recipe = task, Recipe() if recipe is None else recipe
         recipe = self.recipe
         self.decisions, self.round = int(decisions), 0
-        self.course = Course(task, recipe.lanes, threads=threads)
+        self.course = course_of(task, recipe.lanes, threads=threads)
         self.random = np.random.default_rng(recipe.seed)
         observed, actions = self.course.observation.shape[1], self.course.robot.nu
         self.actor = Perceptron((observed, *recipe.hidden, actions), self.random, 0.01)
@@ -182,7 +181,7 @@ class Trainer:
         Network
             For :class:`heelstrike.Policy`.
         """
-        parameters, task = self.actor.parameters, self.task
+        parameters = self.actor.parameters
         last = len(parameters) - 2
         layers = tuple(
             Layer(
@@ -191,12 +190,13 @@ class Trainer:
             )
             for i in range(0, last + 1, 2)
         )  # fmt: skip
-        return Network(
-            layers, task.decision_period, self.course.gear, self.observations.mean,
-            self.observations.deviation, LIMIT,
-            int(task.exclude_current_positions_from_observation), task.velocity_limit,
-            self.course.robot.name, {"task": task.file, "seed": str(self.recipe.seed)},
-        )  # fmt: skip
+        return self.course.network(
+            layers,
+            self.observations.mean,
+            self.observations.deviation,
+            observation_limit=LIMIT,
+            about={**self.task.about, "seed": str(self.recipe.seed)},
+        )
 
     def keep(self, path: str | os.PathLike[str]) -> Path:
         """Keep everything that the further course hangs on in a file.
@@ -218,9 +218,7 @@ class Trainer:
             "count": [self.observations.count, self.returns.count],
         }  # fmt: skip
         arrays = {f"array.{i}": each for i, each in enumerate(self._arrays())}
-        image = io.BytesIO()
-        np.savez(image, allow_pickle=False, state=np.array(json.dumps(state)), **arrays)
-        return write_whole(path, image.getbuffer())
+        return write_arrays(path, {"state": json.dumps(state), **arrays})
 
     def restore(self, path: str | os.PathLike[str]) -> None:
         """Go on from a file, as if there had been no break.
@@ -235,9 +233,8 @@ class Trainer:
         SimulationError
             If it is another, damaged, or cannot be read.
         """
+        arrays = read_arrays(path, _KEPT, SimulationError)
         try:
-            with np.load(Path(path), allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
             state = json.loads(str(arrays["state"]))
             mine = json.loads(json.dumps([asdict(self.recipe), asdict(self.task), self.decisions]))
             same = [state["recipe"], state["task"], state["decisions"]] == mine
@@ -248,10 +245,8 @@ class Trainer:
             self._lately = [tuple(each) for each in state["lately"]]
             self.curve = Curve(**state["curve"])
             self.observations.count, self.returns.count = state["count"]
-        except OSError as error:
-            raise SimulationError(f"{path}: cannot be read ({error.strerror or error})") from error
-        except (ValueError, KeyError, TypeError, EOFError, *_DAMAGED) as error:
-            raise SimulationError(f"{path}: not what a trainer keeps, or damaged") from error
+        except DAMAGED as error:
+            raise SimulationError(f"{path}: not {_KEPT}, or damaged") from error
         if not same:
             raise SimulationError(
                 f"{path}: kept of another task, recipe or number of decisions; begin afresh, or "
@@ -379,4 +374,4 @@ class Trainer:
         self.best = max(self.best, curve.mean_return[-1])
 
 
-_DAMAGED = (zipfile.BadZipFile, zlib.error, struct.error, AssertionError)
+_KEPT = "what a trainer keeps"

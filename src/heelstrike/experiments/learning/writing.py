@@ -11,8 +11,10 @@ from pathlib import Path
 from heelstrike.contact.ground import Ground
 from heelstrike.control.policy.law import Policy
 from heelstrike.control.policy.network import Network
-from heelstrike.experiments.learning.tasks import RunningTask
+from heelstrike.experiments.learning.courses import LearningTask
 from heelstrike.experiments.learning.training import Curve, Trainer
+from heelstrike.experiments.learning.walk_task import WalkTask
+from heelstrike.robot.state import State
 from heelstrike.sim import Run, TimeStepping, simulate
 from heelstrike.view.style import new_figure, save_figure, styled
 from heelstrike.whole_file import write_whole
@@ -24,15 +26,15 @@ SHOWN = 10.0
 """Seconds of the run that is shown."""
 
 
-def run_of(network: Network, task: RunningTask, *, duration: float = SHOWN) -> Run:
+def run_of(network: Network, task: LearningTask, *, duration: float = SHOWN) -> Run:
     """Simulate a policy from the initial state of its task, without noise.
 
     Parameters
     ----------
     network : Network
         The policy.
-    task : RunningTask
-        Its task.
+    task : RunningTask or WalkTask
+        Its task; a walker is commanded a speed in the middle.
     duration : float
         How long at most (s).
 
@@ -41,9 +43,15 @@ def run_of(network: Network, task: RunningTask, *, duration: float = SHOWN) -> R
     Run
         The run, up to a fall.
     """
-    robot = task.robot()
+    robot, state, speed = task.robot(), None, None
+    if isinstance(task, WalkTask):
+        reference = task.motion()
+        middle = reference.speed.size // 2
+        begin, speed = reference.motion[middle, 0], float(reference.speed[middle])
+        state = State(begin[: robot.nq], begin[robot.nq : robot.nq + robot.nv])
     return simulate(
-        robot, Policy(network, robot), state=robot.reference_state(), duration=duration,
+        robot, Policy(network, robot, speed=speed), duration=duration,
+        state=robot.reference_state() if state is None else state,
         method=TimeStepping(step=task.step), ground=Ground(friction=task.friction),
     )  # fmt: skip
 

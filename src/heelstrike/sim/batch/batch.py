@@ -102,7 +102,9 @@ class Batch:
         How each lane came back, 0 or 1 of those that can go on: an
         :class:`~heelstrike.sim.frame.Outcome`.
     command : (n, nu) float
-        Torques (N m) that :class:`~heelstrike.HeldTorque` holds; write into it.
+        Torques (N m) that :class:`~heelstrike.HeldTorque` holds; write into it. Laws that are
+        commanded with something else (:attr:`~heelstrike.control.Law.commanded`) have as many
+        columns as that.
 
     Raises
     ------
@@ -179,11 +181,12 @@ class Batch:
         self._outcome = np.full(count, WENT_ON, dtype=np.int64)
         self.outcome: Integers = _read_only(self._outcome)
         self.events: Integers = _read_only(self._lanes.events)
-        self.command: Floats = np.zeros((count, self.robot.nu))
+        width = commanded_width(plans)
+        self.command: Floats = np.zeros((count, width))
         for row, lane in zip(self.command, self._lanes.lanes, strict=True):
             if lane.commanded is not None:
                 row[:] = lane.commanded
-        self._command = np.array([address_of_array(self.command), self.robot.nu], dtype=np.int64)
+        self._command = np.array([address_of_array(self.command), width], dtype=np.int64)
         self._find_columns()
         self._tell_apart()
 
@@ -375,6 +378,26 @@ class Batch:
             self._outcome[chosen] = WENT_ON
             self._has_ended = bool((self._outcome > WENT_ON).any())
 
+    def _renew(
+        self, index: int, *, pushes: Sequence[Push] | None = None, ground: Ground | None = None
+    ) -> None:
+        """Give a lane that is about to begin anew other pushes, as many as it has, or ground.
+
+        That is some thirty times as quick as :meth:`lay`: nothing else of the lane is looked at.
+        """
+        lane, setting = self._lanes.lanes[index], self._plans[index].setting
+        if pushes is not None:
+            if len(pushes) != len(setting.pushes):
+                raise SimulationError(
+                    f"lane {index} has {len(setting.pushes)} pushes, and is given {len(pushes)}"
+                )
+            setting = replace(setting, pushes=tuple(pushes))
+        if ground is not None:
+            setting = replace(setting, ground=ground)
+        lane.renew(setting)
+        self._lanes.find(index)
+        self._plans[index] = self._plans[index]._replace(setting=setting)
+
     def lay(
         self,
         index: int,
@@ -436,6 +459,7 @@ class Batch:
             if len(plans) != 1:
                 raise SimulationError(f"one lane is laid at once, got arguments for {len(plans)}")
             self._lanes.refuse_others(plans)
+            commanded_width(plans, (self.command.shape[1],))
             compile_all(self.method, plans)
             self._lanes.lay(index, plans[0])
         self._plans[index] = plans[0]
@@ -651,6 +675,17 @@ _OUTCOME_OF = {
     RunStatus.SOLVER_FAILED: int(Outcome.SOLVER_FAILED),
     RunStatus.CONTROLLER_FAILED: int(Outcome.BAD_CONTROLLER),
 }
+
+
+def commanded_width(plans: Sequence[Plan], others: Sequence[int] = ()) -> int:
+    """Return how many numbers each lane is commanded with, or refuse lanes that differ in it."""
+    laws = [plan.law for plan in plans if plan.law.commanded]
+    found = {*others, *(int(getattr(law.parameters, law.commanded).size) for law in laws)}
+    if len(found) > 1:
+        raise SimulationError(
+            f"all lanes of a batch are commanded with as many numbers, got {sorted(found)}"
+        )
+    return found.pop() if found else plans[0].setting.robot.nu
 
 
 def checked_threads(threads: int, lanes: int) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,13 @@ from heelstrike.sim.batch.planning import Plan
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.controller.control import TRUSTED
-from heelstrike.sim.controller.held_torque import Command
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.frame import Outcome
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method
+from heelstrike.sim.push import pushes_on
 from heelstrike.sim.run import Run, counted
+from heelstrike.sim.setting import Setting
 from heelstrike.sim.simulation import NEVER, Simulation
 
 
@@ -69,6 +71,7 @@ class Lane(Simulation):
     ) -> None:  # fmt: skip
         self._begin(plan.setting, method, memory, clock, keep_rows)
         self._event_counts = events
+        self._commanded = plan.law.commanded
         self._control_with(plan.law)
         self._new_record()
 
@@ -92,9 +95,9 @@ class Lane(Simulation):
 
     @property
     def commanded(self) -> NDArray[np.float64] | None:
-        """Torques that its law holds (nu,), if that is what it does."""
-        parameters: Any = self._numbers.parameters
-        return parameters.torque if isinstance(parameters, Command) else None
+        """What its law is commanded with, if it is."""
+        name = self._commanded
+        return getattr(self._numbers.parameters, name) if name else None
 
     @property
     def places(self) -> list[int]:
@@ -129,6 +132,21 @@ class Lane(Simulation):
     def came_to(self, outcome: int) -> None:
         """Note why compiled code came back that moved it."""
         self.status, self.message = self._ending(Outcome(outcome))
+
+    def renew(self, setting: Setting) -> None:
+        """Take ground and pushes, as many as before, of another setting.
+
+        It has to begin anew before it moves.
+        """
+        if setting.pushes is not self._pushes and setting.pushes:
+            mine, its = self._memory.pushes, pushes_on(self.robot, setting.pushes)
+            for name in ("link", "point", "force", "start", "end"):
+                getattr(mine, name)[:] = getattr(its, name)
+        self._pushes = setting.pushes
+        if setting.ground is not self._ground:
+            self._ground = setting.ground
+            self._choose_loop()
+        self._setting = replace(self._setting, pushes=setting.pushes, ground=setting.ground)
 
     def begin_anew(self) -> None:
         """Forget in Python, too, what was before its memory was put back."""

@@ -53,6 +53,8 @@ class HeldTorque(Law):
     'completed'
     """
 
+    commanded = "torque"
+
     @takes(ControllerError)
     def __init__(self, robot: Robot, torque: ArrayLike = 0.0) -> None:
         held = per_actuator("torque", torque, robot)

@@ -317,6 +317,10 @@ class Law:
     keeps_period: ClassVar[bool] = False
     """Whether it cannot be called at other times than its own."""
 
+    commanded: ClassVar[str] = ""
+    """Name of the array among its parameters that is commanded from outside, call by call; empty
+    if there is none. Batches have the row of each lane in `command`."""
+
     def __init__(
         self,
         function: ControllerFunction,
