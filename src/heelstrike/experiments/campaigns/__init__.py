@@ -1,0 +1,8 @@
+"""Campaigns: thousands of trials of a walk with other numbers in each, and one verdict."""
+
+from heelstrike.experiments.campaigns.campaign import Campaign, Progress
+from heelstrike.experiments.campaigns.outcome import Outcome
+from heelstrike.experiments.campaigns.parameters import Draw, Share
+from heelstrike.experiments.campaigns.results import CampaignResults
+
+__all__ = ["Campaign", "CampaignResults", "Draw", "Outcome", "Progress", "Share"]
