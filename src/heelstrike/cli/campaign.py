@@ -69,13 +69,12 @@ def campaign(
 
                 made, _ = kept_campaign(Path(folder), method_called)
                 results = made.load(folder)
-            _tell(results, as_json=as_json)
+            _tell(results, Path(folder), as_json=as_json)
         case [file] if file not in ("replay", "verdict"):
             folder = out or Path(Path(file).stem)
             results = _run(file, folder, workers, processes, scheduler, afresh=afresh)
             wrote(folder)
-            _tell(results, as_json=as_json)
-            tell(f"in {folder}: campaign.sqlite")
+            _tell(results, folder, as_json=as_json)
             tell(f"heelstrike campaign replay {folder} NUMBER walks a trial again")
         case _:
             complain(f"write heelstrike campaign {USAGE}")
@@ -114,13 +113,25 @@ def _run(
         )  # fmt: skip
 
 
-def _tell(results: CampaignResults, *, as_json: bool) -> None:
+def _tell(results: CampaignResults, folder: Path, *, as_json: bool) -> None:
+    """Print the verdict, and write its page."""
+    with stage("judging"):
+        from heelstrike.experiments.campaigns.page import save_campaign_page
+        from heelstrike.experiments.campaigns.verdict import verdict
+
+        found = verdict(results)
+        page = save_campaign_page(results, folder / "verdict.html", command=this_command())
+    wrote(page)
     if as_json:
-        good = int(results.success.sum())
-        told = {"trials": len(results), "success": good, "causes": results.causes}
+        told = {
+            "trials": len(results), "success": found.success.count,
+            "interval": [found.success.low, found.success.high], "causes": results.causes,
+            "worst": found.worst,
+        }  # fmt: skip
         typer.echo(json.dumps(told, indent=2))
     else:
-        output().print(str(results))
+        output().print(str(found))
+    tell(f"in {folder}: campaign.sqlite, verdict.html")
 
 
 def _replay(folder: Path, number: int, *, film: bool, as_json: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from collections import deque
@@ -13,6 +14,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol
 
+from heelstrike.analysis.stability.largest import Largest, largest
 from heelstrike.analysis.stability.trial import Trial
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.campaigns.outcome import CRASHED, Outcome
@@ -30,6 +32,7 @@ from heelstrike.experiments.campaigns.trials import (
     check_parameters,
     chosen,
     inputs_digest,
+    judged_as_in,
     laid_out,
     replayed,
     run_block,
@@ -302,6 +305,41 @@ class Campaign:
         _, trial = chosen(self.trials, values)
         lane = laid_out(trial, values, int(self.plan.seeds[number]))
         return replayed(trial, lane, self.duration, **more)
+
+    def margin(
+        self, name: str, most: float, *, strides: int = 8, halvings: int = 4, unit: str = ""
+    ) -> Largest:
+        """Find how large one parameter may be while nothing else differs, by bisection.
+
+        Parameters
+        ----------
+        name : str
+            The parameter, such as ``"push.impulse"`` or ``"ground.slope"``.
+        most : float
+            Largest size tried; a negative one is tried downwards.
+        strides, halvings : int
+            As of :func:`heelstrike.analysis.stability.largest.largest`.
+        unit : str
+            Of its values.
+
+        Returns
+        -------
+        Largest
+            Sizes of both outcomes, without a sign.
+
+        Raises
+        ------
+        HeelstrikeError
+            If there is no such parameter, or a value is impossible.
+        """
+        trial = next(iter(self.trials.values()))
+        sign, seed = math.copysign(1.0, most), int(self.plan.seeds[0])
+
+        def recovers(size: float) -> bool:
+            lane = laid_out(trial, {name: sign * size}, seed)
+            return judged_as_in(trial, replayed(trial, lane, self.duration)).success
+
+        return largest(recovers, most=abs(most), strides=strides, halvings=halvings, unit=unit)
 
     def gait(self, number: int) -> Gait | None:
         """Return the gait that the robot of a trial follows; None if its law follows none.

@@ -105,7 +105,7 @@ def _simulated(
         found = {}
         for index, lane in lanes:
             try:
-                found[index] = _judged(replayed(trial, lane, block.duration), trial)
+                found[index] = judged_as_in(trial, replayed(trial, lane, block.duration))
             except Exception as error:
                 found[index] = failed(error)
         return found
@@ -123,7 +123,7 @@ def _simulated(
             control_period=trial.control_period, record_every=ROWS, on_error=OnError.STOP,
             threads=1, time_limit=block.limit, progress=look,
         )  # fmt: skip
-        return {i: _judged(result.run(k), trial) for k, (i, _) in enumerate(lanes)}
+        return {i: judged_as_in(trial, result.run(k)) for k, (i, _) in enumerate(lanes)}
     except Exception as error:
         if len(lanes) == 1 or (stopped is not None and stopped()):
             return {index: failed(error) for index, _ in lanes}
@@ -133,7 +133,8 @@ def _simulated(
         )
 
 
-def _judged(run: Run, trial: Trial) -> Outcome:
+def judged_as_in(trial: Trial, run: Run) -> Outcome:
+    """Judge the run of a trial, by the gait that its law follows, if it follows one."""
     return judged(run, getattr(trial.controller, "gait", None))
 
 
