@@ -15,7 +15,7 @@ from time import perf_counter
 from typing import Any, Protocol
 
 from heelstrike.analysis.stability.largest import Largest, largest
-from heelstrike.analysis.stability.trial import Trial
+from heelstrike.analysis.stability.trial import ROWS, Trial
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.campaigns.outcome import CRASHED, Outcome
 from heelstrike.experiments.campaigns.parameters import Draw, Share, planned
@@ -277,15 +277,15 @@ class Campaign:
             refuse_another(connection, self.about, Path(folder))
             return self._results(outcomes_in(connection))
 
-    def replay(self, number: int, **more: Any) -> Run:
+    def replay(self, number: int, *, record_every: int = ROWS) -> Run:
         """Simulate one trial alone, as it was in the campaign to the last bit.
 
         Parameters
         ----------
         number : int
             Which.
-        **more
-            Other arguments of :func:`~heelstrike.simulate`, such as ``record_every=1``.
+        record_every : int
+            Steps of the method between two rows.
 
         Returns
         -------
@@ -304,7 +304,7 @@ class Campaign:
         values = self.plan.of(number)
         _, trial = chosen(self.trials, values)
         lane = laid_out(trial, values, int(self.plan.seeds[number]))
-        return replayed(trial, lane, self.duration, **more)
+        return replayed(trial, lane, self.duration, record_every)
 
     def margin(
         self, name: str, most: float, *, strides: int = 8, halvings: int = 4, unit: str = ""
@@ -342,12 +342,17 @@ class Campaign:
         return largest(recovers, most=abs(most), strides=strides, halvings=halvings, unit=unit)
 
     def gait(self, number: int) -> Gait | None:
-        """Return the gait that the robot of a trial follows; None if its law follows none.
+        """Return the gait that the robot of a trial follows.
 
         Parameters
         ----------
         number : int
             Which.
+
+        Returns
+        -------
+        Gait or None
+            Nothing if its law follows none.
         """
         _, trial = chosen(self.trials, self.plan.of(number))
         found: Gait | None = getattr(trial.controller, "gait", None)

@@ -88,12 +88,12 @@ def laid_out(trial: Trial, values: Mapping[str, Any], seed: int) -> Laid:
     return laid(trial, {name: each for name, each in values.items() if name != TRIAL}, seed)
 
 
-def replayed(trial: Trial, lane: Laid, duration: float, **more: Any) -> Run:
+def replayed(trial: Trial, lane: Laid, duration: float, record_every: int = ROWS) -> Run:
     """Simulate a trial alone, to the last bit as in its block."""
     return simulate(
         lane.robot, lane.controller, state=lane.state, duration=duration, method=trial.method,
         ground=lane.ground, pushes=lane.pushes, control_period=trial.control_period,
-        on_error=OnError.STOP, **{"record_every": ROWS} | more,
+        on_error=OnError.STOP, record_every=record_every,
     )  # fmt: skip
 
 
