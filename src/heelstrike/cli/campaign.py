@@ -71,11 +71,11 @@ def campaign(
                 results = made.load(folder)
             _tell(results, Path(folder), as_json=as_json)
         case [file] if file not in ("replay", "verdict"):
-            folder = out or Path(Path(file).stem)
-            results = _run(file, folder, workers, processes, scheduler, afresh=afresh)
-            wrote(folder)
-            _tell(results, folder, as_json=as_json)
-            tell(f"heelstrike campaign replay {folder} NUMBER walks a trial again")
+            into = out or Path(Path(file).stem)
+            results = _run(file, into, workers, processes, scheduler, afresh=afresh)
+            wrote(into)
+            _tell(results, into, as_json=as_json)
+            tell(f"heelstrike campaign replay {into} NUMBER walks a trial again")
         case _:
             complain(f"write heelstrike campaign {USAGE}")
             raise typer.Exit(2)

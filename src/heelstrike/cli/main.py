@@ -8,6 +8,7 @@ import typer
 
 from heelstrike import __version__
 from heelstrike.cli.campaign import campaign
+from heelstrike.cli.check import check
 from heelstrike.cli.compare import compare
 from heelstrike.cli.inspect import inspect
 from heelstrike.cli.paper import paper
@@ -35,6 +36,7 @@ for command in (
     transfer,
     zoo,
     campaign,
+    check,
     paper,
     compare,
     robots,

@@ -146,25 +146,30 @@ class Trial:
         """
         own = self.ground.model()
         if slope == 0.0 and roughness == 0.0:
-            given = {"friction": friction, "restitution": restitution}
-            return replace(self.ground, **{k: x for k, x in given.items() if x is not None})
+            mu = self.ground.friction if friction is None else friction
+            bounce = self.ground.restitution if restitution is None else restitution
+            return replace(self.ground, friction=mu, restitution=bounce)
         if len(own.friction) > 1:
             raise SimulationError(
                 "a trial's own ground must be level: disturbances lay other ground"
             )
         if not abs(slope) < 0.5 * np.pi:
             raise SimulationError(f"the slope must lie within ±π/2 rad, got {slope}")
-        numbers = {
-            "friction": float(own.friction[0]) if friction is None else friction,
-            "restitution": float(own.restitution[0]) if restitution is None else restitution,
-        }
+        mu = float(own.friction[0]) if friction is None else friction
+        bounce = float(own.restitution[0]) if restitution is None else restitution
         edge = self.edge
         if roughness == 0.0:
             corners = [(edge - 1.0, 0.0), (edge, 0.0), (edge + FAR, np.tan(slope) * FAR)]
-            return Ground(profile=np.array(corners), **numbers)
+            return Ground(friction=mu, restitution=bounce, profile=np.array(corners))
         length = 3.0 * self.speed * (self.begins + self.settling) + 2.0
         rough = Ground.rough(
-            amplitude=roughness, spacing=spacing, length=length, seed=seed, start=edge, **numbers
+            amplitude=roughness,
+            spacing=spacing,
+            length=length,
+            seed=seed,
+            start=edge,
+            friction=mu,
+            restitution=bounce,
         )
         if slope == 0.0:
             return rough

@@ -204,7 +204,7 @@ def _distribution(given: Any, where: str) -> Any:
         if name == "uniform" and listed:
             low, high = listed
             return stats.uniform(low, high - low)
-        known = getattr(stats, {"normal": "norm"}.get(name, name), None)
+        known = getattr(stats, "norm" if name == "normal" else str(name), None)
         if not isinstance(known, stats.rv_continuous | stats.rv_discrete):
             guess = meant(name, {each: repr(each) for each in ("uniform", "normal", "truncnorm")})
             raise SimulationError(f"{where}: scipy.stats has no distribution {name!r}.{guess}")

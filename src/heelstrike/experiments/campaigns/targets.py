@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -260,7 +261,7 @@ def _controller(law: Any, given: list[tuple[Target, float]]) -> Any:
     parameters = law.parameters
     for each, value in given:
         path = [each.number, *filter(None, each.where.split("."))]
-        parameters = _changed(parameters, path, lambda now, of=each, to=value: of.applied(now, to))
+        parameters = _changed(parameters, path, partial(each.applied, value=value))
     return law.with_parameters(parameters)
 
 
