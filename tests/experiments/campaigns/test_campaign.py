@@ -319,7 +319,7 @@ def test_several_trials_are_chosen_by_name() -> None:
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"trial": "bravo7"}, "a campaign is of a Trial"),
+        ({"trial": "bravo7"}, "trial must be a Trial or a mapping"),
         ({"trial": {}}, "a campaign is of a Trial"),
         ({"seed": -1}, "seed must be"),
         ({"duration": 0.0}, "duration of trials"),

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 
 from heelstrike.analysis.stability.largest import Largest, largest
 from heelstrike.analysis.stability.trial import ROWS, Trial
+from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.campaigns.outcome import CRASHED, Outcome
 from heelstrike.experiments.campaigns.parameters import Draw, Share, planned
@@ -141,6 +142,7 @@ class Campaign:
     4
     """
 
+    @takes(SimulationError)
     def __init__(
         self,
         trial: Trial | Mapping[str, Trial],

@@ -364,10 +364,11 @@ class _Work:
         """Simulate a run to its end, or until it has taken too long."""
         end = thread_time() + self._limit
         ending = lane.to_the_end(duration, lambda: self._stop.is_set() or thread_time() > end)
-        if ending.status is RunStatus.INTERRUPTED and not self._stop.is_set():
-            late = f"took more than {self._limit:g} s of the processor: {ending.message}"
-            run = ending.run and replace(ending.run, message=late)
-            return replace(ending, message=late, run=run)
+        late = thread_time() > end and not self._stop.is_set()
+        if late and ending.status is RunStatus.INTERRUPTED:
+            told = f"took more than {self._limit:g} s of the processor: {ending.message}"
+            run = ending.run and replace(ending.run, message=told)
+            return replace(ending, message=told, run=run)
         return ending
 
     def _show(self, show: Callable[[int, int], None]) -> None:
