@@ -23,6 +23,9 @@ BLAS_KERNELS ?= $(if $(filter x86_64 amd64 AMD64,$(shell uname -m)),Nehalem Hasw
 SAMPLE := tests/compiler/test_plain_code.py tests/compiler/test_straight_line.py tests/contact \
 	tests/sim/contacts/test_geometry.py tests/experiments/test_paper.py
 
+# Tests start Python some hundred times: what it makes of the sources is kept, whatever is said elsewhere.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help walk peers pinocchio test test-plain test-blas test-perturbed test-sample test-numba test-documented bench check check-all docs clean
 

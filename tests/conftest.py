@@ -7,8 +7,10 @@ import os
 import platform
 import signal
 import tempfile
+from collections.abc import Generator
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 # Matplotlib reads this when it is imported; processes that tests start inherit it.
 os.environ["MPLBACKEND"] = "Agg"
@@ -25,6 +27,13 @@ settings.register_profile(
 # Continuous integration asks the same questions each time: a failure is the change's doing.
 settings.register_profile("ci", settings.get_profile("local"), derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file() -> Generator[None, list[Any], list[Any]]:
+    """Look for doctests in the package alone: here there are none, and looking takes long."""
+    found = yield
+    return [each for each in found if type(each) is pytest.Module]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

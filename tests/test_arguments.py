@@ -75,6 +75,12 @@ def usual() -> dict[str, dict[str, Any]]:
         "disturbance_response": {**walked, "disturbances": {}},
         "find_limit_cycle": walked,
         "floquet_multipliers": walked,
+        "load_motion": {"path": "motion.json"},
+        "optimize_motion": {
+            "robot": robot,
+            "phases": [hs.ContactPhase("right_foot")],
+            "speed": 0.4,
+        },
         "gait_family": {"robot": robot, "speed": [0.4]},
         "gait_sensitivity_norm": dict.fromkeys("ABCD", 0.5 * ONE),
         "human": {},
@@ -107,12 +113,12 @@ def usual() -> dict[str, dict[str, Any]]:
 
 RESULTS = """ActiveContacts BatchResult CampaignResults DisturbanceResponse Floquet Gait GaitFamily
 Gradient Largest
-LimitCycle ModeChange Monodromy PhasedGait Robot Run RunDerivatives Snapshot StepDerivatives
+LimitCycle ModeChange Monodromy Motion PhasedGait Robot Run RunDerivatives Snapshot StepDerivatives
 StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
-TOLD_APART = """Bundle Constraint EndOfRun GaitLQR GroundShape SteppingConstraints
-VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell controller number part
-watch"""
+TOLD_APART = """Bundle Constraint ContactPhase EndOfRun GaitLQR GroundShape MotionTracking
+SteppingConstraints VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell
+controller number part watch"""
 """Declarations of controllers, laws, classes to derive from, and the viewer, whose own tests have
 this."""
 WRONG = ("0.5", None, object(), ["a"], {"a": 1}, 1j, b"x", [[1, [2]]], 2.5, hs.load_robot)

@@ -80,6 +80,7 @@ if TYPE_CHECKING:
     from heelstrike.control import GaitLQR as GaitLQR
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
+    from heelstrike.control import MotionTracking as MotionTracking
     from heelstrike.control import Policy as Policy
     from heelstrike.control import Sensed as Sensed
     from heelstrike.control import StandingLQR as StandingLQR
@@ -104,15 +105,20 @@ if TYPE_CHECKING:
     from heelstrike.experiments.campaigns import CampaignResults as CampaignResults
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.experiments.spring_mass import SpringMass as SpringMass
+    from heelstrike.gait import ContactPhase as ContactPhase
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import GaitFamily as GaitFamily
+    from heelstrike.gait import Motion as Motion
     from heelstrike.gait import PhasedGait as PhasedGait
+    from heelstrike.gait import Repeat as Repeat
     from heelstrike.gait import StepFamily as StepFamily
     from heelstrike.gait import gait_family as gait_family
     from heelstrike.gait import load_gait as load_gait
     from heelstrike.gait import load_gait_family as load_gait_family
+    from heelstrike.gait import load_motion as load_motion
     from heelstrike.gait import make_invariant as make_invariant
     from heelstrike.gait import optimize_gait as optimize_gait
+    from heelstrike.gait import optimize_motion as optimize_motion
     from heelstrike.robot import Robot as Robot
     from heelstrike.robot import RobotBuilder as RobotBuilder
     from heelstrike.robot import RobotWarning as RobotWarning
@@ -169,6 +175,7 @@ _HOME = {
     "Compliant": "heelstrike.sim",
     "ComputedTorque": "heelstrike.control",
     "Constraint": "heelstrike.sim",
+    "ContactPhase": "heelstrike.gait",
     "ContactProblemError": "heelstrike.errors",
     "ControllerError": "heelstrike.errors",
     "ControllerWarning": "heelstrike.sim",
@@ -204,9 +211,12 @@ _HOME = {
     "LimitCycleError": "heelstrike.errors",
     "ModeChange": "heelstrike.sim.linearized.mode_changes",
     "Monodromy": "heelstrike.analysis.stability.monodromy",
+    "Motion": "heelstrike.gait",
+    "MotionTracking": "heelstrike.control",
     "PhasedGait": "heelstrike.gait",
     "Policy": "heelstrike.control",
     "Push": "heelstrike.sim",
+    "Repeat": "heelstrike.gait",
     "Robot": "heelstrike.robot",
     "RobotBuilder": "heelstrike.robot",
     "RobotError": "heelstrike.errors",
@@ -259,6 +269,7 @@ _HOME = {
     "linearize_impact": "heelstrike.contact",
     "load_gait": "heelstrike.gait",
     "load_gait_family": "heelstrike.gait",
+    "load_motion": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",
     "load_snapshot": "heelstrike.sim",
@@ -266,6 +277,7 @@ _HOME = {
     "monodromy": "heelstrike.analysis.stability.monodromy",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
+    "optimize_motion": "heelstrike.gait",
     "part": "heelstrike.compiler.bundle",
     "report": "heelstrike.view.report",
     "run_derivatives": "heelstrike.sim.linearized.derivatives",

@@ -25,18 +25,18 @@ def walked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Any]:
 
 
 @pytest.fixture
-def walk(
-    walked: tuple[Path, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Callable[..., Any]:
-    """Walk the gait of `walked` again, with other options, into ``tmp_path / "out"``.
-
-    Figures, which `walked` has drawn in earnest, are empty files here: they take most of the time.
-    """
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures, which `walked` has drawn in earnest, are empty files: they take most of the time."""
 
     def plot(run: hs.Run, what: str, *, path: Path, **_: Any) -> None:
         path.touch()
 
     monkeypatch.setattr(hs.Run, "plot", plot)
+
+
+@pytest.fixture
+def walk(walked: tuple[Path, Any], tmp_path: Path, undrawn: None) -> Callable[..., Any]:
+    """Walk the gait of `walked` again, with other options, into ``tmp_path / "out"``, undrawn."""
 
     def run(*options: str) -> Any:
         gait = str(walked[0] / "gait.json")

@@ -396,6 +396,7 @@ def test_a_law_of_ones_own_walks_and_its_code_is_named(
     assert f"the code of {file} has been run" in result.stderr.replace("\n", "")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_law_that_stands_takes_no_steps_and_is_well(tmp_path: Path) -> None:
     out = str(tmp_path / "out")
     options = ["--steps", "1", "--controller", "StandingLQR", "--animation", "none", "--out", out]
@@ -404,6 +405,7 @@ def test_a_law_that_stands_takes_no_steps_and_is_well(tmp_path: Path) -> None:
     assert not (tmp_path / "out" / "gait.json").exists()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_passive_walker_starts_on_its_cycle(tmp_path: Path) -> None:
     (tmp_path / "gait.json").write_text("of yesterday", encoding="utf-8")
     options = ["--ground", "slope:-3", "--steps", "4", "--animation", "none"]

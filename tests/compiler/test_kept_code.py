@@ -213,3 +213,89 @@ def test_processes_that_write_the_same_files_leave_whole_ones(
         assert list(threads.map(lambda _: run(program, cache), range(3))) == [[]] * 3
     assert len(kept(cache)) == 5
     assert all(is_whole(file) for file in kept(cache))
+
+
+ALONE = """
+import time
+from pathlib import Path
+from heelstrike.compiler.kept_code import KEY, alone, read, write
+
+places, key = [Path("cache")], b"k" * KEY
+with alone(places, "kernel"):
+    found = read(places, "kernel", key)
+    if found is None:
+        time.sleep(0.5)
+        write(places, "kernel", key, b"code")
+print(found)
+"""
+
+LOOP = """
+import pathlib
+import sys
+from numba import types
+from heelstrike.compiler.compilation import loop_for
+
+replace = pathlib.Path.replace
+
+def told(self, target):
+    print(pathlib.Path(target).name.split(".")[0], file=sys.stderr)
+    return replace(self, target)
+
+pathlib.Path.replace = told
+
+def loop(x):
+    return 2.0 * x
+
+sys.modules["loop_of_this"] = sys.modules["__main__"]
+loop.__module__ = "loop_of_this"
+print(loop_for(types.float64(types.float64), loop)(1.5))
+"""
+
+
+def at_once(program: str, folder: Path) -> list[tuple[str, str]]:
+    """What three processes print, and their errors."""
+    (folder / "program.py").write_text(program)
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache")}
+
+    def answer(_: int) -> tuple[str, str]:
+        done = fresh_python("program.py", cwd=folder, env=environment)
+        return done.stdout.strip(), done.stderr
+
+    with ThreadPoolExecutor() as threads:
+        return list(threads.map(answer, range(3)))
+
+
+def test_of_processes_that_need_the_same_one_makes_it(tmp_path: Path) -> None:
+    found = [printed for printed, _ in at_once(ALONE, tmp_path)]
+    assert sorted(found) == ["None", "b'code'", "b'code'"]
+    assert [file.name for file in kept(tmp_path / "cache")] == ["kernel"]
+
+
+@BY_PRIVATE_NAMES
+def test_a_loop_that_processes_need_at_once_is_compiled_by_one(tmp_path: Path) -> None:
+    answers = at_once(LOOP, tmp_path)
+    assert [printed for printed, _ in answers] == ["3.0"] * 3
+    made = "".join(errors for _, errors in answers).split()
+    assert made.count("loop_of_this") == 2  # as a module without constants, and finished
+
+
+@pytest.mark.parametrize("lock", ["no database", "a directory"])
+def test_where_nothing_can_be_locked_all_make_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lock: str
+) -> None:
+    if lock == "a directory":
+        (tmp_path / "kernel.lock").mkdir()
+    else:
+        monkeypatch.setitem(sys.modules, "sqlite3", None)
+    with kept_code.alone([tmp_path], "kernel"), kept_code.alone([tmp_path], "kernel"):
+        write([tmp_path], NAME, KEY, CODE)
+    assert read([tmp_path], NAME, KEY) == CODE
+    with kept_code.alone([], "kernel"):
+        pass
+
+
+def test_nobody_waits_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept_code, "LONGEST_WAIT", 0.1)
+    with kept_code.alone([tmp_path], "kernel"), kept_code.alone([tmp_path], "kernel"):
+        pass
+    assert kept(tmp_path) == []

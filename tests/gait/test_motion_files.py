@@ -9,7 +9,7 @@ import pytest
 import walking
 
 from heelstrike.errors import GaitError
-from heelstrike.gait.motion_files import load_motion
+from heelstrike.gait.motion_files import load_recorded_motion
 
 NAMES = walking.bravo7().actuator_names
 ROWS = np.linspace(-0.5, 0.5, 60).reshape(10, 6)
@@ -27,7 +27,7 @@ def test_columns_in_any_order_with_units_and_a_time(tmp_path: Path) -> None:
     names = [f"{NAMES[5].replace('_', ' ').title()} [deg]", *NAMES[:4], f"{NAMES[4]}_deg"]
     table = np.column_stack((1000.0 + 5.0 * np.arange(10), np.ones(10), ROWS))
     path = written(tmp_path, ";".join(["t [ms]", "battery", *names]), table, ";")
-    motion = load_motion(path, walking.bravo7())
+    motion = load_recorded_motion(path, walking.bravo7())
     np.testing.assert_allclose(motion.time, 5e-3 * np.arange(10), atol=1e-12)
     np.testing.assert_array_equal(motion.position[:, :4], ROWS[:, 1:5])
     np.testing.assert_allclose(motion.position[:, 4], np.deg2rad(ROWS[:, 5]))
@@ -38,11 +38,13 @@ def test_columns_in_any_order_with_units_and_a_time(tmp_path: Path) -> None:
 
 def test_a_rate_and_a_unit_that_the_file_does_not_say(tmp_path: Path) -> None:
     path = written(tmp_path, " ".join(NAMES), ROWS, " ")
-    motion = load_motion(path, walking.bravo7(), rate=50.0, unit="deg")
+    motion = load_recorded_motion(path, walking.bravo7(), rate=50.0, unit="deg")
     np.testing.assert_allclose(motion.time, np.arange(10) / 50.0)
     np.testing.assert_allclose(motion.position, np.deg2rad(ROWS))
     assert not motion.seems_degrees(walking.bravo7())
-    far = load_motion(written(tmp_path, ",".join(NAMES), 60.0 * ROWS), walking.bravo7(), rate=50.0)
+    far = load_recorded_motion(
+        written(tmp_path, ",".join(NAMES), 60.0 * ROWS), walking.bravo7(), rate=50.0
+    )
     assert far.seems_degrees(walking.bravo7())
 
 
@@ -65,18 +67,18 @@ def test_what_is_no_motion_is_refused(
     heading: str, rows: np.ndarray, words: str, tmp_path: Path
 ) -> None:
     with pytest.raises(GaitError, match=words):
-        load_motion(written(tmp_path, heading, rows), walking.bravo7())
+        load_recorded_motion(written(tmp_path, heading, rows), walking.bravo7())
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
     robot = walking.bravo7()
     with pytest.raises(GaitError, match="cannot be read"):
-        load_motion(tmp_path / "none.csv", robot)
+        load_recorded_motion(tmp_path / "none.csv", robot)
     (tmp_path / "empty.csv").write_text("")
     with pytest.raises(GaitError, match="nothing in it"):
-        load_motion(tmp_path / "empty.csv", robot)
+        load_recorded_motion(tmp_path / "empty.csv", robot)
     (tmp_path / "picture.csv").write_bytes(b"\xff\xd8\xff\xe0")
     with pytest.raises(GaitError, match="not a text file"):
-        load_motion(tmp_path / "picture.csv", robot)
+        load_recorded_motion(tmp_path / "picture.csv", robot)
     with pytest.raises(GaitError, match="rad or deg"):
-        load_motion(tmp_path / "empty.csv", robot, unit="grad")
+        load_recorded_motion(tmp_path / "empty.csv", robot, unit="grad")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import subprocess
 import sys
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import matplotlib
 import numpy as np
 import pytest
 import walking
+from figure_text import check_text
 from matplotlib.axes import Axes
 from PIL import Image
 from synthetic_runs import box, liftoff, make_run, pendulum, pushes, touchdown
@@ -44,6 +46,7 @@ def test_every_figure_is_a_picture_with_units(what: str, tmp_path: Path) -> None
     assert colors is not None
     assert len(colors) > 20  # not blank
     assert "bravo7" in figure.get_suptitle()
+    assert any(word.startswith("bravo7: ") for word in check_text(figure))
     for axes in figure.axes:
         if axes.axison:
             unit = axes.get_ylabel().removesuffix(")").split("(")[-1]
@@ -55,18 +58,24 @@ def test_every_figure_is_a_picture_with_units(what: str, tmp_path: Path) -> None
 @pytest.mark.parametrize("what", FIGURES)
 @pytest.mark.parametrize("kind", ["fall", "one row", "slope, without gait"])
 def test_unusual_runs_are_drawn_too(what: str, kind: str) -> None:
+    figure = plot(unusual(kind), what)
+    if kind == "fall":
+        check_text(figure)
+
+
+@cache
+def unusual(kind: str) -> hs.Run:
     robot = walking.bravo7()
+    if kind == "one row":
+        return make_run(robot, [0.5])
     if kind == "fall":
         state = hs.State(robot.model.reference, np.full(robot.nv, 0.4))
         run = hs.simulate(robot, state=state, duration=3.0)
         assert not run.completed
-    elif kind == "one row":
-        run = make_run(robot, [0.5])
-    else:
-        run = hs.simulate(
-            robot, state=robot.reference_state(), duration=0.2, ground=hs.Ground(slope=0.1)
-        )
-    plot(run, what)
+        return run
+    return hs.simulate(
+        robot, state=robot.reference_state(), duration=0.2, ground=hs.Ground(slope=0.1)
+    )
 
 
 @pytest.mark.parametrize("what", ["tracking", "torque", "energy", "snapshots"])

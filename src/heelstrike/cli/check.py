@@ -56,7 +56,7 @@ def check(
     """
     with stage("loading"):
         from heelstrike.experiments.checking import check_motion
-        from heelstrike.gait.motion_files import load_motion
+        from heelstrike.gait.motion_files import load_recorded_motion
         from heelstrike.robot import builtin_robots, load_robot
         from heelstrike.view.page.page import check_page, save_html
 
@@ -64,7 +64,7 @@ def check(
             check_page(page)
         built_in = robot in builtin_robots()
         machine = load_robot(robot) if built_in else load_robot(robot, **how.keywords())
-        motion = load_motion(trajectory, machine, rate=rate, unit=unit)
+        motion = load_recorded_motion(trajectory, machine, rate=rate, unit=unit)
     with stage("checking") as doing:
         found = check_motion(
             machine, motion, friction=friction, stiffness=stiffness, damping=damping,

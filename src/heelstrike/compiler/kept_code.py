@@ -9,10 +9,12 @@ A disk that is full or cannot be written costs time only.
 from __future__ import annotations
 
 import hashlib
+import importlib
 import time
 import uuid
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,9 @@ KEY = DIGEST = hashlib.sha256().digest_size
 
 FORGOTTEN = 3600.0
 """Age from which a half-written file is one of a killed process, in s."""
+
+LONGEST_WAIT = 300.0
+"""How long to wait for another process that compiles the same, in s."""
 
 _UNFINISHED = ".unfinished"
 
@@ -83,6 +88,37 @@ def write(places: Sequence[Path], name: str, key: bytes, code: bytes) -> None:
         unfinished.replace(unfinished.parent / name)
 
     _anywhere(places, keep)
+
+
+@contextmanager
+def alone(places: Sequence[Path], name: str) -> Iterator[None]:
+    """Make what is kept under a name while no other process does: others wait, and find it kept.
+
+    After ``LONGEST_WAIT``, and where no file can be locked, both make it.
+    """
+    place = first_writable(places)
+    held = place and _locked(place / f"{name}.lock")
+    try:
+        yield
+    finally:
+        if place and held:
+            held.close()
+            with suppress(OSError):  # somebody waits for it
+                (place / f"{name}.lock").unlink()
+
+
+def _locked(file: Path) -> Any:
+    """Lock a file as databases do: everywhere alike, and only as long as this process lives."""
+    try:
+        sqlite = importlib.import_module("sqlite3")
+    except ImportError:  # a Python that was built without it
+        return None
+    with suppress(sqlite.Error):
+        held = sqlite.connect(file, timeout=LONGEST_WAIT, isolation_level=None)
+        with suppress(sqlite.Error):
+            held.execute("BEGIN EXCLUSIVE")
+        return held
+    return None
 
 
 def first_writable(places: Sequence[Path]) -> Path | None:

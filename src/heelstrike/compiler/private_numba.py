@@ -22,7 +22,7 @@ import re
 import sys
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -104,7 +104,7 @@ class PrivateNumba(DocumentedNumba):
     ) -> tuple[Any, int]:
         """Compile a function for the C calling convention; return it and its address."""
         compiled = self.kept(function, boundscheck=boundscheck, separate=True)
-        self.compile(lambda: compiled.compile(signature))
+        self.compile(lambda: _separate(compiled, signature))
         compiled.disable_compile()
         result = compiled.get_compile_result(signature)
         return compiled, result.library.get_pointer_to_function(
@@ -240,14 +240,24 @@ def _loop(compiled: Any, cache: _Cache, signature: Any, fixed: Fixed) -> Any:
     asked, context = (signature, fixed), compiled.targetctx
     code = cache.read(asked)
     if code is None:
-        raw = cache.read(signature)
-        if raw is None:
-            compiled.compile(signature)
-            raw = dumps(compiled.get_compile_result(signature)._reduce())
-            cache.write(signature, raw)
-        code = dumps(_finished(context.codegen(), pickle.loads(raw), fixed))
-        cache.write(asked, code)
+        with cache.alone(signature):
+            code = cache.read(asked)
+            if code is None:
+                raw = cache.read(signature)
+                if raw is None:
+                    compiled.compile(signature)
+                    raw = dumps(compiled.get_compile_result(signature)._reduce())
+                    cache.write(signature, raw)
+                code = dumps(_finished(context.codegen(), pickle.loads(raw), fixed))
+                cache.write(asked, code)
     return cache.rebuilt(context, code)
+
+
+def _separate(compiled: Any, signature: Any) -> None:
+    """Load a separate kernel, or compile it."""
+    kept = compiled._cache.read(signature) is not None
+    with nullcontext() if kept else compiled._cache.alone(signature):
+        compiled.compile(signature)
 
 
 def _finished(codegen: Any, parts: tuple[Any, ...], fixed: Fixed) -> tuple[Any, ...]:
@@ -357,6 +367,11 @@ class _Cache(NullCache):
     def write(self, asked: Any, code: bytes) -> None:
         """Keep it for a signature, or for one with constants."""
         kept_code.write(self.places, *self._name_and_key(asked), code)
+
+    def alone(self, asked: Any) -> AbstractContextManager[None]:
+        """Make what is kept for a signature while no other process does."""
+        name, _ = self._name_and_key(asked)
+        return kept_code.alone(self.places, name)
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Keep machine code, unless it is good for this process only."""

@@ -24,10 +24,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from heelstrike.compiler.compilation import numba_in_use
-
-LONGEST_WAIT = 300.0
-"""How long to wait for another process to compile a kernel, in s."""
-
+from heelstrike.compiler.kept_code import LONGEST_WAIT
 
 LOOK_EVERY = 0.1
 """Seconds between two looks at a helper; Windows lets nobody interrupt a longer wait."""

@@ -7,6 +7,7 @@ from heelstrike.control.estimation import Estimated
 from heelstrike.control.gait_lqr.flat_law import FlatGaitLQR
 from heelstrike.control.gait_lqr.law import GaitLQR
 from heelstrike.control.joint_pd import Feedforward, JointPD
+from heelstrike.control.motion_tracking import MotionTracking
 from heelstrike.control.noise import RandomNumbers
 from heelstrike.control.policy.law import Policy
 from heelstrike.control.policy.network import Layer, Network, load_network
@@ -42,6 +43,7 @@ __all__ = [
     "Law",
     "Layer",
     "LinearEquations",
+    "MotionTracking",
     "Network",
     "Policy",
     "PreviewControl",

@@ -6,6 +6,11 @@ from heelstrike.gait.family import GaitFamily, gait_family, load_gait_family
 from heelstrike.gait.file import load_gait
 from heelstrike.gait.gait import Footing, Gait, Phase
 from heelstrike.gait.margins import Margins
+from heelstrike.gait.motion.file import load_motion
+from heelstrike.gait.motion.motion import Motion, MotionPhase
+from heelstrike.gait.motion.optimize import optimize_motion
+from heelstrike.gait.motion.phases import ContactPhase
+from heelstrike.gait.motion.request import Repeat
 from heelstrike.gait.optimize import optimize_gait
 from heelstrike.gait.phased.family import StepFamily
 from heelstrike.gait.phased.phased_gait import PhasedGait
@@ -13,19 +18,25 @@ from heelstrike.gait.phased.surface import Touchdown, make_invariant
 
 __all__ = [
     "ClearanceProfile",
+    "ContactPhase",
     "Cost",
     "Footing",
     "Gait",
     "GaitFamily",
     "Instant",
     "Margins",
+    "Motion",
+    "MotionPhase",
     "Phase",
     "PhasedGait",
+    "Repeat",
     "StepFamily",
     "Touchdown",
     "gait_family",
     "load_gait",
     "load_gait_family",
+    "load_motion",
     "make_invariant",
     "optimize_gait",
+    "optimize_motion",
 ]

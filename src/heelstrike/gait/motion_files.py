@@ -29,7 +29,7 @@ BEYOND = 1.2
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RecordedMotion:
     """How the driven joints of a robot move."""
 
     time: Floats
@@ -67,9 +67,9 @@ class Motion:
         return bool(hinges.any() and far[hinges].mean() > 0.5 and near[hinges].all())
 
 
-def load_motion(
+def load_recorded_motion(
     path: str | os.PathLike[str], robot: Robot, *, rate: float | None = None, unit: str = ""
-) -> Motion:
+) -> RecordedMotion:
     """Read a motion from a table of text.
 
     Its first line names the columns: the actuated joints, each perhaps with a unit as in
@@ -89,7 +89,7 @@ def load_motion(
 
     Returns
     -------
-    Motion
+    RecordedMotion
         The motion.
 
     Raises
@@ -128,7 +128,7 @@ def load_motion(
     time = _times(path, numbers, column_of.get("time"), rate)
     used = {*order, column_of.get("time", -1)}
     ignored = tuple(name for column, name in enumerate(names) if column not in used)
-    return Motion(time, numbers[:, order], ignored)
+    return RecordedMotion(time, numbers[:, order], ignored)
 
 
 def _lines(path: str | os.PathLike[str]) -> list[str]:

@@ -19,15 +19,17 @@ from heelstrike.cli.main import app
 from heelstrike.errors import GaitError
 from heelstrike.experiments.checking import Check, check_motion
 from heelstrike.experiments.checking.stance import placed
-from heelstrike.gait.motion_files import Motion
+from heelstrike.gait.motion_files import RecordedMotion
 
 STEPS = 3
 
 
-def motion(rate: float = 200.0, change: Callable[[np.ndarray], np.ndarray] = lambda q: q) -> Motion:
+def motion(
+    rate: float = 200.0, change: Callable[[np.ndarray], np.ndarray] = lambda q: q
+) -> RecordedMotion:
     """Return the reference gait as an engineer has it."""
     time = np.arange(0.0, STEPS * walking.STEP_DURATION, 1.0 / rate)
-    return Motion(time, change(np.array(walking.gait().position(time))), ())
+    return RecordedMotion(time, change(np.array(walking.gait().position(time))), ())
 
 
 def bravo7(**numbers: np.ndarray) -> hs.Robot:
@@ -101,7 +103,7 @@ FORWARDS = np.array(walking.bravo7().model.center_of_mass) + np.array(
         (bravo7(speed_limit=np.array([np.inf] * 3 + [3.0] * 6)), motion(), "speed"),
     ],
 )
-def test_what_is_wrong_is_named_first(robot: hs.Robot, moves: Motion, cause: str) -> None:
+def test_what_is_wrong_is_named_first(robot: hs.Robot, moves: RecordedMotion, cause: str) -> None:
     found = check_motion(robot, moves)
     assert not found.good
     assert found.findings[0].cause == cause, str(found)
@@ -122,7 +124,7 @@ def test_fifty_rows_a_second_are_enough() -> None:
 
 def test_robots_whose_trunk_does_not_follow_are_refused() -> None:
     rabbit = hs.load_robot("rabbit")
-    still = Motion(np.arange(10) / 100.0, np.zeros((10, rabbit.nu)), ())
+    still = RecordedMotion(np.arange(10) / 100.0, np.zeros((10, rabbit.nu)), ())
     with pytest.raises(GaitError, match="flat feet"):
         check_motion(rabbit, still)
 

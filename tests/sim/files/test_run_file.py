@@ -166,10 +166,18 @@ def test_a_method_that_could_not_be_read_again_is_refused(name: str, tmp_path: P
 # Damage
 
 
+@pytest.fixture(scope="module")
+def saved_now(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    folder = tmp_path_factory.mktemp("saved")
+    return save(load_run(run_file("compliant", folder)), folder / "sealed.nc").read_bytes()
+
+
 @pytest.fixture
-def sealed(tmp_path: Path) -> Path:
+def sealed(saved_now: bytes, tmp_path: Path) -> Path:
     """Return a file as it is saved now."""
-    return save(load_run(run_file("compliant", tmp_path)), tmp_path / "sealed.nc")
+    path = tmp_path / "sealed.nc"
+    path.write_bytes(saved_now)
+    return path
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from heelstrike.experiments.checking.findings import ORDER, Finding, find
 from heelstrike.experiments.checking.stance import Placed, placed
 from heelstrike.experiments.laws import servo_gains
 from heelstrike.field_texts import dataclass
-from heelstrike.gait.motion_files import Motion
+from heelstrike.gait.motion_files import RecordedMotion
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import OnError
@@ -34,7 +34,7 @@ KNOTS = 0.02
 class Check:
     """What a check of a motion came to."""
 
-    motion: Motion
+    motion: RecordedMotion
     """The motion."""
     findings: tuple[Finding, ...]
     """What is too much, causes first, then what comes nearest to that."""
@@ -74,7 +74,7 @@ class Check:
 
 def check_motion(
     robot: Robot,
-    motion: Motion,
+    motion: RecordedMotion,
     *,
     friction: float = 0.75,
     stiffness: ArrayLike | None = None,
@@ -92,8 +92,8 @@ def check_motion(
     ----------
     robot : Robot
         A robot on two flat feet, all joints driven.
-    motion : Motion
-        The trajectory; :func:`~heelstrike.gait.motion_files.load_motion` reads one.
+    motion : RecordedMotion
+        The trajectory; :func:`~heelstrike.gait.motion_files.load_recorded_motion` reads one.
     friction : float
         Of the ground.
     stiffness, damping : float or (nu,) float, optional
@@ -155,8 +155,8 @@ def check_motion(
 
 
 def _trial(
-    robot: Robot, motion: Motion, there: Placed, ground: Ground, stiffness: ArrayLike | None,
-    damping: ArrayLike | None,
+    robot: Robot, motion: RecordedMotion, there: Placed, ground: Ground,
+    stiffness: ArrayLike | None, damping: ArrayLike | None,
 ) -> Trial:  # fmt: skip
     """Return the walk of a motion by servos."""
     usual = servo_gains(robot)

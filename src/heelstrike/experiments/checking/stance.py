@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from heelstrike.dynamics import contact_positions
 from heelstrike.errors import GaitError
 from heelstrike.field_texts import dataclass
-from heelstrike.gait.motion_files import Motion
+from heelstrike.gait.motion_files import RecordedMotion
 from heelstrike.gait.sole import sole
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
@@ -50,14 +50,14 @@ class Placed:
     """Foot, first and last row of each phase."""
 
 
-def placed(robot: Robot, motion: Motion) -> Placed:
+def placed(robot: Robot, motion: RecordedMotion) -> Placed:
     """Find the trunk of a motion, and which foot stands.
 
     Parameters
     ----------
     robot : Robot
         A robot on two flat feet whose joints are all driven.
-    motion : Motion
+    motion : RecordedMotion
         Its joints.
 
     Raises
@@ -100,7 +100,7 @@ def _stance(robot: Robot, joints: Floats, time: Floats) -> Integers:
     return _smoothed((above[:, 1] > above[:, 0]).astype(np.int64), time)
 
 
-def _within(motion: Motion, begin: float, end: float) -> CubicSpline:
+def _within(motion: RecordedMotion, begin: float, end: float) -> CubicSpline:
     """Return the joints within a phase by its own samples: accelerations jump at its ends."""
     own = (motion.time >= begin - TOUCHING) & (motion.time <= end + TOUCHING)
     own = own if np.count_nonzero(own) >= FEWEST else np.ones(len(own), dtype=bool)

@@ -171,16 +171,16 @@ class StepFamily:
             )
         postures = Postures(gait)
         wanted = _energy(gait, 0.0)
-        gaits, energies = [], []
-        for tangent in (-slope, 0.0, slope):
+        gaits, energies = {}, {}
+        for tangent in (0.0, -slope, slope):  # on level ground it shows at once if legs are short
             own = 0.0 if tangent == 0.0 else _equal_shift(postures, tangent, shift, wanted.level)
             row = [postures.changed(tangent, own + each) for each in (-shift, 0.0, shift)]
             if tangent == 0.0:
                 row[1] = gait
-            energies.append(_energy(row[1], tangent).series)
-            gaits.append(row)
-        ranges = np.array([[each.phase_range for each in row] for row in gaits])
-        series = np.array([[each.coefficients for each in row] for row in gaits])
+            energies[tangent], gaits[tangent] = _energy(row[1], tangent).series, row
+        slopes = (-slope, 0.0, slope)
+        ranges = np.array([[each.phase_range for each in gaits[tangent]] for tangent in slopes])
+        series = np.array([[each.coefficients for each in gaits[tangent]] for tangent in slopes])
         return cls(
             gait=gait,
             slope=float(slope),
@@ -189,7 +189,7 @@ class StepFamily:
             half=_powers(_powers(0.5 * np.diff(ranges, axis=-1)[..., 0], 0), 1),
             coefficients=_powers(_powers(series, 0), 1),
             rate=wanted.rate,
-            energy=_powers(np.array(energies), 0),
+            energy=_powers(np.array([energies[tangent] for tangent in slopes]), 0),
         )
 
     def coefficients_on_both_feet(self) -> Floats:

@@ -1,0 +1,298 @@
+"""A motion of any phases, followed by computed torque (paper section 4.1, for any contacts).
+
+At each instant the law looks for the accelerations v̇ and contact forces λ nearest to those of the
+motion that are possible with the contacts of its phase:
+
+    minimise  |v̇_J − v̇ᵈ_J|² + ε |λ − λᵈ|²   with   A v̇ + H = Jᵀλ (coordinates without a motor),
+                                                     J v̇ + J̇v = 0,
+
+where v̇ᵈ_J = q̈ᵈ + kp (qᵈ − q) + kd (q̇ᵈ − q̇) are those wanted of the joints (eq. 38). The torques
+follow from the equations of the coordinates with motors. On a flat foot this is the paper's law; on
+a point or in flight the trunk follows from the joints; on two feet the forces of the motion say how
+these share the load.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.compiler.compilation import kernel
+from heelstrike.control.arguments import gains_of, must_be
+from heelstrike.dynamics.dense import solve_to_rank
+from heelstrike.gait.motion.motion import Motion, MotionPhase
+from heelstrike.gait.motion.phases import standing
+from heelstrike.gait.motion.request import Repeat
+from heelstrike.gait.polynomials import motion_in_piece
+from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.controller.law import Law, controller
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+
+PRICE_OF_FORCES = 1e-6
+"""ε, in (m/s²)² for forces of the robot's weight: so small that forces give way before motion."""
+EARLIEST = 0.5
+"""Share of a phase before which a touchdown does not end it: the foot scuffs."""
+LATEST = 1.1
+"""Share of a phase until which its polynomials go on if no touchdown ends it."""
+
+
+class Parameters(Bundle):
+    """Numbers of the law: the phases of a motion, those of its mirror image after them."""
+
+    duration: Floats = array("phases")
+    """Duration of each phase (s)."""
+    begins: Floats = array("pieces")
+    """When each piece begins in its phase (s)."""
+    first: Integers = array("phases + 1", of=int)
+    """First piece of each phase."""
+    pieces: Floats = array("pieces", "terms", "nv")
+    """Coefficients of all coordinates, lowest first."""
+    force: Floats = array("pieces", "stages", "rows")
+    """Coefficients of the contact forces (N), (normal, tangent) point by point."""
+    stands: Integers = array("phases", "rows", of=int)
+    """Whether the force along each row is one of those that hold the robot."""
+    fresh: Integers = array("phases", "nc", of=int)
+    """Whether the touchdown of a contact point ends a phase."""
+    following: Integers = array("phases", of=int)
+    """The phase after each; itself after the last of a motion that never repeats."""
+    kp: Floats = array("nu")
+    kd: Floats = array("nu")
+    """kp, kd: Gains (1/s², 1/s)."""
+    weight: float = number(float)
+    """Of the robot (N)."""
+    earliest: float = number(float)
+    latest: float = number(float)
+    """earliest, latest: Shares of a phase, see :data:`EARLIEST` and :data:`LATEST`."""
+
+
+class Memory(Bundle):
+    """What the law remembers, and its scratch."""
+
+    phase: int = cell(int)
+    """The phase it is in."""
+    start: float = cell(float)
+    """When that began (s)."""
+    mass: Floats = array("nv", "nv")
+    bias: Floats = array("nv")
+    passive: Floats = array("nv")
+    wanted: Floats = array("nv")
+    """mass, bias, passive, wanted: A, H, forces of springs and dampers, v̇ᵈ."""
+    jacobian: Floats = array("rows", "nv")
+    moved: Floats = array("rows")
+    reference: Floats = array("rows")
+    """jacobian, moved, reference: Jacobian of the contact points, J̇v, λᵈ."""
+    system: Floats = array("unknowns", "unknowns + 1")
+    unknown: Floats = array("unknowns")
+    order: Integers = array("unknowns", of=int)
+    """system, unknown, order: The linear equations of the minimum."""
+    held: Integers = array("rows", of=int)
+    """Rows that hold the robot, one after the other."""
+
+
+@kernel
+def advance_phase(t: float, contacts: Contacts, parameters: Parameters, memory: Memory) -> None:
+    """Go on to the next phase: at the touchdown that ends one, or as it is over."""
+    phase = memory.phase
+    gone, duration = t - memory.start, parameters.duration[phase]
+    ends_by_touchdown, touched = False, False
+    for i in range(parameters.fresh.shape[1]):
+        if parameters.fresh[phase, i] == 1:
+            ends_by_touchdown = True
+            touched = touched or contacts.force[i, 0] > 0.0
+    if parameters.following[phase] == phase:
+        return
+    if ends_by_touchdown:
+        if touched and gone >= parameters.earliest * duration:
+            memory.start = t
+            memory.phase = parameters.following[phase]
+    elif gone >= duration:
+        memory.start += duration
+        memory.phase = parameters.following[phase]
+
+
+@kernel
+def solve_for_nearest(
+    count: int, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> None:
+    """Find v̇ and λ nearest to what is wanted, the first unknowns.
+
+    Unknowns are v̇ (nv,), the `count` forces along the rows that hold in units of the weight, and
+    multipliers of the equations of motion and of the rows.
+    """
+    n, free = robot.nv, robot.unactuated.shape[0]
+    size = n + count + free + count
+    system, weight = memory.system, parameters.weight
+    for i in range(size):
+        for j in range(size + 1):
+            system[i, j] = 0.0
+    for i in range(robot.nu):
+        joint = robot.model.actuator_joint[i]
+        system[joint, joint] = 1.0
+        system[joint, size] = memory.wanted[joint]
+    for k in range(count):
+        system[n + k, n + k] = PRICE_OF_FORCES
+        system[n + k, size] = PRICE_OF_FORCES * memory.reference[memory.held[k]] / weight
+    for f in range(free):
+        j, row = robot.unactuated[f], n + count + f
+        for i in range(n):
+            system[row, i] = system[i, row] = memory.mass[j, i] / weight
+        for k in range(count):
+            system[row, n + k] = system[n + k, row] = -memory.jacobian[memory.held[k], j]
+        system[row, size] = (memory.passive[j] - memory.bias[j]) / weight
+    for k in range(count):
+        row = n + count + free + k
+        for i in range(n):
+            system[row, i] = system[i, row] = memory.jacobian[memory.held[k], i]
+        system[row, size] = -memory.moved[memory.held[k]]
+    solve_to_rank(size, system, memory.order, memory.unknown)
+
+
+@controller
+def motion_tracking(
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
+    parameters: Parameters, memory: Memory, torque: Floats,
+) -> None:  # fmt: skip
+    """Torques that make the joints follow the motion."""
+    advance_phase(t, contacts, parameters, memory)
+    phase = memory.phase
+    duration = parameters.duration[phase]
+    gone, latest = t - memory.start, parameters.latest * duration
+    if parameters.following[phase] == phase:
+        latest = duration
+    moves = 0.0 if gone > latest else 1.0
+    gone = min(gone, latest)
+    first, last = parameters.first[phase], parameters.first[phase + 1]
+    piece = first
+    while piece < last - 1 and gone >= parameters.begins[piece + 1]:
+        piece += 1
+    inside = gone - parameters.begins[piece]
+
+    for i in range(robot.nu):
+        joint = robot.model.actuator_joint[i]
+        position, velocity, acceleration = motion_in_piece(
+            parameters.pieces[piece], joint, inside, moves
+        )
+        memory.wanted[joint] = (
+            acceleration
+            + parameters.kp[i] * (position - state.joint_position[i])
+            + parameters.kd[i] * (velocity - state.joint_velocity[i])
+        )
+    robot.mass_matrix(state, memory.mass)
+    robot.bias_force(state, memory.bias)
+    robot.passive_force(state, memory.passive)
+    count = 0
+    for i in range(robot.nc):
+        if parameters.stands[phase, 2 * i] == 1 or parameters.stands[phase, 2 * i + 1] == 1:
+            robot.contact_jacobian(state, contacts, i, memory.jacobian[2 * i : 2 * i + 2])
+            robot.contact_bias_acceleration(state, contacts, i, memory.moved[2 * i : 2 * i + 2])
+        for row in range(2 * i, 2 * i + 2):
+            if parameters.stands[phase, row] == 1:
+                memory.held[count] = row
+                count += 1
+    terms, reference = parameters.force[piece], memory.reference
+    for row in range(terms.shape[1]):
+        reference[row] = 0.0
+        for k in range(terms.shape[0] - 1, -1, -1):
+            reference[row] = reference[row] * inside + terms[k, row]
+    solve_for_nearest(count, robot, parameters, memory)
+    for i in range(robot.nu):
+        j = robot.model.actuator_joint[i]
+        total = memory.bias[j] - memory.passive[j]
+        for k in range(robot.nv):
+            total += memory.mass[j, k] * memory.unknown[k]
+        for k in range(count):
+            force = parameters.weight * memory.unknown[robot.nv + k]
+            total -= memory.jacobian[memory.held[k], j] * force
+        torque[i] = total
+
+
+class MotionTracking(Law):
+    """Follow a motion of any phases by computed torque.
+
+    A phase ends when the points come down that stand in the next one, in its second half; one in
+    which nothing comes down ends by time. Nothing brings back what the joints do not reach, as the
+    pitch of a trunk on a point: motions may be unstable under this law.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot that the motion was designed for.
+    motion : Motion
+        The motion.
+    kp, kd : float or (nu,) array
+        Gains of eq. 38, in 1/s² and 1/s.
+
+    Raises
+    ------
+    ControllerError
+        If gains or motion do not fit the robot.
+    """
+
+    def __init__(
+        self, robot: Robot, motion: Motion, *, kp: ArrayLike = 400.0, kd: ArrayLike = 40.0
+    ) -> None:
+        must_be(Robot, "robot", robot)
+        must_be(Motion, "motion", motion)
+        motion.check_robot(robot)
+        cycle = cycle_of(robot, motion)
+        free = robot.nv - robot.nu
+        unknowns = robot.nv + free + 4 * robot.nc
+        repeats = motion.repeat is not Repeat.NEVER
+        stands = [_rows_of(robot, phase) for phase in cycle]
+        starts = [*range(1, len(cycle)), 0 if repeats else len(cycle) - 1]
+        points = [set(phase.contacts) for phase in cycle]
+        fresh = np.zeros((len(cycle), robot.nc), np.int64)
+        for p, following in enumerate(starts):
+            for name in points[following] - points[p]:
+                fresh[p, robot.contact_names.index(name)] = following != p
+        parameters = Parameters(
+            duration=np.array([phase.duration for phase in cycle]),
+            begins=np.concatenate([phase.breakpoints[:-1] for phase in cycle]),
+            first=np.cumsum([0, *(len(phase.pieces) for phase in cycle)]),
+            pieces=np.concatenate([phase.pieces for phase in cycle]),
+            force=np.concatenate([phase.force_pieces for phase in cycle]),
+            stands=np.array(stands),
+            fresh=fresh,
+            following=np.array(starts),
+            kp=gains_of("kp", kp, robot),
+            kd=gains_of("kd", kd, robot),
+            weight=robot.weight,
+            earliest=EARLIEST,
+            latest=LATEST,
+        )
+        sizes = {"unknowns": max(unknowns, 2 * robot.nc), "rows": 2 * robot.nc}
+        super().__init__(motion_tracking, parameters, memory=sizes, robot=robot)
+        self.motion = motion
+
+
+def _rows_of(robot: Robot, phase: MotionPhase) -> Integers:
+    """Whether a force along each row holds the robot in a phase, (2 nc,)."""
+    rows = np.zeros(2 * robot.nc, np.int64)
+    rows[standing(robot, [robot.contact_names.index(name) for name in phase.contacts]).forces] = 1
+    return rows
+
+
+def cycle_of(robot: Robot, motion: Motion) -> list[MotionPhase]:
+    """Return the phases of a motion, those of its mirror image after them if it has one."""
+    cycle = list(motion.phases)
+    if motion.repeat is Repeat.MIRRORED:
+        cycle += [mirrored_phase(robot, motion, phase) for phase in motion.phases]
+    return cycle
+
+
+def mirrored_phase(robot: Robot, motion: Motion, phase: MotionPhase) -> MotionPhase:
+    """Return the mirror image of a phase."""
+    pieces = motion.mirror_sign * phase.pieces[..., motion.mirror_joint]
+    pieces[:, 0] += motion.mirror_offset
+    names = robot.contact_names
+    points = sorted(int(motion.mirror_contact[names.index(name)]) for name in phase.contacts)
+    return MotionPhase(
+        contacts=tuple(names[i] for i in points),
+        breakpoints=phase.breakpoints,
+        pieces=pieces,
+        force=phase.force[:, :, motion.mirror_contact],
+        impulse=phase.impulse[motion.mirror_contact],
+    )

@@ -1,0 +1,260 @@
+"""A motion of several phases, as polynomials of all coordinates, with the forces that hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from os import PathLike
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from heelstrike.arguments import takes
+from heelstrike.errors import GaitError
+from heelstrike.field_texts import dataclass
+from heelstrike.gait.gait import fingerprint
+from heelstrike.gait.motion.request import Repeat
+from heelstrike.gait.polynomials import evaluated, gauss
+from heelstrike.notebook import ShownInNotebooks
+from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MotionPhase:
+    """A part of a motion in which the same contact points stand."""
+
+    contacts: tuple[str, ...]
+    """The contact points that stand; none in flight."""
+    breakpoints: Floats
+    """(K + 1,) Times since the beginning of the phase between which one polynomial holds, in s."""
+    pieces: Floats
+    """(K, d + 1, nv) Coefficients of all coordinates, lowest first, in the time since the beginning
+    of each of K pieces."""
+    force: Floats
+    """(K, s, nc, 2) Forces of the ground on all contact points, away from it and along it (N), at
+    the s Gauss points of each piece. Of a flat foot, only the first and the last point push, and
+    the first alone exerts what is along the ground: how points share that does not matter."""
+    impulse: Floats
+    """(nc, 2) Impulses (N s) at the end of the phase, likewise; zero where no point comes down."""
+
+    @property
+    def duration(self) -> float:
+        """Duration (s)."""
+        return float(self.breakpoints[-1])
+
+    def coordinates(self, t: ArrayLike, *, order: int = 0) -> Floats:
+        """Coordinates at times in the phase, or a derivative, (..., nv).
+
+        Parameters
+        ----------
+        t : array_like
+            Times since the beginning of the phase (s).
+        order : int
+            0 for positions, 1 for velocities, 2 for accelerations.
+
+        Returns
+        -------
+        (..., nv) float
+            In m and rad, per s or per s².
+        """
+        return evaluated(self.pieces, self.breakpoints, np.asarray(t, np.float64), order)
+
+    def forces(self, t: ArrayLike) -> Floats:
+        """Forces of the ground at times in the phase, (..., nc, 2).
+
+        Parameters
+        ----------
+        t : array_like
+            Times since the beginning of the phase (s).
+
+        Returns
+        -------
+        (..., nc, 2) float
+            Away from the ground and along it (N), of the polynomial through those at the Gauss
+            points.
+        """
+        time = np.asarray(t, np.float64)
+        return evaluated(self.force_pieces, self.breakpoints, time, 0).reshape(
+            *time.shape, *self.force.shape[2:]
+        )
+
+    @cached_property
+    def force_pieces(self) -> Floats:
+        """Coefficients of the forces, lowest first, in the time of each piece, (K, s, 2 nc)."""
+        count, stages = self.force.shape[:2]
+        nodes, _ = gauss(stages)
+        times = np.diff(self.breakpoints)[:, None] * nodes
+        powers = times[..., None] ** np.arange(stages)
+        given = self.force.reshape(count, stages, -1)
+        return np.asarray(np.linalg.solve(powers, given), np.float64)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Motion(ShownInNotebooks):
+    """A motion of a robot through several phases, and how it goes on."""
+
+    robot: str
+    """Name of the robot it was designed for."""
+    fingerprint: str
+    """:func:`~heelstrike.gait.gait.fingerprint` of that robot."""
+    phases: tuple[MotionPhase, ...]
+    """The phases, one after the other."""
+    repeat: Repeat
+    """How it goes on after the last."""
+    distance: float
+    """How far (m) the trunk moves along the ground."""
+    slope: float
+    """Angle (rad) at which the ground ascends ahead."""
+    friction: float
+    """Coefficient of friction it was designed for."""
+    mirror_joint: Integers
+    mirror_sign: Floats
+    mirror_offset: Floats
+    """mirror_joint, mirror_sign, mirror_offset: (nv,) Mirrored positions are
+    ``mirror_sign * q[mirror_joint] + mirror_offset``."""
+    mirror_contact: Integers
+    """(nc,) Counterpart of every contact point."""
+    initial_state: State
+    """All coordinates at the beginning, just after whatever landed there."""
+    cost: float
+    """∫ΓᵀΓ dt over all phases, in N²m²s."""
+    spent: float
+    """What the optimiser was asked to make least, over all phases, in its own unit."""
+    optimal: bool
+    """Whether it is an optimum; if not, it satisfies all constraints nevertheless."""
+    margins: Mapping[str, float]
+    """Smallest distance from every kind of limit, in its unit."""
+
+    @property
+    def duration(self) -> float:
+        """Duration of all phases (s)."""
+        return float(sum(phase.duration for phase in self.phases))
+
+    @property
+    def speed(self) -> float:
+        """Mean speed along the ground (m/s)."""
+        return self.distance / self.duration
+
+    @cached_property
+    def ends(self) -> Floats:
+        """Times at which the phases end, (phases,), in s."""
+        return np.cumsum([phase.duration for phase in self.phases])
+
+    def position(self, t: ArrayLike) -> Floats:
+        """All coordinates at times of the motion, (..., nv).
+
+        Parameters
+        ----------
+        t : array_like
+            Times (s) since the beginning, of any shape. One that repeats goes on for ever, and back
+            in time; one that does not rests before and after.
+
+        Returns
+        -------
+        (..., nv) float
+            Positions (m, rad).
+        """
+        return self._whole(t, 0)
+
+    def velocity(self, t: ArrayLike) -> Floats:
+        """Velocities at times of the motion, (..., nv): just after a landing, at one.
+
+        Parameters
+        ----------
+        t : array_like
+            Times (s) since the beginning, of any shape.
+
+        Returns
+        -------
+        (..., nv) float
+            Velocities (m/s, rad/s).
+        """
+        return self._whole(t, 1)
+
+    def acceleration(self, t: ArrayLike) -> Floats:
+        """Accelerations at times of the motion, (..., nv).
+
+        Parameters
+        ----------
+        t : array_like
+            Times (s) since the beginning, of any shape.
+
+        Returns
+        -------
+        (..., nv) float
+            Accelerations (m/s², rad/s²).
+        """
+        return self._whole(t, 2)
+
+    def _whole(self, t: ArrayLike, order: int) -> Floats:
+        time = np.asarray(t, dtype=np.float64)
+        cycle = np.floor(time / self.duration)
+        if self.repeat is Repeat.NEVER:
+            cycle = np.zeros_like(cycle)
+        inside = time - cycle * self.duration
+        rests = (inside < 0.0) | (inside > self.duration)
+        inside = np.clip(inside, 0.0, self.duration)
+        last = len(self.phases) - 1
+        phase = np.minimum(np.searchsorted(self.ends, inside, side="right"), last)
+        value = np.zeros((*time.shape, self.mirror_sign.size))
+        starts = self.ends - [each.duration for each in self.phases]
+        for p, each in enumerate(self.phases):
+            here = phase == p
+            value[here] = each.coordinates(inside[here] - starts[p], order=order)
+        if order and np.any(rests):
+            value[rests] = 0.0
+        if self.repeat is Repeat.MIRRORED:
+            image = self.mirror_sign * value[..., self.mirror_joint]
+            image = image + self.mirror_offset if order == 0 else image
+            value = np.where((cycle % 2 == 1)[..., None], image, value)
+        if order == 0:
+            along = self.distance * np.array([np.cos(self.slope), np.sin(self.slope)])
+            value[..., :2] += cycle[..., None] * along
+        return value
+
+    def check_robot(self, robot: Robot) -> None:
+        """Raise a `GaitError` unless the motion was designed for a robot.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+
+        Raises
+        ------
+        GaitError
+            That names both.
+        """
+        if self.fingerprint != fingerprint(robot):
+            raise GaitError(
+                f"this motion was designed for robot {self.robot!r} with other numbers than robot "
+                f"{robot.name!r} has. Use that robot, or design a new motion."
+            )
+
+    @takes(GaitError)
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the motion to a readable JSON file; :func:`load_motion` reads it back unchanged.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+
+        Raises
+        ------
+        GaitError
+            If the file cannot be written.
+        """
+        from heelstrike.gait.motion.file import save_motion
+
+        save_motion(self, path)
+
+    def __repr__(self) -> str:
+        count = len(self.phases)
+        return (
+            f"Motion({self.robot!r}: {count} phase{'s' * (count != 1)}, {self.distance:.3g} m in "
+            f"{self.duration:.3g} s, cost {self.cost:.6g} N²m²s"
+            f"{'' if self.optimal else '; feasible, not optimal'})"
+        )

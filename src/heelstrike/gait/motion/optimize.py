@@ -1,0 +1,499 @@
+"""Motions of several phases, of least cost (direct collocation of all coordinates)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import casadi
+import numpy as np
+
+from heelstrike.arguments import takes
+from heelstrike.dynamics import contact_positions
+from heelstrike.errors import GaitError, InfeasibleGaitError
+from heelstrike.gait.cost import Cost, OwnCost, costs_of
+from heelstrike.gait.gait import fingerprint
+from heelstrike.gait.motion.guess import guess_of
+from heelstrike.gait.motion.instant import Instants
+from heelstrike.gait.motion.motion import Motion, MotionPhase
+from heelstrike.gait.motion.phases import ContactPhase
+from heelstrike.gait.motion.program import (
+    EQUATIONS,
+    STAGES,
+    MotionProgram,
+    beginnings,
+    endings,
+    gauss_points,
+    looked_at,
+    phases_of,
+)
+from heelstrike.gait.motion.request import MotionRequest, Repeat
+from heelstrike.gait.motion.rows import Kind
+from heelstrike.gait.polynomials import Instants as Grid
+from heelstrike.gait.program import FEASIBLE
+from heelstrike.robot.loops import refuse_loops
+from heelstrike.robot.model import Floats
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.sides.mirror import Mirror
+from heelstrike.robot.state import State
+
+STARTS = ((0.0, 0.95), (0.1, 0.9), (0.0, 0.85))
+"""Leans of the trunk (rad) and heights, as shares of that on straight legs, to start from."""
+ROUNDS = 5
+"""How often instants are added where limits fail between the Gauss points."""
+FINER = 5
+"""Instants between which limits are checked, for each Gauss point."""
+
+
+@takes(GaitError)
+def optimize_motion(
+    robot: Robot,
+    phases: Sequence[ContactPhase],
+    *,
+    repeat: Repeat | str = "mirrored",
+    distance: float | tuple[float, float] | None = None,
+    duration: float | None = None,
+    speed: float | None = None,
+    start: State | None = None,
+    end: State | None = None,
+    friction: float = 0.75,
+    clearance: float = 0.03,
+    slope: float = 0.0,
+    cost: Cost | str | Mapping[Cost | str, float] | OwnCost = "torque",
+    starts: int = len(STARTS),
+    progress: Callable[[float], None] | None = None,
+) -> Motion:
+    """Find the motion of least cost through phases with given contacts.
+
+    All coordinates are polynomials of degree 5 on pieces of each phase, which satisfy the equations
+    of motion and those of the contacts at four Gauss points of each (direct collocation, of order
+    8 at the ends of pieces). Forces of the ground are unknowns, so that phases on two feet choose
+    how these share the load. Where points come down that did not stand before, there is a plastic
+    impact (paper eq. 20-22) of all points of the next phase, which pushes and stays in the friction
+    cone; points that leave do so freely. All derivatives are exact.
+
+    Parameters
+    ----------
+    robot : Robot
+        A floating robot without closed loops.
+    phases : sequence of ContactPhase
+        What stands in each phase, and its least and greatest duration.
+    repeat : Repeat or its value
+        Whether the motion goes on with its mirror image, with itself, or never.
+    distance : float or (float, float), optional
+        How far the trunk moves along the ground (m), or the least and the greatest.
+    duration : float, optional
+        Duration of all phases (s).
+    speed : float, optional
+        Mean speed along the ground (m/s).
+    start, end : State, optional
+        States at the beginning and at the end of a motion that never repeats.
+    friction : float
+        Coefficient of friction.
+    clearance : float
+        Height (m) of a hump above which all points of a foot in the air stay. Points of a foot that
+        stands on others only stay above the ground.
+    slope : float
+        Angle (rad) at which the ground ascends ahead; negative if it descends.
+    cost : str, mapping or function
+        As for :func:`~heelstrike.gait.optimize.optimize_gait`; per metre where neither the distance
+        nor speed and duration are fixed.
+    starts : int
+        Starting points that are tried until one leads to an optimum.
+    progress : callable, optional
+        Called now and then with the fraction of the work that is done.
+
+    Returns
+    -------
+    Motion
+        The motion, with its margins.
+
+    Raises
+    ------
+    GaitError
+        If the robot cannot move this way or an argument makes no sense.
+    InfeasibleGaitError
+        If no motion was found; the message names the constraints that are violated most.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> robot = hs.load_robot("rabbit")
+    >>> run = [hs.ContactPhase("right_tibia", duration=(0.05, 0.3), pieces=4),
+    ...        hs.ContactPhase(duration=(0.05, 0.3), pieces=3)]
+    >>> motion = hs.optimize_motion(robot, run, speed=2.0)
+    >>> [phase.contacts for phase in motion.phases]
+    [('right_tibia_0',), ()]
+    """
+    request = _checked(
+        robot, phases, repeat=repeat, distance=distance, duration=duration, speed=speed,
+        start=start, end=end, friction=friction, clearance=clearance, slope=slope, cost=cost,
+    )  # fmt: skip
+    if not 1 <= starts <= len(STARTS):
+        raise GaitError(f"starts must be from 1 to {len(STARTS)}, got {starts!r}")
+    report = progress or (lambda _: None)
+    free = request.distance[0] < request.distance[1] and (
+        request.speed is None or request.total is None
+    )
+    functions = Instants(robot, request.cost, per_metre=free and request.repeat is not Repeat.NEVER)
+    program = MotionProgram(
+        request, functions, tuple(looked_at(phase.pieces) for phase in request.phases)
+    )
+    report(0.1)
+    unknowns, optimal = _solved(program, starts, report)
+    program, unknowns, optimal = _refined(program, unknowns, optimal)
+    report(0.9)
+    program, unknowns, optimal = _held_between(program, unknowns, optimal)
+    report(1.0)
+    return _motion(program, unknowns, optimal)
+
+
+def _checked(
+    robot: Robot, phases: Sequence[ContactPhase], *, repeat: Any, distance: Any, duration: Any,
+    speed: Any, cost: Any, **others: Any,
+) -> MotionRequest:  # fmt: skip
+    """Check what is asked; raise a `GaitError` that says what cannot be."""
+    refuse_loops(robot, "motion design", GaitError)
+    if robot.constraints:
+        raise GaitError("motion design knows no constraints from outside; leave them out")
+    if not robot.floating:
+        raise GaitError(f"motion design needs a floating robot; robot {robot.name!r} is not one")
+    try:
+        goes_on = Repeat(repeat)
+    except ValueError:
+        names = ", ".join(repr(each.value) for each in Repeat)
+        raise GaitError(f"repeat must be one of {names}, got {repeat!r}") from None
+    if goes_on is Repeat.MIRRORED and robot.mirror is None:
+        raise GaitError(
+            f"robot {robot.name!r} has no mirror image; ask for a whole cycle, with repeat='same'"
+        )
+    if not phases or not all(isinstance(each, ContactPhase) for each in phases):
+        raise GaitError("phases must be one ContactPhase or more, in their order")
+    asked = {"duration": duration, "speed": speed}
+    for name, value in asked.items():
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            raise GaitError(f"{name} must be positive, got {value}")
+    for name in ("friction", "clearance"):
+        if not (np.isfinite(others[name]) and others[name] >= 0.0):
+            raise GaitError(f"{name} must not be negative, got {others[name]}")
+    if abs(others["slope"]) >= STEEPEST:
+        raise GaitError(f"slope must be between -{STEEPEST} and {STEEPEST} rad")
+    fixed = goes_on is Repeat.NEVER
+    if fixed != (others["start"] is not None) or (others["end"] is not None and not fixed):
+        raise GaitError(
+            "a motion that never repeats needs the state at its start, and may have one at its "
+            "end; one that repeats has neither"
+        )
+    if fixed and (speed is not None or distance is not None):
+        raise GaitError("a motion that never repeats has no speed or distance; give start and end")
+    low, high = _distances(distance, speed, duration, fixed)
+    shortest, longest = (sum(phase.duration[k] for phase in phases) for k in range(2))
+    if duration is not None and not shortest <= duration <= longest * (1.0 + 1e-12):
+        raise GaitError(
+            f"the phases last from {shortest:.6g} to {longest:.6g} s together; a duration of "
+            f"{duration:.6g} s is beyond that"
+        )
+    request = MotionRequest(
+        robot=robot, phases=tuple(phases), repeat=goes_on, cost=costs_of(cost), speed=speed,
+        total=duration, distance=(low, high), **others,
+    )  # fmt: skip
+    _check_states(request)
+    if goes_on is not Repeat.NEVER and not any(each.points for each in request.standing):
+        raise GaitError("a motion that repeats needs a phase in which something stands")
+    return request
+
+
+def _check_states(request: MotionRequest) -> None:
+    """Refuse given states in which what stands is not on the ground, or not where it was."""
+    robot, told = request.robot, {}
+    along = np.array([np.cos(request.slope), np.sin(request.slope)])
+    up = np.array([-along[1], along[0]])
+    for name, state, stands in (
+        ("start", request.start, request.standing[0]),
+        ("end", request.end, request.standing[-1]),
+    ):
+        if state is None:
+            continue
+        centers = contact_positions(robot, state.q)
+        heights = centers @ up - robot.model.contact_radius
+        for i in sorted(stands.points):
+            if abs(heights[i]) > ON_THE_GROUND:
+                raise GaitError(
+                    f"{robot.contact_names[i]!r} stands, but at the {name} it is "
+                    f"{heights[i]:.3g} m away from the ground. Give a state in which it touches."
+                )
+        told[name] = centers @ along
+    if len(told) == 2:
+        for i in frozenset.intersection(*(each.points for each in request.standing)):
+            moved = told["end"][i] - told["start"][i]
+            if robot.model.contact_radius[i] == 0.0 and abs(moved) > ON_THE_GROUND:
+                raise GaitError(
+                    f"{robot.contact_names[i]!r} stands all the time, but from start to end it "
+                    f"would have to move by {moved:.3g} m. Move one of the states."
+                )
+
+
+ON_THE_GROUND = 1e-6
+"""Distance (m) within which a point touches, or is where it was."""
+STEEPEST = 1.0
+"""Slope (rad) from which on no motion is looked for."""
+FARTHEST = 5.0
+"""Greatest distance (m) of a motion that may choose it."""
+
+
+def _distances(
+    distance: Any, speed: float | None, duration: float | None, fixed: bool
+) -> tuple[float, float]:
+    """Least and greatest distance."""
+    if fixed:
+        return 0.0, 0.0
+    if distance is None:
+        if speed is None:
+            raise GaitError("give the distance or the speed of a motion that repeats")
+        return 0.0, FARTHEST
+    bounds = np.atleast_1d(np.asarray(distance, dtype=np.float64))
+    bounds = np.repeat(bounds, 2) if bounds.size == 1 else bounds
+    if bounds.shape != (2,) or not np.all(np.isfinite(bounds)) or bounds[0] > bounds[1]:
+        raise GaitError(f"distance must be a number (m), or the least and greatest, got {distance}")
+    if speed is not None and duration is not None and bounds[0] == bounds[1]:
+        raise GaitError("give two of distance, duration and speed, not all three")
+    return float(bounds[0]), float(bounds[1])
+
+
+def _solved(
+    program: MotionProgram, starts: int, report: Callable[[float], None]
+) -> tuple[Floats, bool]:
+    """Unknowns of an optimum, or of a motion that satisfies all constraints."""
+    nearest, least = np.zeros(0), np.inf
+    feasible: Floats | None = None
+    for k, (lean, lowered) in enumerate(STARTS[:starts]):
+        unknowns, _, told = program.solve(guess_of(program, lean=lean, lowered=lowered))
+        if told["return_status"] == "Solve_Succeeded":
+            return unknowns, True
+        missing = float(np.abs(program.violations(unknowns)).max())
+        if missing <= FEASIBLE and feasible is None:
+            feasible = unknowns
+        if missing < least:
+            nearest, least = unknowns, missing
+        report(0.1 + 0.6 * (k + 1) / starts)
+    if feasible is not None:
+        return feasible, False
+    raise InfeasibleGaitError(_not_found(program, nearest))
+
+
+def _not_found(program: MotionProgram, unknowns: Floats) -> str:
+    """Say which constraints are violated most where the optimiser came nearest."""
+    missing = np.abs(program.violations(unknowns))[program.linear :]
+    lines: list[str] = []
+    for k in np.argsort(-missing)[:50]:
+        row, phase, _ = program.labels[k]
+        text = f"{row.kind.text} ({row.subject}) in phase {phase + 1}"
+        if missing[k] > FEASIBLE and not any(line.startswith(text) for line in lines):
+            lines.append(f"{text}: {missing[k] * row.unit:.3g} {row.kind.unit}")
+    return (
+        "no such motion was found, which does not mean that there is none. Where the optimiser "
+        f"came nearest, these are violated: {'; '.join(lines[:4])}. Give the phases more time, "
+        "more friction, a shorter distance, or durations nearer to what you expect."
+    )
+
+
+def _refined(
+    program: MotionProgram, unknowns: Floats, optimal: bool
+) -> tuple[MotionProgram, Floats, bool]:
+    """Double the pieces of phases in which points that stand move between the ends of pieces."""
+    while True:
+        request, phases = program.request, []
+        for p, phase in enumerate(request.phases):
+            moves = _slip(program, unknowns, p) > STILL
+            more = min(2 * phase.pieces, MOST_PIECES) if moves else phase.pieces
+            phases.append(ContactPhase(*phase.contacts, duration=phase.duration, pieces=more))
+        if [each.pieces for each in phases] == [each.pieces for each in request.phases]:
+            return program, unknowns, optimal
+        finer = replace(
+            program, request=replace(request, phases=tuple(phases)),
+            grids=tuple(looked_at(phase.pieces) for phase in phases), near=True,
+        )  # fmt: skip
+        found, _, told = finer.solve(_resampled(program, unknowns, finer))
+        if np.abs(finer.violations(found)).max() > FEASIBLE:
+            raise InfeasibleGaitError(_not_found(finer, found))
+        program, unknowns, optimal = finer, found, told["return_status"] == "Solve_Succeeded"
+
+
+def _slip(program: MotionProgram, unknowns: Floats, p: int) -> float:
+    """Largest velocity (m/s) of a point that stands, anywhere in a phase."""
+    stands = program.request.standing[p]
+    _, rows = _rows_at(program, unknowns, p, _fine(program.request.phases[p].pieces))
+    still = [
+        k
+        for k, row in enumerate(program.functions.path_rows)
+        if (row.kind is Kind.NORMAL_STILL and row.of[0] in stands.normal)
+        or (row.kind is Kind.TANGENT_STILL and row.of[0] in stands.tangent)
+    ]
+    return float(np.abs(rows[still]).max(initial=0.0))
+
+
+def _resampled(program: MotionProgram, unknowns: Floats, finer: MotionProgram) -> Floats:
+    """Unknowns of a finer program for the same motion."""
+    _, impulses, distance = program.parts(casadi.DM(unknowns))
+    motion = _phases(program, unknowns)
+    positions, velocities, accelerations, forces = [], [], [], []
+    for own, phase in zip(motion, finer.request.phases, strict=True):
+        at = [
+            own.duration * phases_of(grid_of(phase.pieces))
+            for grid_of in (endings, beginnings, gauss_points)
+        ]
+        positions.append(own.coordinates(at[0]).T)
+        velocities.append(own.coordinates(at[1], order=1).T)
+        bend = own.coordinates(at[2], order=2).T
+        accelerations.append(bend.reshape(-1, phase.pieces, STAGES))
+        forces.append(own.forces(at[2]).reshape(at[2].size, -1).T)
+    durations = np.array([own.duration for own in motion])
+    return finer.packed(
+        positions, velocities, accelerations, forces, durations, float(distance),
+        [np.array(each).ravel() for each in impulses],
+    )  # fmt: skip
+
+
+STILL = 3e-4
+"""Velocity (m/s) that a point that stands may have between the ends of pieces."""
+MOST_PIECES = 48
+"""Pieces of a phase beyond which the mesh is not refined."""
+
+
+def _fine(pieces: int) -> Grid:
+    """Instants at which limits are checked."""
+    count = FINER * STAGES
+    share = (np.arange(count) + 0.5) / count
+    return Grid(
+        pieces, np.repeat(np.arange(pieces), count), np.tile(share, pieces),
+        np.zeros(pieces * count),
+    )  # fmt: skip
+
+
+def _rows_at(program: MotionProgram, unknowns: Floats, p: int, grid: Grid) -> tuple[Floats, Floats]:
+    """Cost rates (N,) and scaled constraints (rows, N) of a phase at instants."""
+    phases, _, distance = program.parts(casadi.DM(unknowns))
+    own, count = phases[p], grid.share.size
+    request = program.request
+    step = casadi.DM(own.lengths[grid.piece]).T * own.duration
+    far = casadi.repmat(distance, 1, count)
+    places = casadi.repmat(own.places, 1, count)
+    y = casadi.vertcat(*own.along(grid), own.forces(grid), places, step, far)
+    numbers = casadi.repmat(casadi.DM([request.slope, request.friction]), 1, count)
+    cost, rows = program.functions.path.value.map(count)(y, numbers)
+    return np.array(cost).ravel(), np.array(rows)
+
+
+def _held_between(
+    program: MotionProgram, unknowns: Floats, optimal: bool
+) -> tuple[MotionProgram, Floats, bool]:
+    """Add instants where limits fail between the Gauss points, until none does."""
+    for _ in range(ROUNDS):
+        grids, failed = [], False
+        for p, grid in enumerate(program.grids):
+            fine = _fine(grid.pieces)
+            _, rows = _rows_at(program, unknowns, p, fine)
+            lower, upper = program.path_bounds(p, fine)
+            missing = np.maximum(lower - rows, rows - upper)
+            worst = np.where(np.isfinite(missing), missing, -np.inf).max(axis=0)
+            # The worst instant of every piece that fails.
+            by_piece = worst.reshape(grid.pieces, -1)
+            bad = np.flatnonzero(by_piece.max(axis=1) > ALLOWED)
+            failed = failed or bad.size > 0
+            share = fine.share.reshape(grid.pieces, -1)[bad, by_piece[bad].argmax(axis=1)]
+            grids.append(grid.joined(Grid(grid.pieces, bad, share, np.zeros(bad.size))))
+        if not failed:
+            break
+        program = replace(program, grids=tuple(grids), near=True)
+        found, _, told = program.solve(unknowns)
+        if np.abs(program.violations(found)).max() > FEASIBLE:
+            raise InfeasibleGaitError(_not_found(program, found))
+        unknowns, optimal = found, told["return_status"] == "Solve_Succeeded"
+    return program, unknowns, optimal
+
+
+ALLOWED = 1e-5
+"""Scaled violation that a limit may have between the instants at which it is looked at."""
+
+
+def _motion(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
+    request, robot = program.request, program.request.robot
+    _, _, distance = program.parts(casadi.DM(unknowns))
+    effort, spent = 0.0, float(program.value(unknowns)[0])
+    if program.functions.per_metre:
+        spent *= float(distance)
+    margins = dict[str, float]()
+    torque = Instants(robot, costs_of("torque"), per_metre=False)
+    plain = replace(program, functions=torque)
+    phases = _phases(program, unknowns)
+    for p, phase in enumerate(phases):
+        grid = gauss_points(len(phase.pieces))
+        rates, _ = _rows_at(plain, unknowns, p, grid)
+        effort += float(rates @ grid.weight) * grid.pieces
+        _add_margins(program, unknowns, p, margins)
+    mirror = robot.mirror or _itself(robot)
+    first = phases[0].pieces[0]
+    return Motion(
+        robot=robot.name,
+        fingerprint=fingerprint(robot),
+        phases=tuple(phases),
+        repeat=request.repeat,
+        distance=float(distance),
+        slope=request.slope,
+        friction=request.friction,
+        mirror_joint=mirror.joint,
+        mirror_sign=mirror.sign,
+        mirror_offset=mirror.offset,
+        mirror_contact=mirror.contact,
+        initial_state=State(first[0].copy(), first[1].copy()),
+        cost=effort,
+        spent=spent,
+        optimal=optimal,
+        margins=margins,
+    )
+
+
+def _itself(robot: Robot) -> Mirror:
+    """Mirror that changes nothing."""
+    nv, nc, nf = np.arange(robot.nv), np.arange(robot.nc), np.arange(len(robot.feet))
+    return Mirror(nv, np.ones(robot.nv), nc, nf, np.zeros(robot.nq))
+
+
+def _phases(program: MotionProgram, unknowns: Floats) -> list[MotionPhase]:
+    """Return the phases of a motion with the given unknowns."""
+    request, robot = program.request, program.request.robot
+    _, impulses, _ = program.parts(casadi.DM(unknowns))
+    phases = []
+    for p, (pieces, force, ends) in enumerate(program.pieces(unknowns)):
+        impulse = np.zeros((robot.nc, 2))
+        if p < len(impulses):
+            impulse = np.array(impulses[p]).reshape(robot.nc, 2)
+        phases.append(
+            MotionPhase(
+                contacts=tuple(robot.contact_names[i] for i in sorted(request.standing[p].points)),
+                breakpoints=ends,
+                pieces=pieces,
+                force=force.reshape(len(pieces), STAGES, robot.nc, 2),
+                impulse=impulse,
+            )
+        )
+    return phases
+
+
+def _add_margins(
+    program: MotionProgram, unknowns: Floats, p: int, margins: dict[str, float]
+) -> None:
+    """Smallest distances from the limits in a phase, and largest misses of its equations."""
+    grid = _fine(program.grids[p].pieces)
+    _, rows = _rows_at(program, unknowns, p, grid)
+    lower, upper = program.path_bounds(p, grid)
+    for k, row in enumerate(program.functions.path_rows):
+        if row.kind in EQUATIONS or not np.any(lower[k] < upper[k]):
+            continue
+        used = np.isfinite(lower[k]) | np.isfinite(upper[k])
+        least = lower[k] if row.kind is Kind.HEIGHT else row.lower
+        room = np.minimum(rows[k] - least, row.upper - rows[k])[used]
+        if room.size:
+            name = row.kind.name.lower()
+            margins[name] = min(margins.get(name, np.inf), float(room.min()) * row.unit)
