@@ -38,6 +38,7 @@ def usual() -> dict[str, dict[str, Any]]:
     trial = hs.Trial(**walked, controller=law, step_length=0.3, step_duration=0.7)
     active = hs.ActiveContacts(resting=(0,))
     return {
+        "Campaign": {"trial": trial, "parameters": {"ground.friction": 0.5}, "trials": 2},
         "Actuated": {"controller": law},
         "Compliant": {},
         "ComputedTorque": on_a_gait,
@@ -110,7 +111,8 @@ def usual() -> dict[str, dict[str, Any]]:
     }
 
 
-RESULTS = """ActiveContacts BatchResult DisturbanceResponse Floquet Gait GaitFamily Gradient Largest
+RESULTS = """ActiveContacts BatchResult CampaignResults DisturbanceResponse Floquet Gait GaitFamily
+Gradient Largest
 LimitCycle ModeChange Monodromy Motion PhasedGait Robot Run RunDerivatives Snapshot StepDerivatives
 StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""

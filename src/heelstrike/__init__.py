@@ -101,6 +101,8 @@ if TYPE_CHECKING:
     from heelstrike.errors import SimulationError as SimulationError
     from heelstrike.errors import ViewError as ViewError
     from heelstrike.errors import WriteError as WriteError
+    from heelstrike.experiments.campaigns import Campaign as Campaign
+    from heelstrike.experiments.campaigns import CampaignResults as CampaignResults
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.experiments.spring_mass import SpringMass as SpringMass
     from heelstrike.gait import ContactPhase as ContactPhase
@@ -168,6 +170,8 @@ _HOME = {
     "Batch": "heelstrike.sim",
     "BatchResult": "heelstrike.sim",
     "Bundle": "heelstrike.compiler.bundle",
+    "Campaign": "heelstrike.experiments.campaigns",
+    "CampaignResults": "heelstrike.experiments.campaigns",
     "Compliant": "heelstrike.sim",
     "ComputedTorque": "heelstrike.control",
     "Constraint": "heelstrike.sim",

@@ -7,6 +7,8 @@ from typing import Annotated
 import typer
 
 from heelstrike import __version__
+from heelstrike.cli.campaign import campaign
+from heelstrike.cli.check import check
 from heelstrike.cli.compare import compare
 from heelstrike.cli.inspect import inspect
 from heelstrike.cli.paper import paper
@@ -26,7 +28,20 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
 )
-for command in (walk, watch, report, train, transfer, zoo, paper, compare, robots, inspect):
+for command in (
+    walk,
+    watch,
+    report,
+    train,
+    transfer,
+    zoo,
+    campaign,
+    check,
+    paper,
+    compare,
+    robots,
+    inspect,
+):
     app.command()(command)
 
 

@@ -212,10 +212,15 @@ def standing(
     return Entry(name, trial, needs, stands=True)
 
 
-def _joint_pd(robot: Robot, gait: Gait) -> Law:
+def servo_gains(robot: Robot) -> tuple[float, Floats]:
+    """Stiffness (N m/rad) and damping (N m s/rad) of servos that suit a robot's size."""
     size = _size(robot)
-    damping = _at_most(robot, 20.0 * size[0] * size[1] ** 1.5)
-    return JointPD(robot, gait, kp=1000.0 * size[0] * size[1], kd=damping, feedforward="full")
+    return 1000.0 * size[0] * size[1], _at_most(robot, 20.0 * size[0] * size[1] ** 1.5)
+
+
+def _joint_pd(robot: Robot, gait: Gait) -> Law:
+    kp, kd = servo_gains(robot)
+    return JointPD(robot, gait, kp=kp, kd=kd, feedforward="full")
 
 
 def _joint_springs(robot: Robot, q: Floats) -> Law:

@@ -20,6 +20,11 @@ RECOVERED = 1.5
 ANSWERS = {Cause.TORQUE_LIMIT: 0.02, Cause.SPEED_LIMIT: 0.02, Cause.CONTROLLER: 0.005}
 """What a controller shows that answers something else, such as a foot that slips or tips, and how
 long before (s) that is seen: a foot that begins to tip turns slowly at first."""
+DRIVEN, DRIVES = 1.5, 0.01
+"""Torque with which a controller drives a joint away, in the largest before, and how near in time
+(s) a foot tips: at once under what drives its ankle."""
+WILD_AFTER = 0.02
+"""Time (s) after its first symptom in which a run grows beyond all bounds that was never sound."""
 SUNK = 0.8
 """Height of the centre of mass above the ground, in that at the start, of a robot that goes
 down."""
@@ -137,9 +142,21 @@ def _unrecovered(found: tuple[Symptom, ...], end: float, calm: float) -> list[Sy
     if not found or end - latest > calm:
         return []
     chain = list(found[first:])
+    wild = next((each for each in chain if each.cause is Cause.NUMERICAL), None)
+    if wild is not None and wild.time <= chain[0].time + WILD_AFTER:
+        chain.remove(wild)
+        return [wild, *chain]
     soon = chain[0].time + ANSWERS.get(chain[0].cause, 0.0)
     cause = next(
         (each for each in chain if each.cause not in ANSWERS and each.time <= soon), chain[0]
     )
+    if cause.cause in (Cause.TIPPED_FORWARD, Cause.TIPPED_BACK):
+        cause = next((each for each in chain if _drives(each, cause.time)), cause)
     chain.remove(cause)
     return [cause, *chain]
+
+
+def _drives(each: Symptom, tipped: float) -> bool:
+    """Whether a controller drove a joint away as a foot tipped."""
+    strong = each.evidence.get("in_usual_torques", 0.0) > DRIVEN
+    return strong and abs(each.time - tipped) <= DRIVES

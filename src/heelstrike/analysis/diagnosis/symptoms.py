@@ -41,6 +41,8 @@ SLOW = 1e-3
 """Speed up to which a foot creeps and does not slide, in heights h by √(h/g)."""
 SLID = 0.01
 """How far a pressed foot slides in one go, in heights of the centre of mass."""
+SLID_FAST = 0.002
+"""The same of a foot that slides faster than the robot walks, and so leaves the ground again."""
 TIPPED, ROLLING = 0.01, 0.03
 """How far (rad) a foot turns about its toe or heel that tips, and for how long (s) at least."""
 ON_HEEL, FLAT, ON_TOE, NOTHING_PUSHES = -1, 0, 1, 9
@@ -48,6 +50,9 @@ ON_HEEL, FLAT, ON_TOE, NOTHING_PUSHES = -1, 0, 1, 9
 EARLY, LATE, LATE_UNSEEN = 0.85, 1.1, 1.3
 """Parts of a step before which a foot lands early, and after which late: of a gait, or of the steps
 of the run."""
+TOUCHES = 1e-3
+"""How near the ground a foot is down, whether it is pressed or not, in heights of the centre of
+mass."""
 IN_THE_AIR = 0.1
 """Part of a step that a foot is in the air at least before it can scuff."""
 FAST = 0.5
@@ -66,6 +71,8 @@ CLEAR_OF_STOP = 0.02
 """How far a gait keeps off the stops of joints, in parts of their range, for them to be one."""
 RUNAWAY = 8.0
 """Speed of a joint that its motor drives away, in radians over the time √(h/g)."""
+WILD = 100.0
+"""Speed of a joint, likewise, that no motor gives it: numbers that grow beyond all bounds."""
 BEGINS_TO_RUN = 2.0
 """The same when it begins."""
 SHORT_LEG, SHORTENING = 0.75, 0.92
@@ -196,6 +203,24 @@ class Walk:
         return np.asarray(self.run.position[:, joints] - reference)
 
     @cached_property
+    def full_torque(self) -> tuple[Rows, Floats, Rows]:
+        """Where motors give all that they can, that bound, and whether their speed sets it.
+
+        Each (nt, nu), the bound in N m.
+        """
+        run = self.run
+        lower, upper, _ = torque_bounds(run)
+        # Beyond the speed without load both bounds have one sign: then a motor can only brake.
+        with np.errstate(invalid="ignore"):
+            least = run.torque <= lower + (1.0 - REACHED) * np.abs(lower)
+            most = run.torque >= upper - (1.0 - REACHED) * np.abs(upper)
+        bound = np.where(most | (~least & (run.torque >= 0.0)), upper, lower)
+        full = np.isfinite(bound) & (least | most)
+        model = run.robot.model
+        by_speed = np.where(bound == upper, upper < model.torque_upper, lower > model.torque_lower)
+        return full, bound, by_speed
+
+    @cached_property
     def tilt(self) -> Floats:
         """Angle between the soles and the ground, (nt, nf), in rad; positive with the toe up.
 
@@ -270,7 +295,12 @@ def _slips(walk: Walk) -> Iterator[Symptom]:
         for first, last in _spells(run, np.asarray(sliding[:, contacts].any(axis=1))):
             after = min(last + 1, len(slid) - 1)
             distance = float((slid[after] - slid[first])[contacts].max())
-            if distance < SLID * walk.height:
+            inside = slice(first, last + 1)
+            speeds = np.where(
+                sliding[inside][:, contacts], run.slip_velocity[inside][:, contacts], 0
+            )
+            dragged = np.abs(speeds).max() > walk.speed
+            if distance < (SLID_FAST if dragged else SLID) * walk.height:
                 continue
             point = contacts[int(np.argmax(np.abs(run.slip_velocity[first, contacts])))]
             yield Symptom(
@@ -349,6 +379,8 @@ def _late_landings(walk: Walk) -> Iterator[Symptom]:
             row = min(int(np.searchsorted(run.time, due - 1e-9)), len(run.time) - 1)
             feet = [run.gap[row, list(foot.contacts)].min() for foot in run.robot.feet]
             swing = int(np.argmax(feet)) if feet else -1
+            if feet and walk.has_soles and feet[swing] < TOUCHES * walk.height:
+                continue  # it is down, and nothing presses it
             yield Symptom(
                 Cause.LATE_TOUCHDOWN if walk.has_soles else Cause.TIPPED_BACK, due, following,
                 run.robot.feet[swing].name if feet else "",
@@ -358,10 +390,7 @@ def _late_landings(walk: Walk) -> Iterator[Symptom]:
 
 def _torques_at_limits(walk: Walk) -> Iterator[Symptom]:
     run, error = walk.run, walk.error
-    lower, upper, by_speed = torque_bounds(run)
-    bound = np.where(run.torque < 0.0, lower, upper)
-    with np.errstate(invalid="ignore"):
-        full = np.isfinite(bound) & (np.abs(run.torque) >= REACHED * np.abs(bound))
+    full, bound, by_speed = walk.full_torque
     for i, name in enumerate(run.robot.actuator_names):
         for first, last in _spells(run, full[:, i], 0.5 * HELD):
             held = float(run.time[last] - run.time[first])
@@ -395,8 +424,8 @@ def _joints_at_stops(walk: Walk) -> Iterator[Symptom]:
             wanted = run.position[:, joint] - walk.error[:, actuator[joint]]
             ends = (wanted - model.lower[joint], model.upper[joint] - wanted)
             planned = float(np.minimum(*ends).min())
-        if planned < CLEAR_OF_STOP * (room if np.isfinite(room) else 1.0):
-            continue  # its gait goes there
+        if abs(planned) < CLEAR_OF_STOP * (room if np.isfinite(room) else 1.0):
+            continue  # its gait goes there, and not beyond
         for first, last in _spells(run, pressed):
             if run.time[last] - run.time[first] < HELD:
                 continue
@@ -448,7 +477,8 @@ def _departures(walk: Walk) -> Iterator[Symptom]:
     ):  # a law that plans its steps leaves the gait on purpose
         return
     away = np.abs(error)
-    let = (away > LEAVES) & (run.torque * error >= 0.0)
+    full, _, _ = walk.full_torque  # what is no fault of who asks for more
+    let = (away > LEAVES) & (run.torque * error >= 0.0) & ~full
     found = []
     for i, name in enumerate(run.robot.actuator_names):
         for first, last in _spells(run, let[:, i], 0.5 * HELD):
@@ -462,11 +492,14 @@ def _departures(walk: Walk) -> Iterator[Symptom]:
         first = found[0][0]
         same = [each for each in found if run.time[each[0]] - run.time[first] <= 2.0 * HELD]
         found = found[len(same) :]
-        _, last, i, name, _ = max(same, key=lambda each: each[-1])
+        begin, last, i, name, _ = max(same, key=lambda each: each[-1])
+        before = run.time < run.time[begin] - 2.0 * HELD
+        usual = float(np.abs(run.torque[before, i]).max(initial=0.0))
+        driven = float(np.abs(run.torque[begin, i])) / usual if usual > 0.0 else 0.0
         yield Symptom(
             Cause.CONTROLLER, float(run.time[first]), float(run.time[last]), name,
             {"missed_rad": float(away[first : last + 1, i].max()),
-             "torque_Nm": float(run.torque[last, i])},
+             "torque_Nm": float(run.torque[last, i]), "in_usual_torques": driven},
         )  # fmt: skip
 
 
@@ -476,26 +509,26 @@ def _is_pushed(run: Run, time: float) -> bool:
 
 def _ends(walk: Walk) -> Iterator[Symptom]:
     """Find what the simulation itself says of its end."""
-    cause = {
-        RunStatus.CONTROLLER_FAILED: Cause.CONTROLLER,
-        RunStatus.DIVERGED: Cause.NUMERICAL,
-        RunStatus.SOLVER_FAILED: Cause.NUMERICAL,
-    }.get(walk.run.status)
-    if cause is not None:
-        end = float(walk.run.time[-1])
-        yield Symptom(cause, end, end)
+    run, end = walk.run, float(walk.run.time[-1])
+    if run.status is RunStatus.CONTROLLER_FAILED:
+        yield Symptom(Cause.CONTROLLER, end, end)
+    elif run.status in (RunStatus.DIVERGED, RunStatus.SOLVER_FAILED):
+        speed = np.abs(run.velocity[:, run.robot.model.actuator_joint]).max(axis=1, initial=0.0)
+        wild = _spells(run, ~(speed * walk.pace <= WILD))
+        begin = wild[-1][0] if wild and wild[-1][1] == len(run.time) - 1 else len(run.time) - 1
+        yield Symptom(Cause.NUMERICAL, float(run.time[begin]), end)
 
 
 DETECTORS = (
     _ends,
     _departures,
     _runaways,
+    _joints_at_stops,
     _landings_amiss,
     _slips,
-    _tips,
-    _joints_at_stops,
-    _torques_at_limits,
     _late_landings,
+    _tips,
+    _torques_at_limits,
     _legs_that_fold,
 )
 """Each finds one kind; of what begins together, what an earlier one finds comes first."""

@@ -11,15 +11,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from heelstrike.analysis.stability.trial import Trial
+from heelstrike.analysis.stability.trial import FAR, Trial
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.sim.push import Push
-
-FAR = 1000.0
-"""How far ground that is not level goes, in m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,9 +187,7 @@ def largest_slope(
     sign = 1.0 if uphill else -1.0
 
     def recovers(degrees: float) -> bool:
-        edge = trial.edge
-        rise = sign * np.tan(np.deg2rad(degrees)) * FAR
-        ground = _ground(trial, [(edge - 1.0, 0.0), (edge, 0.0), (edge + FAR, rise)])
+        ground = trial.other_ground(slope=sign * float(np.deg2rad(degrees)))
         return _walks_on(trial, ground, same_speed=False)
 
     return largest(recovers, most=most, strides=strides, halvings=halvings, unit="degrees")
@@ -266,13 +261,9 @@ def largest_roughness(
     SimulationError
         If an argument is not usable.
     """
-    length = 3.0 * trial.speed * (trial.begins + trial.settling) + 2.0
 
     def recovers(amplitude: float) -> bool:
-        ground = Ground.rough(
-            amplitude=amplitude, spacing=spacing, length=length, seed=seed, start=trial.edge,
-            friction=_friction(trial),
-        )  # fmt: skip
+        ground = trial.other_ground(roughness=amplitude, spacing=spacing, seed=seed)
         return _walks_on(trial, ground, same_speed=False)
 
     return largest(recovers, most=most, strides=strides, halvings=halvings, unit="m")

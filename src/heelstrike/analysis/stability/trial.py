@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -29,6 +29,9 @@ from heelstrike.sim.whole_run import whole
 ROWS = 5
 # Time (s) simulated beyond the verdict: methods with steps end on one.
 BEYOND = 0.02
+# How far ground that is not level goes, and the corners of rough ground are apart (m).
+FAR = 1000.0
+SPACING = 0.1
 # A foot that is lifted by less than this (m) stands.
 ON_IT = 1e-3
 # Part of the speed that may differ after a push, and on other ground.
@@ -110,6 +113,69 @@ class Trial:
         lowest = points[:, 1].min()
         first = max(float(foot[:, 0].mean()) for foot in feet if foot[:, 1].min() < lowest + ON_IT)
         return first + (self.undisturbed + 0.5) * self.step_length
+
+    def other_ground(
+        self, *, friction: float | None = None, restitution: float | None = None,
+        slope: float = 0.0, roughness: float = 0.0, spacing: float = SPACING, seed: int = 0,
+    ) -> Ground:  # fmt: skip
+        """Return ground that is level up to the `edge` and another one beyond it.
+
+        Parameters
+        ----------
+        friction, restitution : float, optional
+            Of all of it; those of the trial's own ground by default.
+        slope : float
+            Inclination beyond the edge, in rad; positive climbs.
+        roughness : float
+            Greatest height or depth of corners beyond the edge, in m.
+        spacing : float
+            Distance between them, in m.
+        seed : int
+            Of their heights; each is that of a size times one shape.
+
+        Returns
+        -------
+        Ground
+            The ground.
+
+        Raises
+        ------
+        SimulationError
+            If the trial's own ground is not level where other ground is asked for, or a number is
+            impossible.
+        """
+        own = self.ground.model()
+        if slope == 0.0 and roughness == 0.0:
+            mu = self.ground.friction if friction is None else friction
+            bounce = self.ground.restitution if restitution is None else restitution
+            return replace(self.ground, friction=mu, restitution=bounce)
+        if len(own.friction) > 1:
+            raise SimulationError(
+                "a trial's own ground must be level: disturbances lay other ground"
+            )
+        if not abs(slope) < 0.5 * np.pi:
+            raise SimulationError(f"the slope must lie within ±π/2 rad, got {slope}")
+        mu = float(own.friction[0]) if friction is None else friction
+        bounce = float(own.restitution[0]) if restitution is None else restitution
+        edge = self.edge
+        if roughness == 0.0:
+            corners = [(edge - 1.0, 0.0), (edge, 0.0), (edge + FAR, np.tan(slope) * FAR)]
+            return Ground(friction=mu, restitution=bounce, profile=np.array(corners))
+        length = 3.0 * self.speed * (self.begins + self.settling) + 2.0
+        rough = Ground.rough(
+            amplitude=roughness,
+            spacing=spacing,
+            length=length,
+            seed=seed,
+            start=edge,
+            friction=mu,
+            restitution=bounce,
+        )
+        if slope == 0.0:
+            return rough
+        profile = np.array(rough.profile)
+        profile[:, 1] += np.tan(slope) * np.maximum(profile[:, 0] - edge, 0.0)
+        return replace(rough, profile=profile)
 
     def run(
         self, until: float, *, pushes: Sequence[Push] = (), ground: Ground | None = None,

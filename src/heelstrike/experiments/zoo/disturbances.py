@@ -14,7 +14,6 @@ import numpy as np
 
 from heelstrike.analysis import torque_cost
 from heelstrike.analysis.stability.largest import (
-    FAR,
     Largest,
     largest,
     largest_ground_step,
@@ -22,7 +21,7 @@ from heelstrike.analysis.stability.largest import (
     largest_roughness,
     largest_slope,
 )
-from heelstrike.analysis.stability.trial import Trial
+from heelstrike.analysis.stability.trial import FAR, Trial
 from heelstrike.contact.ground import Ground
 from heelstrike.experiments.laws import BRAVO7_STEP, BRAVO7_WEIGHT
 from heelstrike.experiments.walk import typical_step

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import threading
@@ -9,8 +10,8 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from dataclasses import field
-from time import perf_counter
+from dataclasses import field, replace
+from time import perf_counter, thread_time
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.batch.batch import NO_ROWS, checked_threads
-from heelstrike.sim.batch.lane import Ending
+from heelstrike.sim.batch.lane import Ending, Lane
 from heelstrike.sim.batch.lanes import Lanes
 from heelstrike.sim.batch.planning import Joints, Plan, compile_all, naming, planned
 from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus
@@ -159,6 +160,7 @@ def simulate_batch(
     braked: Joints | Sequence[Joints] = (),
     on_error: OnError | str = OnError.WARN,
     threads: int | None = None,
+    time_limit: float | None = None,
     progress: Callable[[int, int], None] | bool | None = None,
 ) -> BatchResult:
     """Simulate many runs at once.
@@ -209,6 +211,9 @@ def simulate_batch(
         so; ``"raise"`` raises it, and the batch is lost; ``"stop"`` does neither.
     threads : int, optional
         Threads to work with; by default one a processor.
+    time_limit : float, optional
+        Seconds of a processor after which a run is given up: it ends as ``INTERRUPTED``, and its
+        message tells.
     progress : callable or bool, optional
         Called with the numbers of finished and of all runs; true shows a bar, false nothing. By
         default there is a bar on a terminal and nothing elsewhere. If it raises, that ends all runs
@@ -243,6 +248,8 @@ def simulate_batch(
     workers = (os.cpu_count() or 1) if threads is None else threads
     if workers < 1:
         raise SimulationError(f"threads must be at least 1, got {threads}")
+    if time_limit is not None and not time_limit > 0.0:
+        raise SimulationError(f"time_limit must be positive (s) or None, got {time_limit}")
     method = checked_method(method)
     setup: dict[str, Any] = {
         "control_period": control_period,
@@ -264,7 +271,7 @@ def simulate_batch(
         rows = sum(method.rows_in(each, record_every) for each in durations)
         check_runs(plans[0].setting.robot, rows, len(plans), record_every)
     compile_s = compile_all(method, plans)
-    work = _Work(plans, durations, method, recorded=record_every is not None)
+    work = _Work(plans, durations, method, recorded=record_every is not None, limit=time_limit)
     threads = checked_threads(workers, len(plans))
     with _shown(progress, len(plans)) as show:
         work.finish(threads, show)
@@ -305,10 +312,11 @@ class _Work:
     """Runs that are simulated to their ends, some lanes at a time."""
 
     def __init__(
-        self, plans: Sequence[Plan], durations: Sequence[float], method: Method, *, recorded: bool
-    ) -> None:
+        self, plans: Sequence[Plan], durations: Sequence[float], method: Method, *, recorded: bool,
+        limit: float | None,
+    ) -> None:  # fmt: skip
         self._plans, self._durations, self._method = plans, durations, method
-        self._recorded = recorded
+        self._recorded, self._limit = recorded, math.inf if limit is None else limit
         self._stop = threading.Event()
         self._why = ""
         self._lock = threading.Lock()
@@ -339,8 +347,8 @@ class _Work:
             for index in np.flatnonzero(lanes.thread == thread).tolist():
                 if self._stop.is_set():
                     return
-                self._endings[first + index] = lanes.take(index).to_the_end(
-                    self._durations[first + index], self._stop.is_set
+                self._endings[first + index] = self._end(
+                    lanes.take(index), self._durations[first + index]
                 )
                 with self._lock:
                     self._done += 1
@@ -351,6 +359,17 @@ class _Work:
             for future in done:
                 future.result()
             self._show(show)
+
+    def _end(self, lane: Lane, duration: float) -> Ending:
+        """Simulate a run to its end, or until it has taken too long."""
+        end = thread_time() + self._limit
+        ending = lane.to_the_end(duration, lambda: self._stop.is_set() or thread_time() > end)
+        late = thread_time() > end and not self._stop.is_set()
+        if late and ending.status is RunStatus.INTERRUPTED:
+            told = f"took more than {self._limit:g} s of the processor: {ending.message}"
+            run = ending.run and replace(ending.run, message=told)
+            return replace(ending, message=told, run=run)
+        return ending
 
     def _show(self, show: Callable[[int, int], None]) -> None:
         """Show how far it is; what that raises ends all runs, unless all have ended."""

@@ -38,12 +38,8 @@ def provenance(run: Run, gait: Gait | None = None, *, command: str = "") -> dict
         The command that made it, if one did.
     """
     found = {"command": command} if command else {}
-    packages = ", ".join(f"{name} {_version(name)}" for name in COMPUTING)
+    found |= versions()
     found |= {
-        # A run from a file may have been computed with others, which it does not tell.
-        "page written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        "by": f"heelstrike {heelstrike.__version__} with {packages}, Python "
-        f"{platform.python_version()}, {platform.system()} {platform.machine()}",
         "robot": _robot(run.robot),
         "ground": ground_in_words(run.ground),
         "method": _method(run),
@@ -63,6 +59,17 @@ def provenance(run: Run, gait: Gait | None = None, *, command: str = "") -> dict
             f"{run.time[-1]:.6g} s, {len(run.events)} events"
         )
     return found
+
+
+def versions() -> dict[str, str]:
+    """Say when a page is written, and by what, label by label."""
+    packages = ", ".join(f"{name} {_version(name)}" for name in COMPUTING)
+    return {
+        # A run from a file may have been computed with others, which it does not tell.
+        "page written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "by": f"heelstrike {heelstrike.__version__} with {packages}, Python "
+        f"{platform.python_version()}, {platform.system()} {platform.machine()}",
+    }
 
 
 def command_line(words: Sequence[str]) -> str:

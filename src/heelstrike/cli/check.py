@@ -1,0 +1,87 @@
+"""``heelstrike check``: a trajectory before it reaches hardware."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from heelstrike.cli.options import AsJson, Friction, Reading
+from heelstrike.cli.terminal import FAILED, output, spoken, stage, this_command, wrote
+
+
+# As many arguments as the command has options: a person's, none of which is handed on one by one.
+@spoken
+def check(
+    trajectory: Annotated[
+        Path, typer.Argument(help="Table of text: a column a driven joint, and the time.")
+    ],
+    *,
+    robot: Annotated[
+        str, typer.Option(help="A built-in robot, or an MJCF, URDF or SDF file.")
+    ] = "bravo7",
+    rate: Annotated[
+        float | None, typer.Option(help="Rows a second, where there is no column of times.")
+    ] = None,
+    unit: Annotated[
+        str, typer.Option(help="Of columns that name none: rad or deg.", show_default="rad")
+    ] = "",
+    friction: Friction = 0.75,
+    stiffness: Annotated[
+        float | None,
+        typer.Option(help="Of the servos, in N m/rad.", show_default="suits the robot's size"),
+    ] = None,
+    damping: Annotated[
+        float | None,
+        typer.Option(help="Of the servos, in N m s/rad.", show_default="suits the robot's size"),
+    ] = None,
+    trials: Annotated[
+        int, typer.Option(min=0, help="Walks with tolerances of mass, ground and delay.")
+    ] = 64,
+    seed: Annotated[int, typer.Option(min=0, help="Of those.")] = 0,
+    how: Reading,
+    page: Annotated[
+        Path | None, typer.Option(dir_okay=False, help="Also write the walk of it as a page.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Check a trajectory of joints: what stands against it, and whether the robot walks it.
+
+    The foot that stands lies flat: trunk and phases follow. Then inverse dynamics against motors,
+    soles and friction, a walk on hard contact by servos, and walks with tolerances. The exit status
+    is 0 if nothing stands against it, 1 if something does.
+    """
+    with stage("loading"):
+        from heelstrike.experiments.checking import check_motion
+        from heelstrike.gait.motion_files import load_recorded_motion
+        from heelstrike.robot import builtin_robots, load_robot
+        from heelstrike.view.page.page import check_page, save_html
+
+        if page is not None:
+            check_page(page)
+        built_in = robot in builtin_robots()
+        machine = load_robot(robot) if built_in else load_robot(robot, **how.keywords())
+        motion = load_recorded_motion(trajectory, machine, rate=rate, unit=unit)
+    with stage("checking") as doing:
+        found = check_motion(
+            machine, motion, friction=friction, stiffness=stiffness, damping=damping,
+            trials=trials, seed=seed, progress=lambda what: doing.doing(what, 0.0),
+        )  # fmt: skip
+    if page is not None and found.run is not None and len(found.run.time):
+        wrote(save_html(found.run, page, command=this_command()))
+    if as_json:
+        told = {
+            "good": found.good, "headline": found.headline,
+            "findings": [asdict(each) | {"broken": each.broken} for each in found.findings],
+        }  # fmt: skip
+        if found.campaign is not None:
+            good = int(found.campaign.success.sum())
+            told["tolerances"] = {"trials": len(found.campaign), "success": good}
+        typer.echo(json.dumps(told, indent=2))
+    else:
+        output().print(str(found), markup=False)
+    if not found.good:
+        raise typer.Exit(FAILED)

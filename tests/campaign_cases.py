@@ -1,0 +1,29 @@
+"""Trials that cost next to nothing, and one that walks."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import walking
+
+import heelstrike as hs
+
+
+@cache
+def limp(settling: float = 0.03) -> hs.Trial:
+    """Return bravo7 without torques, for some milliseconds."""
+    robot = walking.bravo7()
+    return hs.Trial(
+        robot=robot, controller=None, state=robot.standing(hs.Ground()), step_length=0.0,
+        step_duration=0.01, settling=settling,
+    )  # fmt: skip
+
+
+@cache
+def walks() -> hs.Trial:
+    """Return bravo7 on its gait, by computed torque."""
+    gait = walking.gait()
+    return hs.Trial(
+        robot=walking.bravo7(), controller=hs.ComputedTorque(walking.bravo7(), gait),
+        state=gait.initial_state, step_length=gait.step_length, step_duration=gait.step_duration,
+    )  # fmt: skip
