@@ -18,7 +18,8 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c c
 OLDEST_NUMBA := $(shell sed -n 's/.*"numba>=\([0-9.]*\)".*/\1/p' pyproject.toml)
 NUMBA_SAMPLE := tests/compiler tests/dynamics/queries/test_c_code.py tests/contact/solvers tests/sim/test_walking.py
 
-PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile
+CHOSEN ?=
+PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile $(CHOSEN)
 BLAS_KERNELS ?= $(if $(filter x86_64 amd64 AMD64,$(shell uname -m)),Nehalem Haswell,ARMV8 CORTEXA57)
 SAMPLE := tests/compiler/test_plain_code.py tests/compiler/test_straight_line.py tests/contact \
 	tests/sim/contacts/test_geometry.py tests/experiments/test_paper.py

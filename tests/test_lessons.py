@@ -22,6 +22,7 @@ GALLERY = ROOT / "docs" / "gallery.ipynb"
 
 @pytest.mark.filterwarnings("ignore:stick_slip. numbers that are unlikely")
 @pytest.mark.parametrize("lesson", [*LESSONS, GALLERY], ids=lambda path: path.stem)
+@pytest.mark.slow
 def test_a_lesson_runs(lesson: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(plt, "show", lambda: None)

@@ -302,6 +302,7 @@ ERRORS = {
 
 
 @POSIX
+@pytest.mark.slow
 def test_every_writer_beyond_a_quota(tmp_path: Path) -> None:
     """A limit on the size of files stands for a quota: write(2) fails, in the middle or at once."""
     folder = tmp_path / "out"

@@ -322,6 +322,7 @@ def test_a_walk_that_goes_on_repeats_after_two_steps() -> None:
     assert again.period == pytest.approx(step.period, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_footstep_feedback_repeats_with_its_samples_and_its_memory() -> None:
     """Time stepping at 1 ms, the controller called at every step.
 

@@ -10,6 +10,7 @@ TEXT = '''"""A module,
 in two lines."""
 
 import math  # counts
+import pytest
 
 SIZE = 1.0
 """What is said of a number."""
@@ -32,6 +33,7 @@ def test_what_counts_as_a_line_of_code(tmp_path: Path) -> None:
     assert code_lines(file) == 2 + 3 + 2 + 1
 
 
+@pytest.mark.slow
 def test_rooms_by_their_depth() -> None:
     rooms, folders = counted(1), counted(2)
     assert sum(code for code, _ in rooms.values()) == sum(code for code, _ in folders.values())

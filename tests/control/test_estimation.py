@@ -62,6 +62,7 @@ def seen_again(run: hs.Run, steps: int, **sensors: Any) -> tuple[np.ndarray, np.
 
 
 @pytest.mark.parametrize(("bits", "noise"), [(14, 1e-4), (12, 0.0), (14, 1e-3)])
+@pytest.mark.slow
 def test_half_the_error_of_the_best_difference(bits: int, noise: float) -> None:
     """A walk of four steps, seen with the noise of encoders, 1e-4 rad of pitch and 5 N."""
     run, steps = walking.walk(), 2800
@@ -95,6 +96,7 @@ def test_a_robot_walks_on_its_estimate() -> None:
     assert mean(error) < 0.01
 
 
+@pytest.mark.slow
 def test_a_push_that_the_model_does_not_know_is_followed() -> None:
     """After the push the estimate comes back within the filter's time."""
     robot = walking.bravo7()

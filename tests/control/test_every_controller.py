@@ -86,6 +86,7 @@ def usual(name: str) -> hs.Run:
 
 
 @every
+@pytest.mark.slow
 def test_it_is_compiled_and_the_same_in_python(name: str) -> None:
     law = case(name)[2]
     assert law.function.compiles

@@ -77,6 +77,7 @@ def memory_with(draw: np.random.Generator) -> Memory:
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.slow
 def test_derivatives_of_the_gait_that_changes(seed: int) -> None:
     """Against central differences, with a shift that goes over to another along the step."""
     draw = np.random.default_rng(seed)
@@ -217,6 +218,7 @@ def test_the_multipliers_with_feedback() -> None:
         np.testing.assert_allclose(cycle.state.v, start.v, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_it_stands_what_the_law_without_feedback_does_not() -> None:
     """A push after which no energy is left to come over the stance foot."""
     laws = hs.SteppingConstraints(family()), hs.VirtualConstraints(family().gait)

@@ -242,6 +242,7 @@ def test_a_slower_controller_is_held() -> None:
     assert len(np.unique(run.torque[:, 0])) == 6
 
 
+@pytest.mark.slow
 def test_shells_in_shells() -> None:
     inner = hs.Estimated(law())
     both = hs.Actuated(hs.Sensed(inner, encoders=hs.Encoders(bits=14)), delay=1e-3)

@@ -123,6 +123,7 @@ def test_five_links_are_where_the_source_says() -> None:
     assert zero.period == pytest.approx(0.3005558323, abs=1e-10)
 
 
+@pytest.mark.slow
 def test_five_links_have_the_multiplier_of_their_zero_dynamics() -> None:
     """Invariance makes δ² an eigenvalue of the closed loop's return map, whatever the gains.
 

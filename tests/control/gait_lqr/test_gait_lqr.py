@@ -93,6 +93,7 @@ def test_the_riccati_equation_is_that_of_the_least_cost() -> None:
         assert total(change) > least * (1.0 + 1e-4)
 
 
+@pytest.mark.slow
 def test_multipliers_are_those_of_the_closed_loop() -> None:
     """Of the walk as simulated, through its impacts, by flows and saltations."""
     found = hs.find_limit_cycle(gait().robot, zero().initial_state, law())

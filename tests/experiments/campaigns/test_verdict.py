@@ -31,6 +31,7 @@ def results_of(
     return hs.CampaignResults(plan, tuple(range(len(outcomes))), outcomes)
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     """2000 campaigns of 400 trials; of so many the share itself has a deviation of 0.5 %.
 

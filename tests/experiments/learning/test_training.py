@@ -119,6 +119,7 @@ def test_training_that_was_killed_comes_to_the_same(tmp_path: Path) -> None:
         again.restore(damaged)
 
 
+@pytest.mark.slow
 def test_a_policy_gets_better_and_runs_in_the_loop(tmp_path: Path) -> None:
     recipe = Recipe(lanes=32, horizon=64, minibatch=512, epochs=6, seed=1)
     trainer = Trainer(TASK, 24_000, recipe)

@@ -47,6 +47,7 @@ def test_a_step_on_a_slope_ends_as_it_began(slope: float, shift: float) -> None:
     assert first[2] == pytest.approx(before[2], abs=1e-5)
 
 
+@pytest.mark.slow
 def test_the_gait_in_the_middle_is_the_gait() -> None:
     middle = family().at(0.0)
     np.testing.assert_allclose(middle.coefficients, gait().coefficients, atol=1e-14)

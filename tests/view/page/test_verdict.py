@@ -63,6 +63,7 @@ def test_a_run_whose_impacts_made_energy_is_not_good() -> None:
         ("SteppingConstraints", "the law that it had steps"),
     ],
 )
+@pytest.mark.slow
 def test_a_law_that_just_fell_is_not_advised(law: str, named: str) -> None:
     robot = hs.load_robot("rabbit")
     run = walk(robot, gait_for(robot), steps=1, law=law_called(law))

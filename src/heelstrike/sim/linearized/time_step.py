@@ -29,7 +29,7 @@ from heelstrike.contact.linearized.partials import (
     partial_program,
 )
 from heelstrike.contact.modes import OPEN, SLIP_FORWARD, STICK
-from heelstrike.contact.sets import LINE
+from heelstrike.contact.sets import LINE, row_of
 from heelstrike.dynamics.dense import triangulate
 from heelstrike.dynamics.kernels import forward_kinematics
 from heelstrike.dynamics.loops import LoopRows, count_rows
@@ -232,8 +232,11 @@ def differentiate_problem(
         for k in range(2):
             balance.push[assembly.candidate[place], k] = impulse[2 * place + k] / step
     balance.ahead[1] = slopes.turning * step
-    for row in range(balance.pull.shape[0]):
-        balance.pull[row] = impulse[2 * (assembly.begin[LOOP] + row)] / step
+    pulling = 0  # rows of loops come first among those that always hold, brakes after them
+    for place in range(assembly.begin[LOOP], assembly.until[LOOP]):
+        if pulling < balance.pull.shape[0]:
+            balance.pull[pulling] = impulse[row_of(place, assembly.problem.first)] / step
+            pulling += 1
     evaluate(model, after, slopes)
     rows, partials = slopes.active, slopes.partials
     rate = 1.0 / step if gaps else 0.0
@@ -244,12 +247,10 @@ def differentiate_problem(
         surface.friction, surface.restitution, balance.rows, partials.along_by_q, rows,
     )  # fmt: skip
     active = write_joints(active, mode, rate, assembly, memory.rows.owner, memory.rows.side, rows)
-    if assembly.until[LOOP] > assembly.begin[LOOP]:
-        active = write_loops(
-            active, assembly.begin[LOOP], assembly.until[LOOP], candidate, model.brake_joint,
-            memory.rows.kind, memory.rows.owner,
-            slopes.loops.jacobian, partials, rows,
-        )  # fmt: skip
+    active = write_loops(
+        active, assembly.begin[LOOP], assembly.until[LOOP], candidate, model.brake_joint,
+        memory.rows.kind, memory.rows.owner, slopes.loops.jacobian, partials, rows,
+    )  # fmt: skip
     write_free(model, step, active, partials, rows)
     if memory.pushes.link.shape[0] > 0:
         push_free(step, active, slopes.pushed_by_q, rows.response)
