@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from lines import code_lines, counted
 
 TEXT = '''"""A module,
 in two lines."""
 
 import math  # counts
-import pytest
 
 SIZE = 1.0
 """What is said of a number."""

@@ -71,9 +71,7 @@ def test_where_loops_hold_pivots_are_searched() -> None:
 
 def test_a_law_keeps_no_addresses() -> None:
     """It goes to other processes, and to robots whose code is another: addresses are the run's."""
-    robot = dataclasses.replace(
-        walking.bravo7()
-    )  # what other tests made of the robot does not count
+    robot = dataclasses.replace(walking.bravo7())
     law = hs.FootstepFeedback(robot, walking.gait())
     assert not np.any(law.parameters.constrained)
     parameters, _ = law.numbers(robot)
