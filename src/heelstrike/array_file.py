@@ -45,8 +45,10 @@ def write_arrays(path: str | os.PathLike[str], arrays: Mapping[str, ArrayLike]) 
         If it cannot be written.
     """
     image = io.BytesIO()
-    named = {name: np.asarray(array) for name, array in arrays.items()}
-    np.savez(image, allow_pickle=False, **named)
+    with zipfile.ZipFile(image, "w") as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, np.asarray(array), allow_pickle=False)
     return write_whole(path, image.getbuffer())
 
 

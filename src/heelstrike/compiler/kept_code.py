@@ -115,8 +115,11 @@ def _locked(file: Path) -> Any:
         return None
     with suppress(sqlite.Error):
         held = sqlite.connect(file, timeout=LONGEST_WAIT, isolation_level=None)
-        with suppress(sqlite.Error):
+        try:
             held.execute("BEGIN EXCLUSIVE")
+        except sqlite.Error:  # another holds it still: its lock stays
+            held.close()
+            return None
         return held
     return None
 

@@ -57,7 +57,7 @@ class Parameters(Bundle):
     fresh: Integers = array("phases", "nc", of=int)
     """Whether the touchdown of a contact point ends a phase."""
     following: Integers = array("phases", of=int)
-    """The phase after each; itself after the last of a motion that never repeats."""
+    """The phase after each; -1 after the last of a motion that never repeats."""
     kp: Floats = array("nu")
     kd: Floats = array("nu")
     """kp, kd: Gains (1/s², 1/s)."""
@@ -102,7 +102,7 @@ def advance_phase(t: float, contacts: Contacts, parameters: Parameters, memory: 
         if parameters.fresh[phase, i] == 1:
             ends_by_touchdown = True
             touched = touched or contacts.force[i, 0] > 0.0
-    if parameters.following[phase] == phase:
+    if parameters.following[phase] < 0:
         return
     if ends_by_touchdown:
         if touched and gone >= parameters.earliest * duration:
@@ -160,7 +160,7 @@ def motion_tracking(
     phase = memory.phase
     duration = parameters.duration[phase]
     gone, latest = t - memory.start, parameters.latest * duration
-    if parameters.following[phase] == phase:
+    if parameters.following[phase] < 0:
         latest = duration
     moves = 0.0 if gone > latest else 1.0
     gone = min(gone, latest)
@@ -228,7 +228,9 @@ class MotionTracking(Law):
     Raises
     ------
     ControllerError
-        If gains or motion do not fit the robot.
+        If the gains do not fit the robot.
+    GaitError
+        If the motion was designed for another robot.
     """
 
     def __init__(
@@ -242,12 +244,12 @@ class MotionTracking(Law):
         unknowns = robot.nv + free + 4 * robot.nc
         repeats = motion.repeat is not Repeat.NEVER
         stands = [_rows_of(robot, phase) for phase in cycle]
-        starts = [*range(1, len(cycle)), 0 if repeats else len(cycle) - 1]
+        starts = [*range(1, len(cycle)), 0 if repeats else -1]
         points = [set(phase.contacts) for phase in cycle]
         fresh = np.zeros((len(cycle), robot.nc), np.int64)
         for p, following in enumerate(starts):
-            for name in points[following] - points[p]:
-                fresh[p, robot.contact_names.index(name)] = following != p
+            for name in points[following] - points[p] if following >= 0 else ():
+                fresh[p, robot.contact_names.index(name)] = 1
         parameters = Parameters(
             duration=np.array([phase.duration for phase in cycle]),
             begins=np.concatenate([phase.breakpoints[:-1] for phase in cycle]),
@@ -263,7 +265,7 @@ class MotionTracking(Law):
             earliest=EARLIEST,
             latest=LATEST,
         )
-        sizes = {"unknowns": max(unknowns, 2 * robot.nc), "rows": 2 * robot.nc}
+        sizes = {"unknowns": unknowns, "rows": 2 * robot.nc}
         super().__init__(motion_tracking, parameters, memory=sizes, robot=robot)
         self.motion = motion
 

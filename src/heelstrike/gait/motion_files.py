@@ -97,7 +97,7 @@ def load_recorded_motion(
     GaitError
         If it is no such file, a joint is missing, or numbers are; the message has the place.
     """
-    if unit and unit not in UNITS:
+    if unit not in ("", "rad", "deg"):
         raise GaitError(f"unit must be rad or deg, got {unit!r}")
     lines = _lines(path)
     if not lines:
@@ -183,7 +183,7 @@ def _times(
 ) -> Floats:
     table = np.asarray(numbers, dtype=np.float64)
     if column is None:
-        if rate is None or not rate > 0.0:
+        if rate is None or not 0.0 < rate < np.inf:
             raise GaitError(f"{path}: there is no column of times; say the rate (rows a second)")
         return np.arange(len(table)) / rate
     time: Floats = table[:, column] - table[0, column]

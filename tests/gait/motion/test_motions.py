@@ -165,7 +165,6 @@ def test_one_that_limps_repeats_itself(limping: hs.Motion) -> None:
     later = limping.position(limping.duration + 0.1)
     later[0] -= limping.distance
     np.testing.assert_allclose(later, limping.position(0.1), atol=1e-9)
-    assert limping.phases[0].duration > limping.phases[1].duration + 0.05
 
 
 def test_one_that_never_repeats_begins_and_ends_as_asked(
@@ -229,6 +228,10 @@ def test_saved_and_read_back_unchanged(
         ({"duration": 9.0}, "beyond that"),
         ({"friction": -0.1}, "friction must not be negative"),
         ({"slope": 1.2}, "slope must be between"),
+        ({"slope": np.nan}, "slope must be between"),
+        ({"distance": "x", "speed": None}, "distance must be a number"),
+        ({"distance": (-0.3, 0.3), "speed": None}, "must not have both signs"),
+        ({"distance": 9.0, "speed": 0.5}, "the phases last from"),
         ({"starts": 0}, "starts must be from 1"),
         ({"cost": "money"}, "cost must be one of"),
     ],
@@ -239,6 +242,17 @@ def test_what_makes_no_sense_is_refused(rabbit: hs.Robot, asked: dict, said: str
         hs.optimize_motion(rabbit, **given)
 
 
+def test_pieces_may_be_numbers_of_numpy() -> None:
+    assert hs.ContactPhase("right_foot", pieces=np.int64(4)).pieces == 4
+
+
+def test_velocities_repeat_without_a_rest(running: hs.Motion) -> None:
+    """Rounding of times that are nearly multiples of the duration stops nothing."""
+    times = running.duration * np.arange(1, 200)
+    for t in (times, np.nextafter(times, 0.0), np.cumsum(np.full(200, running.duration))):
+        assert np.abs(running.velocity(t)[:, 0]).min() > 1.0
+
+
 def test_states_that_do_not_stand_are_refused(bravo7: hs.Robot) -> None:
     """What stands must be on the ground, and be where it was."""
     low, high = (crouched(bravo7, knee) for knee in (0.9, 0.3))
@@ -246,14 +260,20 @@ def test_states_that_do_not_stand_are_refused(bravo7: hs.Robot) -> None:
     lifted, moved = high.q.copy(), high.q.copy()
     lifted[1] += 0.01
     moved[0] += 0.01
-    for q, said in ((lifted, "0.01 m away from the ground"), (moved, "would have to move by 0.01")):
+    sliding = high.v.copy()
+    sliding[0] = 0.2
+    for q, v, said in (
+        (lifted, high.v, "0.01 m away from the ground"),
+        (moved, high.v, "would have to move by 0.01"),
+        (high.q, sliding, "moves at 0.2 m/s"),
+    ):
         with pytest.raises(hs.GaitError, match=said):
             hs.optimize_motion(
-                bravo7, [both], repeat="never", start=low, end=hs.State(q, high.v), starts=1
+                bravo7, [both], repeat="never", start=low, end=hs.State(q, v), starts=1
             )
 
 
-@pytest.mark.parametrize("duration", [0.0, (0.3, 0.1), (0.1, 0.2, 0.3), np.nan])
+@pytest.mark.parametrize("duration", ["fast", {}, True, 0.0, (0.3, 0.1), (0.1, 0.2, 0.3), np.nan])
 def test_durations_are_refused(duration: object) -> None:
     with pytest.raises(hs.GaitError, match="duration of a phase"):
         hs.ContactPhase("right_foot", duration=duration)  # type: ignore[arg-type]
@@ -286,8 +306,9 @@ def followed(
 
 
 def largest_error(run: hs.Run, motion: hs.Motion) -> float:
-    """Of a coordinate, at rows that are not just at a touchdown."""
-    apart = np.abs(run.time % motion.duration - motion.duration) > 1e-4
+    """Of a coordinate in the first cycle, at rows that are not just at a touchdown."""
+    apart = run.time < motion.duration
+    apart &= np.abs(run.time % motion.duration - motion.duration) > 1e-4
     return float(np.abs(run.position - motion.position(run.time))[apart].max())
 
 
@@ -295,7 +316,7 @@ def largest_error(run: hs.Run, motion: hs.Motion) -> float:
 def test_event_driven_it_moves_as_designed(name: str, request: pytest.FixtureRequest) -> None:
     """In each phase what is to stand stands, and phases end when they are to end."""
     motion, robot = request.getfixturevalue(name), robot_of(name, request)
-    run = followed(robot, motion, hs.EventDriven(rtol=1e-9, atol=1e-11))
+    run = followed(robot, motion, hs.EventDriven(rtol=1e-9, atol=1e-11), 1.05)
     assert largest_error(run, motion) < 3e-5
     down = [e.time for e in run.events if e.kind is hs.sim.EventKind.TOUCHDOWN]
     planned = [
@@ -303,6 +324,7 @@ def test_event_driven_it_moves_as_designed(name: str, request: pytest.FixtureReq
         for end, phase in zip(motion.ends, motion.phases, strict=True)
         if phase.impulse.any() and end < run.time[-1] - 1e-9
     ]
+    assert planned or name == "rising"
     for end in planned:
         assert min(abs(t - end) for t in down) < 1e-5
     for end, phase in zip(motion.ends, motion.phases, strict=True):

@@ -228,6 +228,8 @@ class Campaign:
         """
         if workers is not None and workers < 1:
             raise SimulationError(f"workers must be at least 1, got {workers}")
+        if limit is not None and not limit > 0.0:
+            raise SimulationError(f"limit must be a positive number of seconds, got {limit}")
         digests = self._digests()
         store = None if folder is None else Store(Path(folder))
         try:

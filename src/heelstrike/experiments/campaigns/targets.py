@@ -57,6 +57,11 @@ class Target:
     def applied(self, before: Any, value: float) -> Any:
         """Return what becomes of a number, or of several."""
         if self.how == "*":
+            if not np.any(before):
+                raise SimulationError(
+                    f"{self.group}.{self.number} * would do nothing: it is zero. Set it, or add to "
+                    "it with +"
+                )
             return before * value
         return before + value if self.how == "+" else np.zeros_like(before) + value
 
@@ -115,7 +120,9 @@ def laid(trial: Trial, values: Mapping[str, Any], seed: int) -> Laid:
 
     def given(group: str) -> list[tuple[Target, float]]:
         return [
-            (each, float(values[name])) for name, each in targets.items() if each.group == group
+            (each, _number(name, values[name]))
+            for name, each in targets.items()
+            if each.group == group
         ]
 
     robot = _robot(trial.robot, given("robot"))
@@ -131,6 +138,13 @@ def laid(trial: Trial, values: Mapping[str, Any], seed: int) -> Laid:
     law = _sensed(law, given("sensors"), seed)
     law = _actuated(law, given("actuators"))
     return Laid(robot, law, state, ground, _pushes(trial, given("push")))
+
+
+def _number(name: str, value: Any) -> float:
+    """Return the value of a parameter, or refuse one that is no number."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        raise SimulationError(f"parameter {name!r} must be a number, got {value!r}")
+    return float(value)
 
 
 def _robot(robot: Robot, given: list[tuple[Target, float]]) -> Robot:
@@ -222,6 +236,7 @@ def _ground(trial: Trial, given: list[tuple[Target, float]], seed: int) -> Any:
             raise SimulationError(
                 f"ground has no {each.number!r}.{guess} It has {', '.join(GROUND)}"
             )
+        _refuse_where(each)
         before = 0.0
         if each.number in ("friction", "restitution"):
             before = float(getattr(known, each.number)[0])
@@ -241,6 +256,8 @@ def _pushes(trial: Trial, given: list[tuple[Target, float]]) -> tuple[Push, ...]
             )
         numbers[each.number] = float(each.applied(numbers[each.number], value))
         link = each.where or link
+    if given and not any(each.number == "impulse" for each, _ in given):
+        raise SimulationError("a push needs push.impulse; without it there is none")
     if numbers["impulse"] == 0.0:
         return ()
     if not numbers["duration"] > 0.0:
@@ -281,7 +298,14 @@ def _changed(bundle: Bundle, path: list[str], change: Callable[[Any], Any]) -> B
             f"has {', '.join(names) or 'none'}"
         )
     found = np.array(now, dtype=np.float64)
-    rows: Any = int(path[1]) if len(path) > 1 and path[1].isdecimal() else ...
+    rows: Any = ...
+    if len(path) > 1:
+        if not path[1].isdecimal() or found.ndim == 0 or int(path[1]) >= len(found):
+            raise SimulationError(
+                f"{'.'.join(path)!r} of the controller: after {name!r} stands the index of one of "
+                f"its {len(found) if found.ndim else 'no'} rows, from 0, or nothing"
+            )
+        rows = int(path[1])
     found[rows] = change(found[rows])
     return bundle.replaced(**{name: found if isinstance(now, np.ndarray) else float(found)})
 
@@ -313,12 +337,21 @@ def _numbers(
     group: str, known: Mapping[str, str], given: list[tuple[Target, float]]
 ) -> dict[str, float]:
     for each, _ in given:
+        _refuse_where(each)
         if each.number not in known or each.how:
             guess = meant(each.number, {name: repr(name) for name in known})
             raise SimulationError(
                 f"{group} have no {each.number!r} to set.{guess} They have {', '.join(known)}"
             )
     return {each.number: value for each, value in given}
+
+
+def _refuse_where(each: Target) -> None:
+    """Refuse a place where there is but one number."""
+    if each.where:
+        raise SimulationError(
+            f"{each.group}.{each.number} is one number for all; leave {each.where!r} out"
+        )
 
 
 def _whole(law: Any, delay: float) -> float:

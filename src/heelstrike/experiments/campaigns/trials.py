@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import pickle
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -146,7 +147,7 @@ def _same(several: list[Any]) -> Any:
 def inputs_digest(trial: Trial, duration: float) -> str:
     """Digest of all that the runs of a trial follow from, but for what differs among them.
 
-    Of a controller in Python its class counts, and no more: nobody knows what it reads.
+    Of a controller in Python its class counts, and what its attributes are, pickled.
     """
     from heelstrike import __version__
 
@@ -155,21 +156,50 @@ def inputs_digest(trial: Trial, duration: float) -> str:
     names = robot.link_names, robot.joint_names, robot.actuator_names, robot.contact_names
     control = type(law).__module__, type(law).__qualname__, getattr(law, "period", None)
     digest.update(
-        repr((robot.name, names, control, trial.method, duration, trial.control_period,
-              trial.begins, trial.edge, trial.speed, trial.settling)).encode()
+        repr((robot.name, names, robot.constraints, control, trial.method, duration,
+              trial.control_period, trial.begins, trial.edge, trial.speed,
+              trial.settling)).encode()
     )  # fmt: skip
     bundles: list[Bundle] = [robot.model]
     if isinstance(law, Law):
         digest.update(f"{law.function.python.__module__}.{law.function.name}".encode())
         bundles += law.numbers(robot)
-        code = getattr(law.function.python, "__code__", None)
-        digest.update(b"" if code is None else code.co_code)
+        digest.update(_code_of(law.function.python))
+    else:
+        digest.update(_attributes_of(law))
     arrays = [*trial.ground.numbers().items(), ("q", trial.state.q), ("v", trial.state.v)]
     arrays += [each for bundle in bundles for each in bundle.storage()]
     for name, array in arrays:
         digest.update(f"{name} {array.dtype} {array.shape};".encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
+
+
+def _code_of(function: Any) -> bytes:
+    """What a function does: its code, its constants, and what it names."""
+    code = getattr(function, "__code__", None)
+    if code is None:
+        return b""
+    named = [repr(getattr(function, "__globals__", {}).get(name)) for name in code.co_names]
+    plain = [text for text in named if " at 0x" not in text]  # addresses differ from run to run
+    return b"\0".join(
+        [code.co_code, repr(code.co_consts).encode(), repr(code.co_names).encode(),
+         *(text.encode() for text in plain)]
+    )  # fmt: skip
+
+
+def _attributes_of(law: Any) -> bytes:
+    """What a controller in Python holds, as bytes that differ where it does."""
+    torque = getattr(type(law), "torque", None)
+    try:
+        held = pickle.dumps(getattr(law, "__dict__", None))
+    except Exception:
+        raise SimulationError(
+            f"controller {type(law).__name__} cannot be told from others of its class, since it "
+            "cannot be pickled; a campaign would take outcomes of one for those of another. Give "
+            "it attributes that pickle takes, or write it with @hs.controller"
+        ) from None
+    return _code_of(torque) + held
 
 
 def trial_digest(base: str, values: Mapping[str, Any], seed: int) -> bytes:

@@ -157,7 +157,9 @@ def _forces(robot: Robot, placed: Placed, ground: Ground) -> Iterator[Finding]:
             half, middle = 0.5 * float(np.ptp(x)), 0.5 * float(x.max() + x.min())
             zmp = float(force[:, 0] @ x) / normal - middle
             end = "toe" if zmp > 0.0 else "heel"
-            use = abs(float(force[:, 1].sum())) / (friction * normal)
+            tangent = abs(float(force[:, 1].sum()))
+            most = friction * normal
+            use = tangent / most if most > 0.0 else (np.inf if tangent > 0.0 else 0.0)
             candidates = [
                 Finding("zero moment point", abs(zmp) / half, time,
                         f"the zero moment point is {1e3 * abs(zmp):.3g} mm from the middle of the "

@@ -130,7 +130,7 @@ class Instants:
             force=expression(np.array([sum(pushes[1::2]), sum(pushes[0::2])], dtype=object)),
         )
         rate = rate_of(self.cost, now, _heat(robot), weight * self.length / self.second)
-        cost = duration * rate / (distance if self.per_metre else 1.0)
+        cost = duration * rate / (casadi.fabs(distance) if self.per_metre else 1.0)
         parameters = casadi.vertcat(self.slope, self.friction)
         self.path = Block("path", y, parameters, cost, casadi.vertcat(*rows.expressions))
 

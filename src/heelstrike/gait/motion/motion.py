@@ -121,11 +121,13 @@ class Motion(ShownInNotebooks):
     cost: float
     """∫ΓᵀΓ dt over all phases, in N²m²s."""
     spent: float
-    """What the optimiser was asked to make least, over all phases, in its own unit."""
+    """What the optimiser was asked to make least, over all phases, in its own unit: not per
+    metre."""
     optimal: bool
     """Whether it is an optimum; if not, it satisfies all constraints nevertheless."""
     margins: Mapping[str, float]
-    """Smallest distance from every kind of limit, in its unit."""
+    """Smallest distance from every kind of limit along the phases, in its unit; those of landings
+    are not among them."""
 
     @property
     def duration(self) -> float:
@@ -203,7 +205,7 @@ class Motion(ShownInNotebooks):
         for p, each in enumerate(self.phases):
             here = phase == p
             value[here] = each.coordinates(inside[here] - starts[p], order=order)
-        if order and np.any(rests):
+        if order and self.repeat is Repeat.NEVER:
             value[rests] = 0.0
         if self.repeat is Repeat.MIRRORED:
             image = self.mirror_sign * value[..., self.mirror_joint]

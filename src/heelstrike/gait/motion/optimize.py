@@ -9,8 +9,8 @@ from typing import Any
 import casadi
 import numpy as np
 
-from heelstrike.arguments import takes
-from heelstrike.dynamics import contact_positions
+from heelstrike.arguments import are_numbers, takes
+from heelstrike.dynamics import contact_jacobian, contact_positions
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.cost import Cost, OwnCost, costs_of
 from heelstrike.gait.gait import fingerprint
@@ -100,7 +100,8 @@ def optimize_motion(
         As for :func:`~heelstrike.gait.optimize.optimize_gait`; per metre where neither the distance
         nor speed and duration are fixed.
     starts : int
-        Starting points that are tried until one leads to an optimum.
+        Starting points that are tried until one leads to an optimum; between two given states there
+        is one.
     progress : callable, optional
         Called now and then with the fraction of the work that is done.
 
@@ -168,7 +169,7 @@ def _checked(
         raise GaitError(
             f"robot {robot.name!r} has no mirror image; ask for a whole cycle, with repeat='same'"
         )
-    if not phases or not all(isinstance(each, ContactPhase) for each in phases):
+    if len(phases) == 0 or not all(isinstance(each, ContactPhase) for each in phases):
         raise GaitError("phases must be one ContactPhase or more, in their order")
     asked = {"duration": duration, "speed": speed}
     for name, value in asked.items():
@@ -177,7 +178,7 @@ def _checked(
     for name in ("friction", "clearance"):
         if not (np.isfinite(others[name]) and others[name] >= 0.0):
             raise GaitError(f"{name} must not be negative, got {others[name]}")
-    if abs(others["slope"]) >= STEEPEST:
+    if not abs(others["slope"]) < STEEPEST:
         raise GaitError(f"slope must be between -{STEEPEST} and {STEEPEST} rad")
     fixed = goes_on is Repeat.NEVER
     if fixed != (others["start"] is not None) or (others["end"] is not None and not fixed):
@@ -194,6 +195,15 @@ def _checked(
             f"the phases last from {shortest:.6g} to {longest:.6g} s together; a duration of "
             f"{duration:.6g} s is beyond that"
         )
+    if speed is not None:
+        least = max(low / speed, shortest if duration is None else duration)
+        most = min(high / speed, longest if duration is None else duration)
+        if least > most * (1.0 + 1e-12):
+            raise GaitError(
+                f"at {speed:.6g} m/s a distance from {low:.6g} to {high:.6g} m takes from "
+                f"{low / speed:.6g} to {high / speed:.6g} s; the phases last from {shortest:.6g} "
+                f"to {longest:.6g} s together"
+            )
     request = MotionRequest(
         robot=robot, phases=tuple(phases), repeat=goes_on, cost=costs_of(cost), speed=speed,
         total=duration, distance=(low, high), **others,
@@ -222,6 +232,13 @@ def _check_states(request: MotionRequest) -> None:
                 raise GaitError(
                     f"{robot.contact_names[i]!r} stands, but at the {name} it is "
                     f"{heights[i]:.3g} m away from the ground. Give a state in which it touches."
+                )
+        rows = contact_jacobian(robot, state.q) @ state.v
+        for i in sorted(stands.points):
+            if np.abs(rows[i]).max() > ON_THE_GROUND:
+                raise GaitError(
+                    f"{robot.contact_names[i]!r} stands, but at the {name} it moves at "
+                    f"{np.abs(rows[i]).max():.3g} m/s. Give a state in which it rests."
                 )
         told[name] = centers @ along
     if len(told) == 2:
@@ -252,10 +269,13 @@ def _distances(
         if speed is None:
             raise GaitError("give the distance or the speed of a motion that repeats")
         return 0.0, FARTHEST
-    bounds = np.atleast_1d(np.asarray(distance, dtype=np.float64))
+    given = distance if are_numbers(distance) else np.nan
+    bounds = np.atleast_1d(np.asarray(given, dtype=np.float64))
     bounds = np.repeat(bounds, 2) if bounds.size == 1 else bounds
     if bounds.shape != (2,) or not np.all(np.isfinite(bounds)) or bounds[0] > bounds[1]:
         raise GaitError(f"distance must be a number (m), or the least and greatest, got {distance}")
+    if bounds[0] < 0.0 < bounds[1]:
+        raise GaitError("a distance is forwards or backwards; its bounds must not have both signs")
     if speed is not None and duration is not None and bounds[0] == bounds[1]:
         raise GaitError("give two of distance, duration and speed, not all three")
     return float(bounds[0]), float(bounds[1])
@@ -267,6 +287,8 @@ def _solved(
     """Unknowns of an optimum, or of a motion that satisfies all constraints."""
     nearest, least = np.zeros(0), np.inf
     feasible: Floats | None = None
+    if program.request.end is not None:
+        starts = 1  # the straight way from one state to the other
     for k, (lean, lowered) in enumerate(STARTS[:starts]):
         unknowns, _, told = program.solve(guess_of(program, lean=lean, lowered=lowered))
         if told["return_status"] == "Solve_Succeeded":
@@ -291,6 +313,8 @@ def _not_found(program: MotionProgram, unknowns: Floats) -> str:
         text = f"{row.kind.text} ({row.subject}) in phase {phase + 1}"
         if missing[k] > FEASIBLE and not any(line.startswith(text) for line in lines):
             lines.append(f"{text}: {missing[k] * row.unit:.3g} {row.kind.unit}")
+    if not lines:
+        lines.append("pieces and phases that join, and what is asked of the whole motion")
     return (
         "no such motion was found, which does not mean that there is none. Where the optimiser "
         f"came nearest, these are violated: {'; '.join(lines[:4])}. Give the phases more time, "
@@ -306,7 +330,8 @@ def _refined(
         request, phases = program.request, []
         for p, phase in enumerate(request.phases):
             moves = _slip(program, unknowns, p) > STILL
-            more = min(2 * phase.pieces, MOST_PIECES) if moves else phase.pieces
+            more = min(2 * phase.pieces, MOST_PIECES) if moves else 0
+            more = max(more, phase.pieces)
             phases.append(ContactPhase(*phase.contacts, duration=phase.duration, pieces=more))
         if [each.pieces for each in phases] == [each.pieces for each in request.phases]:
             return program, unknowns, optimal
@@ -371,7 +396,10 @@ def _fine(pieces: int) -> Grid:
     )  # fmt: skip
 
 
-def _rows_at(program: MotionProgram, unknowns: Floats, p: int, grid: Grid) -> tuple[Floats, Floats]:
+def _rows_at(
+    program: MotionProgram, unknowns: Floats, p: int, grid: Grid,
+    functions: Instants | None = None,
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Cost rates (N,) and scaled constraints (rows, N) of a phase at instants."""
     phases, _, distance = program.parts(casadi.DM(unknowns))
     own, count = phases[p], grid.share.size
@@ -381,7 +409,8 @@ def _rows_at(program: MotionProgram, unknowns: Floats, p: int, grid: Grid) -> tu
     places = casadi.repmat(own.places, 1, count)
     y = casadi.vertcat(*own.along(grid), own.forces(grid), places, step, far)
     numbers = casadi.repmat(casadi.DM([request.slope, request.friction]), 1, count)
-    cost, rows = program.functions.path.value.map(count)(y, numbers)
+    path = (functions or program.functions).path
+    cost, rows = path.value.map(count)(y, numbers)
     return np.array(cost).ravel(), np.array(rows)
 
 
@@ -422,24 +451,26 @@ def _motion(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
     _, _, distance = program.parts(casadi.DM(unknowns))
     effort, spent = 0.0, float(program.value(unknowns)[0])
     if program.functions.per_metre:
-        spent *= float(distance)
+        spent *= abs(float(distance))
     margins = dict[str, float]()
     torque = Instants(robot, costs_of("torque"), per_metre=False)
-    plain = replace(program, functions=torque)
     phases = _phases(program, unknowns)
     for p, phase in enumerate(phases):
         grid = gauss_points(len(phase.pieces))
-        rates, _ = _rows_at(plain, unknowns, p, grid)
+        rates, _ = _rows_at(program, unknowns, p, grid, torque)
         effort += float(rates @ grid.weight) * grid.pieces
         _add_margins(program, unknowns, p, margins)
     mirror = robot.mirror or _itself(robot)
-    first = phases[0].pieces[0]
+    first, far = phases[0].pieces[0], float(distance)
+    if request.repeat is Repeat.NEVER:
+        last = phases[-1].coordinates(phases[-1].duration)
+        far = float((last - first[0])[:2] @ [np.cos(request.slope), np.sin(request.slope)])
     return Motion(
         robot=robot.name,
         fingerprint=fingerprint(robot),
         phases=tuple(phases),
         repeat=request.repeat,
-        distance=float(distance),
+        distance=far,
         slope=request.slope,
         friction=request.friction,
         mirror_joint=mirror.joint,
@@ -484,7 +515,7 @@ def _phases(program: MotionProgram, unknowns: Floats) -> list[MotionPhase]:
 def _add_margins(
     program: MotionProgram, unknowns: Floats, p: int, margins: dict[str, float]
 ) -> None:
-    """Smallest distances from the limits in a phase, and largest misses of its equations."""
+    """Smallest distances from the limits in a phase."""
     grid = _fine(program.grids[p].pieces)
     _, rows = _rows_at(program, unknowns, p, grid)
     lower, upper = program.path_bounds(p, grid)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from heelstrike.arguments import are_numbers
 from heelstrike.errors import GaitError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
@@ -41,18 +42,20 @@ class ContactPhase:
             raise GaitError(
                 f"a phase names the feet or contact points that stand, got {contacts!r}"
             )
-        bounds = np.atleast_1d(np.asarray(duration, dtype=np.float64))
+        given = duration if are_numbers(duration) and not isinstance(duration, bool) else np.nan
+        bounds = np.atleast_1d(np.asarray(given, dtype=np.float64))
         bounds = np.repeat(bounds, 2) if bounds.size == 1 else bounds
         if bounds.shape != (2,) or not 0.0 < bounds[0] <= bounds[1] < np.inf:
             raise GaitError(
                 "the duration of a phase is a positive number (s), or the shortest and the "
                 f"longest, got {duration!r}"
             )
-        if isinstance(pieces, bool) or not isinstance(pieces, int) or not 1 <= pieces <= 200:
+        whole = isinstance(pieces, int | np.integer) and not isinstance(pieces, bool)
+        if not whole or not 1 <= pieces <= 200:
             raise GaitError(f"a phase has from 1 to 200 pieces, got {pieces!r}")
         object.__setattr__(self, "contacts", contacts)
         object.__setattr__(self, "duration", (float(bounds[0]), float(bounds[1])))
-        object.__setattr__(self, "pieces", pieces)
+        object.__setattr__(self, "pieces", int(pieces))
 
 
 @dataclass(frozen=True)

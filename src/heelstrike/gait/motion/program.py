@@ -362,6 +362,9 @@ class MotionProgram:
                 used = weighed
             elif row.kind is Kind.PUSH:
                 used = row.of[0] in stands.normal
+            elif row.kind is Kind.RANGE:
+                begins = (grid.piece == 0) & (grid.share == 0.0) & (p == 0)
+                used = ~(ends & ~free) & ~(begins & (request.start is not None))
             elif row.kind is Kind.FRICTION:
                 used = not stands.points.isdisjoint(row.of)
             elif row.kind is Kind.HEIGHT:
@@ -372,6 +375,8 @@ class MotionProgram:
                     lower[k] = upper[k] = 0.0
             if not np.all(lower[k] == upper[k]):
                 kept = FROM_STOPS if row.kind is Kind.RANGE else FROM_LIMITS
+                if row.kind is Kind.FRICTION and request.friction == 0.0:
+                    kept = 0.0
                 span = np.minimum(kept, 0.5 * (upper[k] - lower[k]))
                 lower[k], upper[k] = lower[k] + span, upper[k] - span
             lower[k] = np.where(used, lower[k], -np.inf)

@@ -115,28 +115,30 @@ class MotionRequest:
         """
         link = self.robot.model.contact_link
         foot = frozenset(np.flatnonzero(link == link[point]).tolist())
-        inside = (shares > 0.0) & (shares < 1.0)
-        if not foot.isdisjoint(self.standing[p].points):
-            return np.where(inside, 0.0, -np.inf)
-        before, after = self._in_the_air(p, foot)
-        place = (before + shares) / (before + 1 + after)
-        height = self.clearance * ClearanceProfile.SMOOTH.height(place)
-        return np.where((place > 0.0) & (place < 1.0), height, -np.inf)
+        height = np.zeros(shares.shape)
+        if foot.isdisjoint(self.standing[p].points):
+            before, after = self._in_the_air(p, foot)
+            place = (before + shares) / (before + 1 + after)
+            height = self.clearance * ClearanceProfile.SMOOTH.height(place)
+        # It comes from the ground or goes to it where it stands in the phase before or after.
+        own = frozenset([point])
+        leaves = (shares == 0.0) & (not self._is_up(p - 1, own))
+        lands = (shares == 1.0) & (not self._is_up(p + 1, own))
+        return np.where(leaves | lands, -np.inf, height)
+
+    def _is_up(self, step: int, points: frozenset[int]) -> bool:
+        """Whether none of some points stands in a phase, of all repetitions; beyond the ends no."""
+        cycle, phase = divmod(step, len(self.phases))
+        if cycle and self.repeat is Repeat.NEVER:
+            return False
+        if cycle % 2 and self.repeat is Repeat.MIRRORED:
+            assert self.robot.mirror is not None
+            points = frozenset(int(self.robot.mirror.contact[i]) for i in points)
+        return points.isdisjoint(self.standing[phase].points)
 
     def _in_the_air(self, p: int, foot: frozenset[int]) -> tuple[int, int]:
         """How many phases a foot has been in the air before one, and will be after."""
-        count = len(self.phases)
-
-        def up(step: int) -> bool:
-            cycle, phase = divmod(step, count)
-            if cycle and self.repeat is Repeat.NEVER:
-                return False
-            points = foot
-            if cycle % 2 and self.repeat is Repeat.MIRRORED:
-                assert self.robot.mirror is not None
-                points = frozenset(int(self.robot.mirror.contact[i]) for i in foot)
-            return points.isdisjoint(self.standing[phase].points)
-
-        before = next(k for k in range(2 * count + 1) if k == 2 * count or not up(p - 1 - k))
-        after = next(k for k in range(2 * count + 1) if k == 2 * count or not up(p + 1 + k))
+        most = 2 * len(self.phases)
+        before = next(k for k in range(most + 1) if k == most or not self._is_up(p - 1 - k, foot))
+        after = next(k for k in range(most + 1) if k == most or not self._is_up(p + 1 + k, foot))
         return before, after

@@ -17,7 +17,7 @@ class Kind(enum.Enum):
     NORMAL_REST = ("contact point that stays on the ground", "m/s²")
     TANGENT_REST = ("contact point that does not slide", "m/s²")
     NORMAL_STILL = ("contact point that stays on the ground", "m/s")
-    TANGENT_STILL = ("contact point that does not slide ", "m/s")
+    TANGENT_STILL = ("contact point that does not slide", "m/s")
     PLACE = ("contact point that stays in its place", "m")
     PUSH = ("contact point that pushes", "N")
     FRICTION = ("friction cone", "N")
