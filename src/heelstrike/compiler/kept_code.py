@@ -117,8 +117,11 @@ def _locked(file: Path) -> Any:
         held = sqlite.connect(file, timeout=LONGEST_WAIT, isolation_level=None)
         try:
             held.execute("BEGIN EXCLUSIVE")
-        except sqlite.Error:  # another holds it still: its lock stays
+        except sqlite.Error as error:
             held.close()
+            if getattr(error, "sqlite_errorname", "") != "SQLITE_BUSY":
+                with suppress(OSError):  # nobody else has it: it cannot be locked, or written
+                    file.unlink()
             return None
         return held
     return None

@@ -256,8 +256,6 @@ def _pushes(trial: Trial, given: list[tuple[Target, float]]) -> tuple[Push, ...]
             )
         numbers[each.number] = float(each.applied(numbers[each.number], value))
         link = each.where or link
-    if given and not any(each.number == "impulse" for each, _ in given):
-        raise SimulationError("a push needs push.impulse; without it there is none")
     if numbers["impulse"] == 0.0:
         return ()
     if not numbers["duration"] > 0.0:

@@ -217,6 +217,10 @@ def check_parameters(trials: Mapping[str, Trial], values: Sequence[Mapping[str, 
         If one is not known.
     """
     seen: set[str] = set()
+    targets = [target(name) for name in sorted(set().union(*values) - {TRIAL})]
+    pushes = [each.number for each in targets if each.group == "push"]
+    if pushes and "impulse" not in pushes:
+        raise SimulationError(f"push.{pushes[0]} is of a push that has no push.impulse. Give one.")
     for each in values:
         for name in each.keys() - seen - {TRIAL}:
             target(name)
