@@ -163,6 +163,7 @@ def test_page_shows_every_claim_and_figure(evidence: Evidence, claims: dict[str,
         assert len(bars) == 1
 
 
+@pytest.mark.slow
 def test_command_writes_the_page(
     tmp_path: Path, evidence: Evidence, monkeypatch: pytest.MonkeyPatch
 ) -> None:

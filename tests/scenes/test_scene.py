@@ -86,6 +86,7 @@ def test_what_is_degenerate_on_purpose(kind: str) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
+@pytest.mark.slow
 def test_every_method_can_begin(method: str) -> None:
     """One millisecond of one scene with everything in it."""
     seed = next(

@@ -128,6 +128,7 @@ def check(found: hs.Run, *words: str, until: float = 0.1) -> None:
         (WRITE_BEFORE, "torque[-1] of shape (6,)"),
     ],
 )
+@pytest.mark.slow
 def test_what_is_written_next_to_an_array_ends_the_run_at_once(
     careless: Function, fault: int, place: str, method: Method
 ) -> None:

@@ -96,7 +96,18 @@ class Ranges:
         return cls(**given)
 
     def pushes(self, seconds: float) -> int:
-        """Return how many pushes an episode may have."""
+        """Return how many pushes an episode may have.
+
+        Parameters
+        ----------
+        seconds : float
+            Longest duration of an episode (s).
+
+        Returns
+        -------
+        int
+            The number.
+        """
         return 0 if self.push is None else int(seconds / self.push_period[0])
 
     @property
@@ -140,7 +151,20 @@ class Ranges:
         return Ground(friction=mu, profile=corners), corners
 
     def robot(self, random: np.random.Generator, robot: Robot) -> Robot:
-        """Draw the robot of an episode."""
+        """Draw the robot of an episode.
+
+        Parameters
+        ----------
+        random : numpy.random.Generator
+            The generator.
+        robot : Robot
+            The robot whose masses change.
+
+        Returns
+        -------
+        Robot
+            The same with other masses and inertias.
+        """
         assert self.mass is not None
         model = robot.model
         factor = random.uniform(*self.mass, model.mass.shape)
@@ -151,7 +175,22 @@ class Ranges:
     def drawn_pushes(
         self, random: np.random.Generator, count: int, link: str | int
     ) -> tuple[Push, ...]:
-        """Draw the pushes of an episode."""
+        """Draw the pushes of an episode.
+
+        Parameters
+        ----------
+        random : numpy.random.Generator
+            The generator.
+        count : int
+            How many.
+        link : str or int
+            The link that is pushed.
+
+        Returns
+        -------
+        tuple of Push
+            The pushes, in the order of their beginnings.
+        """
         assert self.push is not None
         impulse = random.uniform(*self.push, count) * random.choice((-1.0, 1.0), count)
         waits = random.uniform(*self.push_period, count)
@@ -162,6 +201,21 @@ class Ranges:
         )
 
     def drawn_delay(self, random: np.random.Generator, step: float, most: int) -> int:
-        """Draw a delay, in steps."""
+        """Draw a delay.
+
+        Parameters
+        ----------
+        random : numpy.random.Generator
+            The generator.
+        step : float
+            Length of a step (s).
+        most : int
+            Longest delay, in steps.
+
+        Returns
+        -------
+        int
+            The delay, in steps.
+        """
         assert self.delay is not None
         return min(round(random.uniform(*self.delay) / step), most)
