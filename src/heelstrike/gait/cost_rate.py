@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import casadi
+import numpy as np
 
 from heelstrike.dynamics.queries.symbolic import expression
 from heelstrike.errors import GaitError
 from heelstrike.gait.cost import Cost, Instant, OwnCost
 from heelstrike.gait.support import Support, Symbols
-from heelstrike.robot.model import Floats
+from heelstrike.robot.model import Floats, Model
 
 ROUNDED = 1e-3
 """Power, in units of weight times height over the pendulum time, below which |x| is rounded off to
@@ -60,6 +61,12 @@ def rate_of(
             rate = 0.5 * casadi.sum1(spent + casadi.sqrt(spent**2 + small**2) - small)
         total += weight * rate
     return total
+
+
+def heat_of(model: Model) -> Floats | None:
+    """ω₀/τ₀ of all motors (rad/s per N m), in the order of the actuators; None if some lack it."""
+    stall, free = (each[model.actuator_joint] for each in (model.stall_torque, model.no_load_speed))
+    return free / stall if np.all(np.isfinite(stall)) and np.all(stall > 0.0) else None
 
 
 def _own_rate(cost: OwnCost, now: Instant) -> Any:

@@ -17,7 +17,7 @@ import numpy as np
 from heelstrike.dynamics.queries.symbolic import expression, symbols
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.blocks import Block
-from heelstrike.gait.cost_rate import instant_of, rate_of
+from heelstrike.gait.cost_rate import heat_of, instant_of, rate_of
 from heelstrike.gait.request import Request
 from heelstrike.gait.request_digest import digest_of
 from heelstrike.gait.stairs import Stairs
@@ -212,11 +212,9 @@ class Transcription:
         """What an instant costs, a second."""
         request, model = self.request, self.robot.model
         actuators = model.actuator_joint.tolist()
-        stall, free = model.stall_torque[actuators], model.no_load_speed[actuators]
-        heat = free / stall if np.all(np.isfinite(stall)) and np.all(stall > 0.0) else None
         now = instant_of(support, pressure, list(request.drive.driven), actuators)
         unit = self.robot.weight * request.height / request.pendulum_time
-        return rate_of(request.cost, now, heat, unit)
+        return rate_of(request.cost, now, heat_of(model), unit)
 
     def _add_cone(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 from pathlib import Path
 
 import campaign_cases as cases
@@ -123,6 +124,12 @@ def test_the_command(tmp_path: Path) -> None:
     assert shown.exit_code == 0, shown.output
     assert json.loads(shown.stdout)["values"] == campaign.plan.of(3)
     assert json.loads(shown.stdout)["summary"]["status"] == outcome.status
+    with sqlite3.connect(out / "campaign.sqlite") as kept:  # as if its robot had changed since
+        kept.execute("UPDATE about SET text = 'another' WHERE name = 'trial'")
+        assert kept.execute("SELECT changes()").fetchone() == (1,)
+    other = CliRunner().invoke(app, ["campaign", "replay", str(out), "3", "--no-film"])
+    assert other.exit_code == 2
+    assert "has another campaign: its trial was other" in other.output
 
 
 def test_what_the_command_refuses(tmp_path: Path) -> None:

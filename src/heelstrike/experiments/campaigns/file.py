@@ -14,7 +14,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.campaigns.campaign import Campaign
 from heelstrike.experiments.campaigns.parameters import Draw, Share
-from heelstrike.experiments.campaigns.store import about_in, reading
+from heelstrike.experiments.campaigns.store import about_in, reading, refuse_another
 from heelstrike.experiments.laws import check_law, gait_for, law_called
 from heelstrike.gait import Gait, load_gait
 from heelstrike.robot import Robot, builtin_robots, load_robot
@@ -91,7 +91,10 @@ def kept_campaign(folder: Path, method_called: MethodCalled) -> tuple[Campaign, 
             f"the campaign in {folder} was made in Python, which alone can make it again: "
             "call replay(number) or load(folder) of it there"
         )
-    return _campaign(about["file"], str(folder), Path(about["home"]), folder, method_called)
+    made, limit = _campaign(about["file"], str(folder), Path(about["home"]), folder, method_called)
+    with reading(folder) as connection:  # files beside it may have changed since
+        refuse_another(connection, made.about, folder)
+    return made, limit
 
 
 def _campaign(

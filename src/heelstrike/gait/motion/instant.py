@@ -16,9 +16,8 @@ from heelstrike.dynamics.places import write_point_rows
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
 from heelstrike.gait.blocks import Block
 from heelstrike.gait.cost import Instant
-from heelstrike.gait.cost_rate import rate_of
+from heelstrike.gait.cost_rate import heat_of, rate_of
 from heelstrike.gait.motion.rows import Kind, Rows
-from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 
 Symbols = Any
@@ -129,7 +128,7 @@ class Instants:
             motor_velocity=expression(dynamics.v[actuated]),
             force=expression(np.array([sum(pushes[1::2]), sum(pushes[0::2])], dtype=object)),
         )
-        rate = rate_of(self.cost, now, _heat(robot), weight * self.length / self.second)
+        rate = rate_of(self.cost, now, heat_of(model), weight * self.length / self.second)
         cost = duration * rate / (casadi.fabs(distance) if self.per_metre else 1.0)
         parameters = casadi.vertcat(self.slope, self.friction)
         self.path = Block("path", y, parameters, cost, casadi.vertcat(*rows.expressions))
@@ -201,13 +200,6 @@ def size_of(robot: Robot) -> float:
     q = robot.reference_state().q
     lowest = contact_positions(robot, q)[:, 1] - robot.model.contact_radius
     return float(center_of_mass(robot, q)[1] - lowest.min())
-
-
-def _heat(robot: Robot) -> Floats | None:
-    """ω₀/τ₀ of all motors (rad/s per N m), if all are told."""
-    actuators = robot.model.actuator_joint
-    stall, free = robot.model.stall_torque[actuators], robot.model.no_load_speed[actuators]
-    return free / stall if np.all(np.isfinite(stall)) and np.all(stall > 0.0) else None
 
 
 LEAVING = 1e-6
