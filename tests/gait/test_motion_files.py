@@ -58,8 +58,9 @@ def test_a_rate_and_a_unit_that_the_file_does_not_say(tmp_path: Path) -> None:
         (",".join(["time", "t", *NAMES]), np.hstack((ROWS, ROWS[:, :2])), "two columns"),
         (",".join(["time", *NAMES]), np.hstack((ROWS[::-1, :1], ROWS)), "time does not go on"),
         (",".join(["time", *NAMES]), np.hstack((ROWS[:, :1], np.full((10, 6), np.nan))),
-         "row 2: 7 finite numbers"),
-        (",".join(["time", *NAMES]), ROWS, "row 2: 7 finite numbers"),
+         "line 2: 7 finite numbers"),
+        (",".join(["time", *NAMES]), ROWS, "line 2: 7 finite numbers"),
+        ("# of a robot\n\n" + ",".join(["time", *NAMES]), ROWS, "line 4: 7 finite numbers"),
         (",".join(["time", *NAMES]), np.hstack((ROWS[:, :1], ROWS))[:3], "at least 8 rows"),
     ],
 )  # fmt: skip

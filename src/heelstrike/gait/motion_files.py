@@ -102,8 +102,9 @@ def load_recorded_motion(
     lines = _lines(path)
     if not lines:
         raise GaitError(f"{path}: there is nothing in it")
-    separator = next((each for each in (",", ";", "\t") if each in lines[0]), None)
-    names = [name.strip().strip('"') for name in lines[0].split(separator)]
+    heading = lines[0][1]
+    separator = next((each for each in (",", ";", "\t") if each in heading), None)
+    names = [name.strip().strip('"') for name in heading.split(separator)]
     wanted = {_plain(name): index for index, name in enumerate(robot.actuator_names)}
     column_of: dict[str, int] = {}
     scale = np.ones(len(names))
@@ -123,15 +124,16 @@ def load_recorded_motion(
             f"{path}: no column for {', '.join(missing)}.{guess} The first line names the columns; "
             f"it has {', '.join(names[:12])}"
         )
-    numbers = _numbers(path, lines, separator, len(names)) * scale
+    numbers = _numbers(path, lines[1:], separator, len(names)) * scale
     order = [column_of[_plain(name)] for name in robot.actuator_names]
-    time = _times(path, numbers, column_of.get("time"), rate)
+    time = _times(path, numbers, column_of.get("time"), rate, [place for place, _ in lines[1:]])
     used = {*order, column_of.get("time", -1)}
     ignored = tuple(name for column, name in enumerate(names) if column not in used)
     return RecordedMotion(time, numbers[:, order], ignored)
 
 
-def _lines(path: str | os.PathLike[str]) -> list[str]:
+def _lines(path: str | os.PathLike[str]) -> list[tuple[int, str]]:
+    """Return the lines that say something, each with its number in the file."""
     try:
         file = Path(path)
         if file.stat().st_size > LARGEST_FILE:
@@ -141,7 +143,8 @@ def _lines(path: str | os.PathLike[str]) -> list[str]:
         raise GaitError(f"{path} cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         raise GaitError(f"{path}: not a text file; a motion is a table of text") from error
-    return [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    numbered = enumerate(text.splitlines(), start=1)
+    return [(i, line) for i, line in numbered if line.strip() and not line.startswith("#")]
 
 
 def _told(name: str) -> tuple[str, str]:
@@ -159,10 +162,10 @@ def _plain(name: str) -> str:
 
 
 def _numbers(
-    path: str | os.PathLike[str], lines: list[str], separator: str | None, columns: int
+    path: str | os.PathLike[str], lines: list[tuple[int, str]], separator: str | None, columns: int
 ) -> Floats:
     rows = []
-    for place, line in enumerate(lines[1:], start=2):
+    for place, line in lines:
         words = line.split(separator)
         try:
             row = [float(word) for word in words]
@@ -170,7 +173,7 @@ def _numbers(
             row = []
         if len(row) != columns or not np.isfinite(row).all():
             raise GaitError(
-                f"{path}, row {place}: {columns} finite numbers are wanted, got {line[:60]!r}"
+                f"{path}, line {place}: {columns} finite numbers are wanted, got {line[:60]!r}"
             )
         rows.append(row)
     if len(rows) < FEWEST:
@@ -179,8 +182,9 @@ def _numbers(
 
 
 def _times(
-    path: str | os.PathLike[str], numbers: ArrayLike, column: int | None, rate: float | None
-) -> Floats:
+    path: str | os.PathLike[str], numbers: ArrayLike, column: int | None, rate: float | None,
+    places: list[int],
+) -> Floats:  # fmt: skip
     table = np.asarray(numbers, dtype=np.float64)
     if column is None:
         if rate is None or not 0.0 < rate < np.inf:
@@ -188,6 +192,6 @@ def _times(
         return np.arange(len(table)) / rate
     time: Floats = table[:, column] - table[0, column]
     if (np.diff(time) <= 0.0).any():
-        row = int(np.argmax(np.diff(time) <= 0.0)) + 3
-        raise GaitError(f"{path}, row {row}: the time does not go on")
+        line = places[int(np.argmax(np.diff(time) <= 0.0)) + 1]
+        raise GaitError(f"{path}, line {line}: the time does not go on")
     return time

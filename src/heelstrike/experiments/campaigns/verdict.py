@@ -48,7 +48,7 @@ class Proportion:
     """count, trials: How often, of how many."""
     low: float
     high: float
-    """low, high: Interval of the probability."""
+    """low, high: Interval of the probability; NaN where trials were chosen, not drawn."""
 
     @property
     def share(self) -> float:
@@ -56,10 +56,10 @@ class Proportion:
         return self.count / self.trials if self.trials else math.nan
 
     def __str__(self) -> str:
-        return (
-            f"{self.count} of {self.trials}, {100.0 * self.share:.1f} % "
-            f"({100.0 * self.low:.1f} to {100.0 * self.high:.1f} %)"
-        )
+        told = f"{self.count} of {self.trials}, {100.0 * self.share:.1f} %"
+        if math.isnan(self.low):
+            return told
+        return f"{told} ({100.0 * self.low:.1f} to {100.0 * self.high:.1f} %)"
 
 
 @dataclass(frozen=True)
@@ -158,19 +158,21 @@ def verdict(results: CampaignResults, *, bounds: Bounds = Bounds.WILSON) -> Verd
     Returns
     -------
     Verdict
-        How often it went well, why not, and what that hangs on.
+        How often it went well, why not, and what that hangs on. Intervals are of trials that were
+        drawn; those of a grid or a sensitivity design have none.
     """
     good, count = results.success, len(results)
-    causes = [
-        (cause, proportion(each, count, bounds=bounds)) for cause, each in results.causes.items()
-    ]
+
+    def share(some: int) -> Proportion:
+        if results.plan.random:
+            return proportion(some, count, bounds=bounds)
+        return Proportion(some, count, math.nan, math.nan)
+
+    causes = [(cause, share(each)) for cause, each in results.causes.items()]
     time = results.column("time").astype(np.float64)
     soon = np.argsort(np.where(np.isnan(time), -1.0, time), kind="stable")
     worst = [results.numbers[i] for i in soon.tolist() if not good[i]][:SHOWN]
-    return Verdict(
-        proportion(int(good.sum()), count, bounds=bounds), tuple(causes), influences(results),
-        tuple(worst),
-    )  # fmt: skip
+    return Verdict(share(int(good.sum())), tuple(causes), influences(results), tuple(worst))
 
 
 def influences(
