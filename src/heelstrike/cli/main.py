@@ -11,6 +11,7 @@ from heelstrike.cli.campaign import campaign
 from heelstrike.cli.check import check
 from heelstrike.cli.compare import compare
 from heelstrike.cli.inspect import inspect
+from heelstrike.cli.mimic import mimic
 from heelstrike.cli.paper import paper
 from heelstrike.cli.report import report
 from heelstrike.cli.robots import robots
@@ -37,6 +38,7 @@ for command in (
     zoo,
     campaign,
     check,
+    mimic,
     paper,
     compare,
     robots,

@@ -38,6 +38,10 @@ barrier parameter than from IPOPT's own 0.1."""
 FROM_STOPS = 1e-3
 """Distance (rad, m) that joints keep from their stops: a robot that follows a motion nearly is not
 to hit them."""
+MOST_CORRECTIONS = 4
+"""Newton steps by which equations are satisfied to rounding."""
+REDUNDANT = 1e-12
+"""Weight that keeps equations that depend on each other solvable, in their unit."""
 PARTS = 6
 """Kinds of unknowns of a phase."""
 FROM_LIMITS = 1e-6
@@ -93,6 +97,16 @@ class PhaseUnknowns:
         for k in range(STAGES):
             values[STAGES * grid.piece + k, np.arange(grid.share.size)] = shares[k]
         return self.force @ casadi.sparsify(casadi.DM(values))
+
+
+def path_variables(phases: list[PhaseUnknowns], p: int, grid: Grid, distance: Any) -> Any:
+    """Variables of ``Instants.path`` at instants of a phase, (variables, N)."""
+    own, count = phases[p], grid.share.size
+    step = casadi.DM(own.lengths[grid.piece]).T * own.duration
+    places, far = (casadi.repmat(each, 1, count) for each in (own.places, distance))
+    begun = sum(each.duration for each in phases[:p])
+    time = begun + casadi.DM(phases_of(grid)).T * own.duration
+    return casadi.vertcat(*own.along(grid), own.forces(grid), places, step, far, time)
 
 
 def breakpoints(pieces: int) -> Floats:
@@ -243,12 +257,8 @@ class MotionProgram:
         numbers = np.array([request.slope, request.friction])
         copies, lower, upper, kept = [], [], [], []
         self.labels: list[tuple[Row, int, float]] = []
-        for p, (unknowns, grid) in enumerate(zip(phases, self.grids, strict=True)):
-            count = grid.share.size
-            step = casadi.DM(unknowns.lengths[grid.piece]).T * unknowns.duration
-            far = casadi.repmat(distance, 1, count)
-            places = casadi.repmat(unknowns.places, 1, count)
-            y = casadi.vertcat(*unknowns.along(grid), unknowns.forces(grid), places, step, far)
+        for p, grid in enumerate(self.grids):
+            y = path_variables(phases, p, grid, distance)
             weight = grid.weight * grid.pieces
             copies.append(Copies.of(functions.path, weight, x, y, numbers))
             low, high = self.path_bounds(p, grid)
@@ -362,6 +372,7 @@ class MotionProgram:
                 used = weighed
             elif row.kind is Kind.PUSH:
                 used = row.of[0] in stands.normal
+                lower[k] = request.force_margin_of(p, row.of[0]) / request.robot.weight
             elif row.kind is Kind.RANGE:
                 begins = (grid.piece == 0) & (grid.share == 0.0) & (p == 0)
                 used = ~(ends & ~free) & ~(begins & (request.start is not None))
@@ -429,6 +440,28 @@ class MotionProgram:
         missing: Floats = np.maximum(self._lower - values, 0.0)
         missing -= np.maximum(values - self._upper, 0.0)
         return missing
+
+    def exact(self, unknowns: Floats) -> Floats:
+        """Return unknowns that satisfy all equations to rounding, changed by the least.
+
+        IPOPT ends where they hold to a tolerance. Each step is Newton's, of least norm.
+        """
+        from scipy.sparse import csr_matrix, eye
+        from scipy.sparse.linalg import splu
+
+        equal = np.flatnonzero(self._lower == self._upper)
+        best, least = unknowns, float(np.abs(self.violations(unknowns)).max(initial=0.0))
+        for _ in range(MOST_CORRECTIONS):
+            missing = self.violations(unknowns)[equal]
+            rows = csr_matrix(self.slopes(unknowns).sparse())[equal]
+            # Of equations that say the same, as those of points that stand, the sum is shared.
+            normal = (rows @ rows.T + REDUNDANT * eye(len(equal))).tocsc()
+            unknowns = unknowns + rows.T @ splu(normal).solve(missing)
+            left = float(np.abs(self.violations(unknowns)).max(initial=0.0))
+            if not left < least:
+                break
+            best, least = unknowns, left
+        return best
 
     def packed(
         self, positions: list[Floats], velocities: list[Floats], accelerations: list[Floats],
