@@ -20,7 +20,7 @@ from heelstrike.gait.motion.phases import ContactPhase
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 
-FORCE_MARGIN = 0.05
+FORCE_MARGIN = 0.1
 """Share of the weight that both ends of a flat sole bear at least: the law can correct the rest."""
 CLEARANCE = 0.01
 """How high a foot in the air is kept half-way, as a share of the leg: people clear little."""
@@ -28,10 +28,10 @@ SHORTER, LONGER = 0.5, 1.6
 """Shares of its recorded duration between which a phase may last."""
 SHORTEST = 0.03
 """Shortest phase (s)."""
-ABRUPT = 0.01
+ABRUPT = 0.02
 """Time (s) whose fourth power is the weight of differences of accelerations squared, beside angles
 squared: without it, blows of forces would bring angles nearer by nothing."""
-EFFORT = 1e-4
+EFFORT = 1e-2
 """Weight of torques squared, in units of weight times leg, beside angles squared: of motions that
 are as near, that of least effort."""
 SKETCH = 0.2
@@ -64,8 +64,8 @@ def nearest_motion(
 
     First a motion of least torque through the phases of the recording (heel, flat foot, toes) is
     looked for, in its time; then, from there, the one of least ∫ Σ (q - qᵖ)² + τ⁴ (q̈ - q̈ᵖ)² dt, of
-    the trunk's pitch and all joints, where qᵖ is the person and τ 0.01 s. Where a robot cannot go through these phases, it
-    stands on flat feet.
+    the trunk's pitch and all joints, where qᵖ is the person and τ some hundredths of a second.
+    Where a robot cannot go through these phases, it stands on flat feet.
 
     Parameters
     ----------

@@ -450,14 +450,14 @@ class MotionProgram:
         from scipy.sparse.linalg import splu
 
         equal = np.flatnonzero(self._lower == self._upper)
-        best, least = unknowns, float(np.abs(self.violations(unknowns)).max(initial=0.0))
+        best, least = unknowns, np.inf
         for _ in range(MOST_CORRECTIONS):
             missing = self.violations(unknowns)[equal]
             rows = csr_matrix(self.slopes(unknowns).sparse())[equal]
             # Of equations that say the same, as those of points that stand, the sum is shared.
             normal = (rows @ rows.T + REDUNDANT * eye(len(equal))).tocsc()
             unknowns = unknowns + rows.T @ splu(normal).solve(missing)
-            left = float(np.abs(self.violations(unknowns)).max(initial=0.0))
+            left = float(np.abs(self.violations(unknowns)[equal]).max(initial=0.0))
             if not left < least:
                 break
             best, least = unknowns, left
