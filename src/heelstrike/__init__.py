@@ -104,6 +104,7 @@ if TYPE_CHECKING:
     from heelstrike.experiments.campaigns import Campaign as Campaign
     from heelstrike.experiments.campaigns import CampaignResults as CampaignResults
     from heelstrike.experiments.comparison import compare as compare
+    from heelstrike.experiments.people import mimic as mimic
     from heelstrike.experiments.spring_mass import SpringMass as SpringMass
     from heelstrike.gait import ContactPhase as ContactPhase
     from heelstrike.gait import Gait as Gait
@@ -274,6 +275,7 @@ _HOME = {
     "load_run": "heelstrike.sim",
     "load_snapshot": "heelstrike.sim",
     "make_invariant": "heelstrike.gait",
+    "mimic": "heelstrike.experiments.people",
     "monodromy": "heelstrike.analysis.stability.monodromy",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
