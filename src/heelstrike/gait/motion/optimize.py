@@ -11,7 +11,7 @@ import casadi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.arguments import are_numbers, takes
+from heelstrike.arguments import are_numbers, shown, takes
 from heelstrike.dynamics import contact_jacobian, contact_positions
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.cost import Cost, OwnCost, costs_of
@@ -310,6 +310,8 @@ def _known(program: MotionProgram, motion: Motion | None) -> list[Floats]:
     """Unknowns of a motion that is given to start from."""
     if motion is None:
         return []
+    if not isinstance(motion, Motion):
+        raise GaitError(f"warm_start must be a Motion or None, got {shown(motion)}")
     request = program.request
     motion.check_robot(request.robot)
     names = request.robot.contact_names
