@@ -98,7 +98,9 @@ def usual() -> dict[str, dict[str, Any]]:
         "load_snapshot": {"path": "kept.npz"},
         "make_invariant": {"gait": PhasedGait()},
         "monodromy": walked,
+        "compare_planners": {"robot": robot},
         "optimize_gait": {"robot": robot},
+        "plan_motion": {"robot": robot, "step_length": 0.3, "step_duration": 0.7},
         "report": {"runs": [], "path": "report.html"},
         "run_derivatives": {"simulation": hs.Simulation(**walked), "until": 0.001},
         "saltation_matrix": {"reset": ONE, "gradient": FLAT, "before": FLAT, "after": FLAT},
@@ -113,7 +115,7 @@ def usual() -> dict[str, dict[str, Any]]:
 
 RESULTS = """ActiveContacts BatchResult CampaignResults DisturbanceResponse Floquet Gait GaitFamily
 Gradient Largest
-LimitCycle ModeChange Monodromy Motion PhasedGait Robot Run RunDerivatives Snapshot StepDerivatives
+LimitCycle ModeChange Monodromy Motion PhasedGait PlannerComparison Robot Run RunDerivatives Snapshot StepDerivatives
 StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
 TOLD_APART = """Bundle Constraint ContactPhase EndOfRun GaitLQR GroundShape MotionTracking

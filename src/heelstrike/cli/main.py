@@ -12,6 +12,7 @@ from heelstrike.cli.check import check
 from heelstrike.cli.compare import compare
 from heelstrike.cli.inspect import inspect
 from heelstrike.cli.paper import paper
+from heelstrike.cli.planners import planners
 from heelstrike.cli.report import report
 from heelstrike.cli.robots import robots
 from heelstrike.cli.train import train
@@ -39,6 +40,7 @@ for command in (
     check,
     paper,
     compare,
+    planners,
     robots,
     inspect,
 ):

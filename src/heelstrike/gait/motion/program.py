@@ -18,7 +18,7 @@ from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.gait.motion.rows import Kind, Row
 from heelstrike.gait.polynomials import Instants as Grid
 from heelstrike.gait.polynomials import coefficients, gauss
-from heelstrike.gait.program import NEAR, SETTINGS, Ipopt
+from heelstrike.gait.program import NEAR, SETTINGS, Ipopt, satisfied
 from heelstrike.robot.model import Floats
 
 STAGES = 4
@@ -429,6 +429,17 @@ class MotionProgram:
         missing: Floats = np.maximum(self._lower - values, 0.0)
         missing -= np.maximum(values - self._upper, 0.0)
         return missing
+
+    def polished(self, unknowns: Floats) -> Floats:
+        """Satisfy the equations to rounding, by the least change of all that is not given."""
+        free = np.full(self.size, True)
+        for p, phase in enumerate(self.request.phases):
+            free[self._ends[PARTS * (p + 1) - 1]] = phase.duration[0] < phase.duration[1]
+        free[-1] = self.request.distance[0] < self.request.distance[1]
+        return satisfied(
+            unknowns, lambda x: np.array(self.value(x)[1]).ravel(), self.slopes,
+            (self._lower, self._upper), free,
+        )  # fmt: skip
 
     def packed(
         self, positions: list[Floats], velocities: list[Floats], accelerations: list[Floats],
