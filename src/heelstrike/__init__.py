@@ -58,9 +58,11 @@ if TYPE_CHECKING:
     from heelstrike.compiler.bundle import number as number
     from heelstrike.compiler.bundle import part as part
     from heelstrike.contact import ActiveContacts as ActiveContacts
+    from heelstrike.contact import Box as Box
     from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
     from heelstrike.contact import GroundShape as GroundShape
+    from heelstrike.contact import SpatialGround as SpatialGround
     from heelstrike.contact import contact_forward_dynamics as contact_forward_dynamics
     from heelstrike.contact import contact_inverse_dynamics as contact_inverse_dynamics
     from heelstrike.contact import contact_kinematics as contact_kinematics
@@ -169,6 +171,7 @@ _HOME = {
     "Actuated": "heelstrike.control",
     "Batch": "heelstrike.sim",
     "BatchResult": "heelstrike.sim",
+    "Box": "heelstrike.contact",
     "Bundle": "heelstrike.compiler.bundle",
     "Campaign": "heelstrike.experiments.campaigns",
     "CampaignResults": "heelstrike.experiments.campaigns",
@@ -231,6 +234,7 @@ _HOME = {
     "SimulationError": "heelstrike.errors",
     "SimulationWarning": "heelstrike.sim",
     "Snapshot": "heelstrike.sim",
+    "SpatialGround": "heelstrike.contact",
     "SpringMass": "heelstrike.experiments.spring_mass",
     "StandingLQR": "heelstrike.control",
     "State": "heelstrike.robot",
