@@ -124,6 +124,7 @@ if TYPE_CHECKING:
     from heelstrike.robot import Robot as Robot
     from heelstrike.robot import RobotBuilder as RobotBuilder
     from heelstrike.robot import RobotWarning as RobotWarning
+    from heelstrike.robot import SpatialRobot as SpatialRobot
     from heelstrike.robot import State as State
     from heelstrike.robot import builtin_robots as builtin_robots
     from heelstrike.robot import inspect_robot as inspect_robot
@@ -235,6 +236,7 @@ _HOME = {
     "SimulationWarning": "heelstrike.sim",
     "Snapshot": "heelstrike.sim",
     "SpatialGround": "heelstrike.contact",
+    "SpatialRobot": "heelstrike.robot",
     "SpringMass": "heelstrike.experiments.spring_mass",
     "StandingLQR": "heelstrike.control",
     "State": "heelstrike.robot",

@@ -26,7 +26,10 @@ VECTORS = {
 }  # fmt: skip
 """Arguments that are vectors, and how long they are."""
 
-_ARGUMENTS = {
+Arguments = dict[str, tuple[str, str]]
+"""Of every argument its type and what it is."""
+
+_ARGUMENTS: Arguments = {
     "robot": ("Robot", "The robot."),
     "q": ("(nq,) array", "Position, in m and rad, in the order of ``robot.joint_names``."),
     "v": ("(nv,) array", "Velocity, in m/s and rad/s."),
@@ -79,7 +82,7 @@ def of_position(
         def answer(robot: Robot, q: ArrayLike, *others: P.args, **named: P.kwargs) -> Result:
             return body(Evaluation(robot, q), *others, **named)
 
-        return _described(answer, body, returns)
+        return described_answer(answer, body, returns)
 
     return query
 
@@ -95,12 +98,14 @@ def of_state(
         ) -> Result:
             return body(Evaluation(robot, q, v), *others, **named)
 
-        return _described(answer, body, returns)
+        return described_answer(answer, body, returns)
 
     return query
 
 
-def _described(answer: Any, body: Callable[..., Any], returns: str) -> Any:
+def described_answer(
+    answer: Any, body: Callable[..., Any], returns: str, arguments: Arguments = _ARGUMENTS
+) -> Any:
     """Give an answer the name, signature and documentation of its question."""
     first, own = inspect.signature(answer), inspect.signature(body)
     names = [one for one in first.parameters.values() if one.kind == one.POSITIONAL_OR_KEYWORD]
@@ -108,15 +113,22 @@ def _described(answer: Any, body: Callable[..., Any], returns: str) -> Any:
     update_wrapper(answer, body)
     answer.__signature__, answer.at, answer.returns = signature, body, returns
     shape, _, meaning = returns.partition(": ")
-    answer.__doc__ = docstring(inspect.getdoc(body) or "", signature.parameters, shape, meaning)
+    summary = inspect.getdoc(body) or ""
+    answer.__doc__ = docstring(summary, signature.parameters, shape, meaning, arguments)
     return answer
 
 
-def docstring(summary: str, names: Iterable[str], returned: str, meaning: str) -> str:
+def docstring(
+    summary: str,
+    names: Iterable[str],
+    returned: str,
+    meaning: str,
+    arguments: Arguments = _ARGUMENTS,
+) -> str:
     """Return the documentation of a function that takes arguments of queries."""
     text = [summary, "", "Parameters", "----------"] if names else [summary]
     for name in names:
-        kind, words = _ARGUMENTS[name]
+        kind, words = arguments[name]
         text += [f"{name} : {kind}", f"    {words}"]
     text += ["", "Returns", "-------", returned, f"    {meaning}"]
     if names:

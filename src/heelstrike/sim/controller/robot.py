@@ -38,7 +38,7 @@ from heelstrike.dynamics.kernels import (
 )
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
-from heelstrike.dynamics.spatial import momentum_of, power, spatial
+from heelstrike.dynamics.planar import momentum_of, power, spatial
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers, Model
