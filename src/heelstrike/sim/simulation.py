@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from numbers import Real
 from pathlib import Path
-from typing import Any, NoReturn, Unpack
+from typing import TYPE_CHECKING, Any, NoReturn, Unpack
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.robot.warning import warn
 from heelstrike.sim.clock import Clock
@@ -54,6 +55,9 @@ from heelstrike.sim.setting import (
 )
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.time_stepping import SimulationWarning, TimeStepping
+
+if TYPE_CHECKING:
+    from heelstrike.sim.spatial.run import SpatialRun
 
 # Rows of one chunk of the record, and most steps between two looks at Ctrl-C and the progress bar.
 CHUNK = 4096
@@ -148,6 +152,14 @@ class Simulation:
     >>> simulation.advance(0.01).value, simulation.time
     ('completed', 0.01)
     """
+
+    def __new__(cls, robot: Any = None, *others: Any, **setup: Any) -> Any:
+        """Make one of space, where the robot is one in space."""
+        if isinstance(robot, SpatialRobot):
+            from heelstrike.sim.spatial.simulation import SpatialSimulation
+
+            return SpatialSimulation(robot, *others, **setup)
+        return super().__new__(cls)
 
     @takes(SimulationError)
     def __init__(
@@ -962,13 +974,13 @@ class Simulation:
 
 @takes(SimulationError)
 def simulate(
-    robot: Robot,
+    robot: Robot | SpatialRobot,
     controller: Controller | None = None,
     *,
     duration: float,
     progress: Callable[[float], None] | None = None,
     **setup: Unpack[Setup],
-) -> Run:
+) -> Run | SpatialRun:
     """Simulate a robot on the ground under a controller.
 
     Parameters
@@ -1007,6 +1019,10 @@ def simulate(
         With ``on_error="raise"``, what the controller raised.
     """
     check_duration(duration)
+    if isinstance(robot, SpatialRobot):
+        from heelstrike.sim.spatial.simulation import simulate_in_space
+
+        return simulate_in_space(robot, controller, duration=duration, progress=progress, **setup)
     simulation = Simulation(robot, controller, **setup)
     going = simulation.advance(simulation._recorded_until + duration, progress=progress)
     final = simulation._final()

@@ -171,12 +171,45 @@ def _keep() -> Any:
     return compiled_for(types.void(CONTROLLER_TYPE, types.int64[::1]), keep_controller)
 
 
-def _called_by_address(law: ControllerFunction, function: Any) -> Callable[..., None]:
+def machine_code_of(law: ControllerFunction, seen: Mapping[str, Any]) -> Integers:
+    """Compile a law that is shown other bundles; return the words that loops find it by.
+
+    Parameters
+    ----------
+    law : ControllerFunction
+        The law.
+    seen : mapping of str to type
+        Classes of `state`, `contacts` and `robot`.
+
+    Raises
+    ------
+    ControllerError
+        If it cannot be compiled.
+    """
+    function = kernel(law.function) if law.is_ours else within_bounds(law.function)
+    separate = SeparateKernel(
+        _called_by_address(law, function, seen), lambda: CONTROLLER_SIGNATURE,
+        boundscheck=not law.is_ours,
+    )  # fmt: skip
+    try:
+        compiled = separate.finish()
+    except CompileError as error:
+        raise ControllerError(f"controller {law.name!r} cannot be compiled. {error}") from error
+    words = np.zeros(VALUE, dtype=np.int64)
+    _keep()(compiled, words)
+    return words
+
+
+_SEEN: Mapping[str, Any] = {"state": ControlState, "contacts": Contacts, "robot": ControlledRobot}
+"""What laws are shown in the plane."""
+
+
+def _called_by_address(
+    law: ControllerFunction, function: Any, seen: Mapping[str, Any] = _SEEN
+) -> Callable[..., None]:
     """Return what loops call: it finds the bundles at their addresses and calls the function."""
     kinds: dict[str, Any] = {
-        "state": ControlState,
-        "contacts": Contacts,
-        "robot": ControlledRobot,
+        **seen,
         "parameters": law.parameters.settable(),
         "memory": law.memory.settable(),
         "log": law.log.settable(),
