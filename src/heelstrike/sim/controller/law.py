@@ -28,6 +28,7 @@ from heelstrike.compiler.words import VALUE, keep_value, kept_value
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import ARGUMENTS, Contacts, Controller
@@ -304,7 +305,7 @@ def controller(
     return make if function is None else make(function)
 
 
-def per_actuator(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
+def per_actuator(name: str, value: ArrayLike, robot: Robot | SpatialRobot) -> NDArray[np.float64]:
     """Return one number for each actuator, (nu,), of one for all or for each."""
     try:
         gains = np.asarray(value)

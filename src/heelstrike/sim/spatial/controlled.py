@@ -195,7 +195,7 @@ class ReadySpatialLaw:
         self.log = law.new_log(known)
         extents = robot.model.extents
         view = SpatialControlledRobot.allocate(
-            extents, model=robot.model, mass=robot.total_mass, position_of=_positions(robot)
+            extents, model=robot.model, mass=robot.total_mass, position_of=driven_positions(robot)
         )
         view.ending = GOES_ON
         self.control = SpatialControl(
@@ -207,7 +207,8 @@ class ReadySpatialLaw:
         )  # fmt: skip
 
 
-def _positions(robot: SpatialRobot) -> Integers:
+def driven_positions(robot: SpatialRobot) -> Integers:
+    """Position of the joint of each actuator, (nu,); -1 of a joint with several."""
     model = robot.model
     joints = model.velocity_joint[model.actuator_velocity]
     single = np.isin(model.joint_kind[joints], (HINGE, SLIDE))
