@@ -92,6 +92,7 @@ if TYPE_CHECKING:
     from heelstrike.control import ZeroMomentPointRegulation as ZeroMomentPointRegulation
     from heelstrike.control import controller as controller
     from heelstrike.control import solve_quadratic_program as solve_quadratic_program
+    from heelstrike.control.spatial.hold_posture import HoldPosture as HoldPosture
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
     from heelstrike.errors import GaitError as GaitError
@@ -204,6 +205,7 @@ _HOME = {
     "GroundShape": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
     "HeldTorque": "heelstrike.sim",
+    "HoldPosture": "heelstrike.control.spatial.hold_posture",
     "HuntCrossley": "heelstrike.sim",
     "ImpulseSet": "heelstrike.sim",
     "InertialUnit": "heelstrike.control",

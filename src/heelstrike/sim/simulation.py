@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, Unpack
+from typing import TYPE_CHECKING, Any, NoReturn, Unpack, overload
 
 import numpy as np
 
@@ -972,6 +972,20 @@ class Simulation:
         )
 
 
+@overload
+def simulate(
+    robot: Robot, controller: Controller | None = None, *, duration: float,
+    progress: Callable[[float], None] | None = None, **setup: Unpack[Setup],
+) -> Run: ...  # fmt: skip
+
+
+@overload
+def simulate(
+    robot: SpatialRobot, controller: Controller | None = None, *, duration: float,
+    progress: Callable[[float], None] | None = None, **setup: Any,
+) -> SpatialRun: ...  # fmt: skip
+
+
 @takes(SimulationError)
 def simulate(
     robot: Robot | SpatialRobot,
@@ -979,7 +993,7 @@ def simulate(
     *,
     duration: float,
     progress: Callable[[float], None] | None = None,
-    **setup: Unpack[Setup],
+    **setup: Any,
 ) -> Run | SpatialRun:
     """Simulate a robot on the ground under a controller.
 
@@ -1001,7 +1015,7 @@ def simulate(
 
     Returns
     -------
-    Run
+    Run or SpatialRun
         Everything that happened, also after a fall, a failure or Ctrl-C; see ``run.status``. A
         controller that raises anything but KeyboardInterrupt, even SystemExit, ends the run with
         status ``controller_failed``, as does one that writes beyond its arrays, changes the robot,

@@ -1,6 +1,6 @@
 """Springs and dampers about a posture, with the weight beyond each joint fed forward.
 
-    Γ = g(q) + kp (q_ref − q) − kd q̇
+Γ = g(q) + kp (q_ref − q) − kd q̇
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ class HoldPosture(Law):
             raise ControllerError(f"robot must be a SpatialRobot, got {type(robot).__name__}")
         stiff, damped = per_actuator("kp", kp, robot), per_actuator("kd", kd, robot)
         if np.any(stiff < 0.0) or np.any(damped < 0.0):
-            raise ControllerError(f"kp and kd must not be negative, got {kp} and {kd}")
+            raise ControllerError(f"kp and kd must not be negative, got {stiff} and {damped}")
         whole = robot.model.reference if posture is None else np.asarray(posture, dtype=float)
         if whole.shape != (robot.nq,) or not np.all(np.isfinite(whole)):
             raise ControllerError(f"posture must be {robot.nq} finite numbers, got {posture!r}")

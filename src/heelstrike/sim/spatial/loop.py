@@ -154,7 +154,7 @@ def advance_in_space(
         for k in range(model.nv):
             memory.kept_v[k] = memory.v[k]
         below = height_of_mass(model, ground, memory.equations) < clock.fallen_height
-        gain = memory.tally.energy_gain
+        gain, steps = memory.tally.energy_gain, memory.tally.steps
         done, certified = take_step(
             model, ground, time, clock.step, clock.resolves == 1, memory
         )  # fmt: skip
@@ -166,6 +166,7 @@ def advance_in_space(
                 memory.q[i] = memory.kept_q[i]
             for k in range(model.nv):
                 memory.v[k] = memory.kept_v[k]
+            memory.tally.steps = steps
             if not done:
                 return SOLVER_FAILED
             if clock.finishing == 1:

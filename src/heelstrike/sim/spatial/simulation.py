@@ -178,7 +178,7 @@ class SpatialSimulation:
             stop_when_fallen = robot.floating and len(robot.feet) > 1
         height = height_of_mass(robot.model, self._ground.model(), self._memory.equations)
         clock.fallen_height = FALL_FRACTION * height if stop_when_fallen else -np.inf
-        self.status = RunStatus.COMPLETED
+        self.status: RunStatus = RunStatus.COMPLETED
         self.message = "not begun"
         self.error: BaseException | None = None
 
@@ -286,7 +286,7 @@ class SpatialSimulation:
         if self.status not in CAN_GO_ON_IN_SPACE:
             raise SimulationError(f"the simulation has ended: {self.message}")
         begin = clock_time.perf_counter()
-        self.error = None
+        self._forget_error()
         try:
             self.status, self.message = self._go(last, progress)
         except KeyboardInterrupt as interrupt:
@@ -296,6 +296,9 @@ class SpatialSimulation:
         if self.status is RunStatus.CONTROLLER_FAILED and self.error is not None:
             tell(self.message, self.error, self.on_error)
         return self.status
+
+    def _forget_error(self) -> None:
+        self.error = None
 
     def _go(self, last: int, progress: Callable[[float], None] | None) -> tuple[RunStatus, str]:
         """Run the loop, with a look now and then at progress and Ctrl-C."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array
@@ -65,19 +67,19 @@ def lay_out_table(robot: SpatialRobot) -> BlockTable:
             entries.append((BALL_STOP, joint, -1.0, last, HALF_LINE, 1))
     for k in np.flatnonzero(model.dry_friction > 0.0).tolist():
         entries.append((DRY_JOINT, k, 0.0, k, INTERVAL, 1))
-    columns = list(zip(*entries, strict=True)) or [()] * 6
-    kinds = (int, int, float, int, int, int)
-    kind, owner, side, last, sets, size = (
-        np.array(column, dtype=dtype) for column, dtype in zip(columns, kinds, strict=True)
-    )
+
+    def column(place: int, dtype: type) -> Any:
+        return np.array([entry[place] for entry in entries], dtype=dtype)
+
+    kind = column(0, np.int64)
     return BlockTable.allocate(
         entries=len(entries),
-        kind=kind.astype(np.int64),
-        owner=owner.astype(np.int64),
-        side=side.astype(np.float64),
-        last=last.astype(np.int64),
-        set=sets.astype(np.int64),
-        size=size.astype(np.int64),
+        kind=kind,
+        owner=column(1, np.int64),
+        side=column(2, np.float64),
+        last=column(3, np.int64),
+        set=column(4, np.int64),
+        size=column(5, np.int64),
         gap=np.full(len(entries), np.inf),
         mode=np.where(kind == DRY_JOINT, STICK, OPEN).astype(np.int64),
         touching=np.full(len(entries), NEVER_TOUCHED),
