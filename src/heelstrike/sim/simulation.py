@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import operator
 import sys
 import time as clock_time
@@ -970,6 +971,15 @@ class Simulation:
             pushes=self._pushes,
             final=final,
         )
+
+
+def _of_init(function: Callable[..., Any]) -> inspect.Signature:
+    """Signature of a class by that of what begins one, not by what chooses between classes."""
+    whole = inspect.signature(function)
+    return whole.replace(parameters=list(whole.parameters.values())[1:])
+
+
+Simulation.__signature__ = _of_init(Simulation.__init__)  # type: ignore[attr-defined]
 
 
 @overload

@@ -101,7 +101,7 @@ def weigh_blocks(problem: BlockProblem, settings: BlockSettings, scaled: ScaledB
 
 
 @kernel
-def sum_blocks(problem: BlockProblem, answer: BlockAnswer, scaled: ScaledBlocks) -> float:
+def sum_blocks(problem: BlockProblem, scaled: ScaledBlocks, answer: BlockAnswer) -> float:
     """Write ``velocity = W impulse + free``; return what rounding is left, relative to the data.
 
     ``scaled`` has the weights and the size of the data.
@@ -158,7 +158,7 @@ def certify_blocks(
     Writes ``velocity`` and ``residual`` of the answer, and names its modes by the velocity.
     """
     weigh_blocks(problem, settings, scaled)
-    rounding = sum_blocks(problem, answer, scaled)
+    rounding = sum_blocks(problem, scaled, answer)
     unit = scaled.unit
     worst, most, nothing = 0.0, 0.0, 0.0
     impulse, velocity = answer.impulse, answer.velocity

@@ -105,7 +105,7 @@ def try_way(way: int, slips: bool, problem: BlockProblem, work: BlockWorkspace) 
         strength, ties = FIRST_TIE, FIRST_TIES
         for _ in range(TURNS_OF_TIES):
             if approach(
-                problem, scaled, settings, strength, ties, tally, iterate, newton, work.anchor
+                problem, settings, strength, ties, scaled, tally, iterate, newton, work.anchor
             ):  # fmt: skip
                 break
             strength *= STRONGER

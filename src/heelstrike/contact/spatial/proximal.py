@@ -61,8 +61,8 @@ def keep_aside(rows: int, least: float, iterate: Iterate, anchor: Anchor) -> flo
 
 @kernel
 def approach(
-    problem: BlockProblem, scaled: ScaledBlocks, settings: BlockSettings, strength: float,
-    ties: int, tally: BlockTally, iterate: Iterate, newton: NewtonSystem, anchor: Anchor,
+    problem: BlockProblem, settings: BlockSettings, strength: float, ties: int,
+    scaled: ScaledBlocks, tally: BlockTally, iterate: Iterate, newton: NewtonSystem, anchor: Anchor,
 ) -> bool:  # fmt: skip
     """Solve problems with a larger diagonal, one after the other; return if one is solved.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, number
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats
@@ -72,6 +73,7 @@ class HoldPosture(Law):
     Torques are held over a step: the damping of a joint must stay below its inertia over the step.
     """
 
+    @takes(ControllerError)
     def __init__(
         self,
         robot: SpatialRobot,

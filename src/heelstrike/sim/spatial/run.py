@@ -220,12 +220,12 @@ def tangents_of(normal: Floats) -> tuple[Floats, Floats]:
     x[..., 0] = 1.0
     first = x - normal * normal[..., :1]
     length = np.linalg.norm(first, axis=-1, keepdims=True)
-    along = length < ALONG_X
+    along = length < X_NORMAL
     first = np.where(along, np.array([0.0, 1.0, 0.0]), first / np.where(along, 1.0, length))
     return first, np.cross(normal, first)
 
 
-ALONG_X = 1e-12
+X_NORMAL = 1e-12
 """Sine of the angle from x up to which a normal is along it."""
 
 
