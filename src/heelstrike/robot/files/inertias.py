@@ -103,8 +103,9 @@ def put_back(
                 f"{label}: body {name!r} has the moment of inertia {moment:.6g} kg m² about the "
                 "normal of the plane in which the robot moves. It must not be negative."
             )
-        # What the parser made of the stand-in: a file may ask for another mass of the whole.
-        share = float(model.body_inertia[place, 0]) / _size(tensor)
+        # What the parser made of the stand-in: a file may ask for another mass of the whole, and
+        # what is less than the least was lifted to it.
+        share = float(model.body_inertia[place, 0]) / max(_size(tensor), least)
         model.body_inertia[place] = max(moment, least) * share
         if not is_possible(tensor) and not _is_planar(tensor, normal, moment):
             impossible.append(name)
@@ -156,7 +157,7 @@ def put_back_whole(model: Any, taken: list[tuple[Any, Floats]], least: float, la
         own, turned = np.zeros(4), np.zeros(4)
         mujoco.mju_mat2Quat(own, np.ascontiguousarray(axes).ravel())
         mujoco.mju_mulQuat(turned, np.array(model.body_iquat[place]), own)
-        share = float(model.body_inertia[place, 0]) / _size(tensor)
+        share = float(model.body_inertia[place, 0]) / max(_size(tensor), least)
         model.body_iquat[place] = turned
         model.body_sameframe[place] = 0  # else its axes count as those of the body
         model.body_inertia[place] = np.maximum(moments, least) * share
