@@ -116,8 +116,8 @@ def usual() -> dict[str, dict[str, Any]]:
 
 RESULTS = """ActiveContacts BatchResult CampaignResults DisturbanceResponse Floquet Gait GaitFamily
 Gradient Largest
-LimitCycle ModeChange Monodromy Motion PhasedGait Robot Run RunDerivatives Snapshot StepDerivatives
-StepFamily ZeroDynamics"""
+LimitCycle ModeChange Monodromy Motion PhasedGait Robot Run RunDerivatives Snapshot SpatialRobot
+StepDerivatives StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
 TOLD_APART = """Bundle Constraint ContactPhase EndOfRun GaitLQR GroundShape MotionTracking
 SteppingConstraints VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell

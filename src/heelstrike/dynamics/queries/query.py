@@ -1,13 +1,15 @@
 """Queries: what can be asked of a robot in a state, each written once for numbers and symbols.
 
 A query is a function of an :class:`~heelstrike.dynamics.queries.evaluation.Evaluation`. The
-decorators here make the function of (robot, q, …) of it that people call, with its documentation;
-its ``at`` is the query itself, which :mod:`heelstrike.dynamics.queries.symbolic` and
+decorators here make the function of (robot, q, …) of it that people call, with its documentation,
+which hands a robot in space on to the query of that name in :mod:`heelstrike.dynamics.spatial`; its
+``at`` is the query itself, which :mod:`heelstrike.dynamics.queries.symbolic` and
 :mod:`heelstrike.dynamics.queries.casadi_functions` ask over symbols.
 """
 
 from __future__ import annotations
 
+import importlib
 import inspect
 from collections.abc import Callable, Iterable
 from functools import update_wrapper
@@ -16,7 +18,9 @@ from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 from numpy.typing import ArrayLike
 
 from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.errors import RobotError
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 
 P = ParamSpec("P")
 Result = TypeVar("Result", covariant=True)
@@ -30,7 +34,7 @@ Arguments = dict[str, tuple[str, str]]
 """Of every argument its type and what it is."""
 
 _ARGUMENTS: Arguments = {
-    "robot": ("Robot", "The robot."),
+    "robot": ("Robot or SpatialRobot", "The robot."),
     "q": ("(nq,) array", "Position, in m and rad, in the order of ``robot.joint_names``."),
     "v": ("(nv,) array", "Velocity, in m/s and rad/s."),
     "time": ("float", "How long, in s."),
@@ -39,7 +43,7 @@ _ARGUMENTS: Arguments = {
     "force": ("(nv,) array", "Generalised force, in N and N m."),
     "torque": ("(nu,) array", "Torques or forces of the motors, as ``robot.actuator_names``."),
     "link": ("int or str", "Link, by its index or the name of its body."),
-    "local": ("(2,) array", "Place (x, z) of the point in the axes of its link, in m."),
+    "local": ("(2,) array", "Place (x, z), in space (x, y, z), of the point on its link, in m."),
     "contacts": ("iterable of int or str, optional", "Contact points, all k = nc by default."),
 }
 _RAISES = "If the robot has no such link or contact point, or a vector has the wrong length."
@@ -60,7 +64,9 @@ class Query(Protocol[P, Result]):
 class OfPosition(Query[P, Result], Protocol[P, Result]):
     """A query of a position."""
 
-    def __call__(self, robot: Robot, q: ArrayLike, *others: P.args, **named: P.kwargs) -> Result:
+    def __call__(
+        self, robot: Robot | SpatialRobot, q: ArrayLike, *others: P.args, **named: P.kwargs
+    ) -> Result:
         """Answer it."""
 
 
@@ -68,7 +74,12 @@ class OfState(Query[P, Result], Protocol[P, Result]):
     """A query of a position and a velocity."""
 
     def __call__(
-        self, robot: Robot, q: ArrayLike, v: ArrayLike, *others: P.args, **named: P.kwargs
+        self,
+        robot: Robot | SpatialRobot,
+        q: ArrayLike,
+        v: ArrayLike,
+        *others: P.args,
+        **named: P.kwargs,
     ) -> Result:
         """Answer it."""
 
@@ -79,7 +90,11 @@ def of_position(
     """Make a query of a position (and more); `returns` says in what shape, unit and frame."""
 
     def query(body: Callable[Concatenate[Evaluation, P], Result]) -> OfPosition[P, Result]:
-        def answer(robot: Robot, q: ArrayLike, *others: P.args, **named: P.kwargs) -> Result:
+        def answer(
+            robot: Robot | SpatialRobot, q: ArrayLike, *others: P.args, **named: P.kwargs
+        ) -> Result:
+            if isinstance(robot, SpatialRobot):
+                return in_space(body.__name__, robot)(robot, q, *others, **named)
             return body(Evaluation(robot, q), *others, **named)
 
         return described_answer(answer, body, returns)
@@ -94,13 +109,37 @@ def of_state(
 
     def query(body: Callable[Concatenate[Evaluation, P], Result]) -> OfState[P, Result]:
         def answer(
-            robot: Robot, q: ArrayLike, v: ArrayLike, *others: P.args, **named: P.kwargs
+            robot: Robot | SpatialRobot,
+            q: ArrayLike,
+            v: ArrayLike,
+            *others: P.args,
+            **named: P.kwargs,
         ) -> Result:
+            if isinstance(robot, SpatialRobot):
+                return in_space(body.__name__, robot)(robot, q, v, *others, **named)
             return body(Evaluation(robot, q, v), *others, **named)
 
         return described_answer(answer, body, returns)
 
     return query
+
+
+def in_space(name: str, robot: SpatialRobot) -> Callable[..., Any]:
+    """Return the query of that name about robots in space, which are not imported before.
+
+    Raises
+    ------
+    RobotError
+        If it is one of the plane alone.
+    """
+    questions = importlib.import_module("heelstrike.dynamics.spatial")
+    if not hasattr(questions, name):
+        raise RobotError(
+            f"{name} is asked of robots of the plane; {robot.name!r} is one of space, of which "
+            "heelstrike does not know it yet."
+        )
+    question: Callable[..., Any] = getattr(questions, name)
+    return question
 
 
 def described_answer(

@@ -17,7 +17,13 @@ import numpy as np
 from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.flattening import Coordinate, flatten
-from heelstrike.robot.files.inertias import put_back, refuse_missing, stated_tensor, take_out
+from heelstrike.robot.files.inertias import (
+    put_back,
+    put_back_whole,
+    refuse_missing,
+    stated_tensor,
+    take_out,
+)
 from heelstrike.robot.files.options import FORWARD, Options
 from heelstrike.robot.files.posture import positions, turn
 from heelstrike.robot.files.screening.screening import Screened, screen
@@ -191,7 +197,9 @@ def parse_whole(
         for link, moments in missing.items():
             raise RobotError(f"{label}: <inertia> of link {link!r} lacks {moments[0]!r}. Give it.")
         told = free(spec, _is_held(file.xml))
+        taken = take_out(spec)
         model = compiled(spec, remarks)
+        put_back_whole(model, taken, spec.compiler.boundinertia, label)
         pose = mujoco.MjData(model)
         pose.qpos[:] = positions(model, options, label)
         turn(model, pose, FORWARD[options.forward or "x"])

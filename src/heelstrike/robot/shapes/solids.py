@@ -51,23 +51,28 @@ def few_corners(points: Floats, most: int) -> tuple[Floats, float]:
     return corners[sorted(chosen)], max(_distance(corners[i], corners[chosen]) for i in worst)
 
 
-WORST = 10
+WORST = 400
 """Corners whose distance is looked at: those that are furthest beyond one face."""
 
 
 def _outside(points: Floats, solid: Floats) -> Floats:
     """How far points are beyond the face of a solid that is furthest from them; 0 within it."""
-    from scipy.spatial import ConvexHull, QhullError
+    from scipy.spatial import ConvexHull
 
-    try:
-        faces = ConvexHull(solid).equations
-    except QhullError:  # it is still flat
-        center = solid.mean(axis=0)
-        _, size, along = np.linalg.svd(solid - center)
-        rank = int(np.count_nonzero(size > ON_A_LINE))
-        away = points - center
-        return np.linalg.norm(away - away @ along[:rank].T @ along[:rank], axis=1)
-    return np.maximum(0.0, (points @ faces[:, :3].T + faces[:, 3]).max(axis=1))
+    center = solid.mean(axis=0)
+    _, size, along = np.linalg.svd(solid - center)
+    rank = int(np.count_nonzero(size > ON_A_LINE))
+    away, within = points - center, solid - center
+    if rank < 3:
+        aside = np.linalg.norm(away - away @ along[:rank].T @ along[:rank], axis=1)
+        if aside.max() > ON_A_LINE:
+            return np.asarray(aside)
+        away, within = away @ along[:rank].T, within @ along[:rank].T
+    if rank < 2:
+        low, high = within.min(axis=0), within.max(axis=0)
+        return np.maximum(np.maximum(low - away, away - high), 0.0).sum(axis=1)
+    faces = ConvexHull(within).equations
+    return np.maximum(0.0, (away @ faces[:, :-1].T + faces[:, -1]).max(axis=1))
 
 
 def _distance(point: Floats, solid: Floats) -> float:

@@ -29,7 +29,7 @@ from heelstrike.tolerances import ONE_POINT
 from heelstrike.wording import some_of
 
 MOST_OF_A_MESH = 32
-"""Points that stand for a mesh at most."""
+"""Points that stand for the meshes of a link at most."""
 
 AROUND = 8
 """Points round each end of a cylinder that stands."""
@@ -39,7 +39,7 @@ UPRIGHT = 0.7
 stands on an end; one that is more level rolls on its rims."""
 
 SAID = 1e-3
-"""Metres by which a mesh reaches beyond its points, from which on that is told."""
+"""Metres by which meshes reach beyond their points, from which on that is told."""
 
 SHOWN = 4  # how many names a message lists before it counts the rest
 
@@ -83,9 +83,9 @@ def read_spatial_points(file: MujocoFile, links: SpatialLinks) -> list[SpatialPo
 
     A sphere is one, of its radius, or a point if that is below 1e-9 m; a capsule is the spheres of
     its two ends, a box its eight corners. A cylinder that lies is its two rims, of which the lowest
-    points meet the ground wherever it rolls; one that stands is eight points round each end. Of a
-    mesh it is up to 32 corners of its convex hull. Edges meet nothing between their ends, and links
-    never each other.
+    points meet the ground wherever it rolls; one that stands is eight points round each end. Of the
+    meshes of a link it is up to 32 corners of their convex hull, which meets level ground where
+    they do. Edges meet nothing between their ends, and links never each other.
 
     Raises
     ------
@@ -99,17 +99,32 @@ def read_spatial_points(file: MujocoFile, links: SpatialLinks) -> list[SpatialPo
     """
     points: list[SpatialPoint] = []
     skipped: list[str] = []
-    beyond: dict[str, float] = {}
+    beyond: dict[int, float] = {}
     scales = contact_scales(file)
     touching = geoms_that_touch(file, links.of_body)
     _tell_of_self_collision(file, touching)
+    of_meshes: dict[tuple[int, float, float, float], list[Floats]] = {}
     for geom in touching:
-        name = file.name("geom", geom)
         own = scales.get(file.given_name("geom", geom), {})
-        shape = list(_shape(file, geom, links, beyond))
+        if file.model.geom_type[geom] == MESH:
+            link, place = _of_link(file, geom, links, mesh_corners(file, geom))
+            friction = float(file.model.geom_friction[geom, 0])
+            key = link, friction, *(own.get(name, 1.0) for name in SCALES)
+            of_meshes.setdefault(key, []).append(place)
+            continue
+        shape = list(_shape(file, geom, links))
         points += [_scaled(point, **own) for point in shape]
         if not shape:
-            skipped.append(name)
+            skipped.append(file.name("geom", geom))
+    for (link, friction, *own_scales), places in of_meshes.items():
+        corners, reach = few_corners(np.concatenate(places), MOST_OF_A_MESH)
+        if reach > SAID:
+            beyond[link] = max(reach, beyond.get(link, 0.0))
+        scaled = dict(zip(SCALES, own_scales, strict=True))
+        points += [
+            _scaled(SpatialPoint(link, _triple(place), 0.0, friction), **scaled)
+            for place in corners
+        ]
     if skipped:
         warn(
             f"{file.source}: these geoms cannot touch the ground here, because their shape "
@@ -118,10 +133,12 @@ def read_spatial_points(file: MujocoFile, links: SpatialLinks) -> list[SpatialPo
         )
     if beyond:
         worst = max(beyond, key=lambda each: beyond[each])
-        number = f"{len(beyond)} meshes reach" if len(beyond) > 1 else "a mesh reaches"
+        name = file.name("body", int(file.model.jnt_bodyid[worst]))
         warn(
-            f"{file.source}: {number} more than {1e3 * SAID:g} mm beyond the {MOST_OF_A_MESH} "
-            f"corners that stand for its hull; {worst} by {1e3 * beyond[worst]:.2g} mm."
+            f"{file.source}: the {MOST_OF_A_MESH} corners that stand for the meshes of a link miss "
+            f"their hull by more than {1e3 * SAID:g} mm on {len(beyond)} of its links, by up to "
+            f"{1e3 * beyond[worst]:.2g} mm on {name!r}. Whoever wants less gives the link spheres, "
+            "capsules or boxes."
         )
     points = sorted(_merged(points), key=lambda point: point.link)
     if len(points) > MOST_POINTS:
@@ -149,16 +166,17 @@ def _tell_of_self_collision(file: MujocoFile, geoms: list[int]) -> None:
         )
 
 
-def _shape(
-    file: MujocoFile, geom: int, links: SpatialLinks, beyond: dict[str, float]
-) -> Iterator[SpatialPoint]:
+def _of_link(file: MujocoFile, geom: int, links: SpatialLinks, local: Floats) -> tuple[int, Floats]:
+    """Return the link of a geom, and points of the geom's frame in the link's."""
+    link = int(links.of_body[file.model.geom_bodyid[geom]])
+    world = file.pose.geom_xpos[geom] + local @ file.pose.geom_xmat[geom].reshape(3, 3).T
+    return link, (world - links.origin[link]) @ links.axes[link]
+
+
+def _shape(file: MujocoFile, geom: int, links: SpatialLinks) -> Iterator[SpatialPoint]:
     """Points of a geom, none if it has no shape that we know."""
     model, pose = file.model, file.pose
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
-    link = int(links.of_body[model.geom_bodyid[geom]])
-    axes = links.axes[link]
-    turn = axes.T @ pose.geom_xmat[geom].reshape(3, 3)
-    middle = axes.T @ (pose.geom_xpos[geom] - links.origin[link])
     radius = float(size[0]) if kind in (SPHERE, CAPSULE) and size[0] > SMALLEST_RADIUS else 0.0
     axis, rim = np.zeros(3), 0.0
     if kind == SPHERE:
@@ -169,20 +187,18 @@ def _shape(
         local = size * np.array(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij")).reshape(3, -1).T
     elif kind == CYLINDER and abs(pose.geom_xmat[geom, 8]) <= UPRIGHT:
         local = np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]])
-        axis, rim = turn[:, 2], float(size[0])
+        axis = links.axes[links.of_body[model.geom_bodyid[geom]]].T @ pose.geom_xmat[geom, 2::3]
+        rim = float(size[0])
     elif kind == CYLINDER:
         angle = np.arange(AROUND) * (2.0 * np.pi / AROUND)
         around = size[0] * np.column_stack((np.cos(angle), np.sin(angle)))
         ends = [np.column_stack((around, np.full(AROUND, end))) for end in (-size[1], size[1])]
         local = np.concatenate(ends)
-    elif kind == MESH:
-        local, reach = few_corners(mesh_corners(file, geom), MOST_OF_A_MESH)
-        if reach > SAID:
-            beyond[file.name("geom", geom)] = reach
     else:
         return
     friction = float(model.geom_friction[geom, 0])
-    for place in middle + local @ turn.T:
+    link, places = _of_link(file, geom, links, local)
+    for place in places:
         yield SpatialPoint(link, _triple(place), radius, friction, _triple(axis), rim)
 
 

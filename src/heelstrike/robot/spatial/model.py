@@ -156,6 +156,11 @@ class SpatialModel(Bundle):
     it."""
     shared: Integers = of("nv", "nv", kind=int, least=0)
     """How many velocities the chains of two velocities share."""
+    first_contact: Integers = of("nl + 1", kind=int, least=0)
+    """First contact point of each link, which has all before that of the next; nc behind the
+    last."""
+    reach: Floats = of("nl", unit="m", least=0.0)
+    """How far from the origin of each link its contact points reach; zero where it has none."""
     pivot: int = of(kind=int, points="nl", least=0)
     """Link whose origin serves as the reference point of spatial vectors, so that a robot far from
     the world origin loses no digits."""
@@ -167,8 +172,9 @@ class SpatialModel(Bundle):
         Parameters
         ----------
         **members : array
-            Members by name, but for `first_position`, `first_velocity`, `velocity_joint`,
-            `last_velocity`, `depth`, `chain` and `shared`.
+            Members by name, contact points in the order of their links; but for `first_position`,
+            `first_velocity`, `velocity_joint`, `last_velocity`, `depth`, `chain`, `shared`,
+            `first_contact` and `reach`, which follow.
 
         Returns
         -------
@@ -177,7 +183,7 @@ class SpatialModel(Bundle):
         """
         parent = np.array(members["parent"], dtype=np.int64).reshape(-1)
         kinds = [JointKind(int(kind)) for kind in np.ravel(members["joint_kind"])]
-        given = members | _tree(parent, kinds)
+        given = members | _tree(parent, kinds) | _contacts(len(parent), members)
         made: dict[str, Any] = dict(given)
         for name, number in SPATIAL_NUMBERS.items():
             if number.shape:
@@ -194,6 +200,18 @@ SPATIAL_NUMBERS: dict[str, Number] = {
     name: member for name, member in SpatialModel.declared.items() if isinstance(member, Number)
 }
 """All that a model in space consists of."""
+
+
+def _contacts(links: int, members: dict[str, Any]) -> dict[str, Any]:
+    """Which contact points each link has, and how far from its origin they reach."""
+    link = np.array(members["contact_link"], dtype=np.int64).reshape(-1)
+    if np.any(np.diff(link) < 0):
+        raise ValueError("contact points are in the order of their links")
+    place = np.array(members["contact_position"], dtype=np.float64).reshape(-1, AXES)
+    extent = np.ravel(members["contact_radius"]) + np.ravel(members["contact_rim"])
+    reach = np.zeros(links)
+    np.maximum.at(reach, link, np.linalg.norm(place, axis=1) + extent)
+    return {"first_contact": np.searchsorted(link, np.arange(links + 1)), "reach": reach}
 
 
 def _tree(parent: Integers, kinds: list[JointKind]) -> dict[str, Any]:
