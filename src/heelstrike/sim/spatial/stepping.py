@@ -14,6 +14,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.spatial.certified_solve import solve_block_problem
 from heelstrike.contact.spatial.ground import SpatialGroundModel
 from heelstrike.contact.spatial.modes import SOLVED
+from heelstrike.contact.spatial.workspace import BlockWorkspace
 from heelstrike.dynamics.spatial.algebra import dot, spatial, velocity_at
 from heelstrike.dynamics.spatial.configurations import integrate
 from heelstrike.dynamics.spatial.equations import (
@@ -38,6 +39,7 @@ from heelstrike.sim.spatial.impact import closes, solve_impact_of, touches_at_en
 from heelstrike.sim.spatial.memory import (
     SpatialAssembly,
     SpatialEquations,
+    SpatialImpact,
     SpatialMemory,
     SpatialPushes,
 )
@@ -167,15 +169,40 @@ def forgive_depth(step: float, table: BlockTable, assembly: SpatialAssembly) -> 
 
 
 @kernel
-def solve_positions(step: float, memory: SpatialMemory) -> int:
-    """Solve the problem of the positions; where there is no way out, without asking for one."""
-    assembly, impact = memory.assembly, memory.impact
-    status = solve_block_problem(assembly.problem, memory.solver, assembly.answer)
+def goes_on_wedged(steps: int, impact: SpatialImpact) -> bool:
+    """Whether the step before had no way out, and is not asked again: at 1, 2, 4, 8, ... steps."""
+    age = steps - impact.since
+    return impact.wedged == steps - 1 and age & (age - 1) != 0
+
+
+@kernel
+def note_relaxed(steps: int, impact: SpatialImpact) -> None:
+    """Keep that a step is not asked to come out of the ground."""
+    impact.relaxed = 1
+    if impact.wedged < steps - 1:
+        impact.since = steps
+    impact.wedged = steps
+
+
+@kernel
+def solve_positions(
+    step: float, steps: int, table: BlockTable, solver: BlockWorkspace,
+    assembly: SpatialAssembly, impact: SpatialImpact,
+) -> int:  # fmt: skip
+    """Solve the problem of the positions; where there is no way out, without asking for one.
+
+    Limbs that lie on several points, at the ends of their ranges, find none where each of their
+    points is in the ground by another billionth: each would have to slide its own way. They are
+    left there, and asked again when that is twice as long ago.
+    """
     impact.relaxed = 0
-    if status != SOLVED and forgive_depth(step, memory.blocks, assembly):
-        impact.relaxed = 1
-        memory.tally.relaxed += 1
-        status = solve_block_problem(assembly.problem, memory.solver, assembly.answer)
+    at_once = goes_on_wedged(steps, impact) and forgive_depth(step, table, assembly)
+    if at_once:
+        note_relaxed(steps, impact)
+    status = solve_block_problem(assembly.problem, solver, assembly.answer)
+    if status != SOLVED and not at_once and forgive_depth(step, table, assembly):
+        note_relaxed(steps, impact)
+        status = solve_block_problem(assembly.problem, solver, assembly.answer)
     return status
 
 
@@ -210,7 +237,8 @@ def solve_step_of(
             assemble(
                 model, step, table, memory.feet, memory.q, v, next_v, equations, assembly
             )  # fmt: skip
-            if solve_positions(step, memory) != SOLVED:
+            steps = memory.tally.steps
+            if solve_positions(step, steps, table, memory.solver, assembly, impact) != SOLVED:
                 worst = assembly.answer.residual
             memory.tally.residual = max(memory.tally.residual, assembly.answer.residual)
             add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
@@ -341,6 +369,7 @@ def take_step(
             certified = False
         note_answer_of(step, length, memory)
         gain += memory.impact.gain
+        memory.tally.relaxed += memory.impact.relaxed
         if done + 1 == parts:
             find_slip(model, memory)
         integrate(model, memory.q, memory.impact.arriving, step, memory.q)
