@@ -95,13 +95,13 @@ def limit_commands(model: SpatialModel, memory: SpatialMemory) -> bool:
 
 
 @kernel
-def is_sound(memory: SpatialMemory) -> bool:
+def is_sound(q: Floats, v: Floats) -> bool:
     """Whether the state is finite and not absurd."""
     bad = 0
-    for i in range(memory.q.shape[0]):
-        bad += not abs(memory.q[i]) < FARTHEST
-    for i in range(memory.v.shape[0]):
-        bad += not abs(memory.v[i]) < FASTEST
+    for i in range(q.shape[0]):
+        bad += not abs(q[i]) < FARTHEST
+    for i in range(v.shape[0]):
+        bad += not abs(v[i]) < FASTEST
     return bad == 0
 
 
@@ -133,7 +133,7 @@ def advance_in_space(
         full = record.events + clock.event_margin > record.event_time.shape[0]
         if full or record.rows + 1 > record.time.shape[0]:
             return RECORD_FULL
-        if not is_sound(memory):
+        if not is_sound(memory.q, memory.v):
             return DIVERGED
         time = clock.start + clock.index * clock.step
         find_state(model, ground, memory)

@@ -182,7 +182,10 @@ def allocate_spatial_memory(robot: SpatialRobot, pushes: SpatialPushes) -> Spati
         extents, problem=block_problem(blocks, rows), answer=block_answer(blocks, rows)
     )
     impact = SpatialImpact.allocate(
-        extents, wedged=NEVER_TOUCHED, problem=block_problem(blocks, rows), answer=block_answer(blocks, rows)
+        extents,
+        wedged=NEVER_TOUCHED,
+        problem=block_problem(blocks, rows),
+        answer=block_answer(blocks, rows),
     )
     solver = block_workspace(blocks, rows, ready=False)
     solver.settings.floor = KNOWN_SPEED

@@ -329,9 +329,8 @@ def find_slip(model: SpatialModel, memory: SpatialMemory) -> None:
 
 
 @kernel
-def begin_step(memory: SpatialMemory) -> None:
+def begin_step(table: BlockTable) -> None:
     """Forget the forces of the step before."""
-    table = memory.blocks
     for entry in range(table.kind.shape[0]):
         for i in range(3):
             table.force[entry, i] = 0.0
@@ -346,7 +345,7 @@ def take_step(
 
     Returns whether it could be done, and whether all of it is certified.
     """
-    begin_step(memory)
+    begin_step(memory.blocks)
     halvings, done = 0, 0
     parts = 1
     certified = True
