@@ -1,0 +1,1 @@
+"""Time stepping of robots in space, and the run it leaves behind."""
