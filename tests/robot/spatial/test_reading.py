@@ -60,6 +60,20 @@ def test_a_file_tells_its_dimension(tmp_path: Path) -> None:
     assert isinstance(hs.load_robot("bravo7"), hs.Robot)
 
 
+def test_a_robot_of_the_plane_that_leaves_it_is_told(tmp_path: Path) -> None:
+    """Who slips in one axis of a planar robot hears why it has become one of space."""
+    path = tmp_path / "robot.xml"
+    path.write_text(SPATIAL, encoding="utf-8")
+    with pytest.warns(RobotWarning, match=r"joint 'roll' .* turns about .* three dimensions"):
+        hs.load_robot(path)
+    assert "leaves the" not in said(SPATIAL, tmp_path)  # which asks for dimension=3
+    path.write_text(FREE, encoding="utf-8")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        hs.load_robot(path)
+    assert not any("leaves" in str(one.message) for one in caught)
+
+
 def test_a_dimension_that_is_asked_for(tmp_path: Path) -> None:
     lifted = load(PLANAR, tmp_path, dimension=3)
     assert isinstance(lifted, SpatialRobot)

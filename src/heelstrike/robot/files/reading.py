@@ -194,17 +194,21 @@ def _read(
     """Read a robot of the dimension that is asked for."""
     from heelstrike.robot.files.mjcf import planar_robot
     from heelstrike.robot.files.spatial import LeavesPlaneError
+    from heelstrike.robot.spatial.reading import spatial_robot
 
+    leaves: LeavesPlaneError | None = None
     if asked.dimension != 3:
         try:
             return planar_robot(source, options, asked.name, asked.text)
-        except LeavesPlaneError:
+        except LeavesPlaneError as error:
             if asked.dimension is not None:
                 raise
-            caught.clear()  # it was said of a robot that is not the one
-    from heelstrike.robot.spatial.reading import spatial_robot
-
-    return spatial_robot(source, options, asked.name, asked.text)
+            leaves = error
+            caught.clear()  # what was said of a robot that is not the one
+    robot = spatial_robot(source, options, asked.name, asked.text)
+    if leaves is not None and not robot.floating:
+        warn(f"{leaves} Until then it is one of three dimensions, which dimension=3 asks for.")
+    return robot
 
 
 def _order(
