@@ -55,6 +55,9 @@ def usual() -> dict[str, dict[str, Any]]:
         "JointPD": {**on_a_gait, "kp": 1.0, "kd": 1.0},
         "KelvinVoigt": {},
         "Policy": {"file": "policy.npz"},
+        "Box": {"center": np.zeros(3), "size": np.ones(3)},
+        "SpatialGround": {},
+        "HoldPosture": {"robot": hs.load_robot("bravo7", dimension=3), "kp": 1.0, "kd": 1.0},
         "Push": {"link": "trunk", "force": (1.0, 0.0), "start": 0.0, "duration": 0.1},
         "RobotBuilder": {"name": "robot"},
         "Sensed": {"controller": law},
@@ -116,7 +119,7 @@ def usual() -> dict[str, dict[str, Any]]:
 RESULTS = """ActiveContacts BatchResult CampaignResults DisturbanceResponse Floquet Gait GaitFamily
 Gradient Largest
 LimitCycle ModeChange Monodromy Motion PhasedGait PlannerComparison Robot Run RunDerivatives
-Snapshot StepDerivatives StepFamily ZeroDynamics"""
+Snapshot SpatialRobot StepDerivatives StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
 TOLD_APART = """Bundle Constraint ContactPhase EndOfRun GaitLQR GroundShape MotionTracking
 SteppingConstraints VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell

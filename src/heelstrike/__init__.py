@@ -58,9 +58,11 @@ if TYPE_CHECKING:
     from heelstrike.compiler.bundle import number as number
     from heelstrike.compiler.bundle import part as part
     from heelstrike.contact import ActiveContacts as ActiveContacts
+    from heelstrike.contact import Box as Box
     from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
     from heelstrike.contact import GroundShape as GroundShape
+    from heelstrike.contact import SpatialGround as SpatialGround
     from heelstrike.contact import contact_forward_dynamics as contact_forward_dynamics
     from heelstrike.contact import contact_inverse_dynamics as contact_inverse_dynamics
     from heelstrike.contact import contact_kinematics as contact_kinematics
@@ -90,6 +92,7 @@ if TYPE_CHECKING:
     from heelstrike.control import ZeroMomentPointRegulation as ZeroMomentPointRegulation
     from heelstrike.control import controller as controller
     from heelstrike.control import solve_quadratic_program as solve_quadratic_program
+    from heelstrike.control.spatial.hold_posture import HoldPosture as HoldPosture
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
     from heelstrike.errors import GaitError as GaitError
@@ -126,6 +129,7 @@ if TYPE_CHECKING:
     from heelstrike.robot import Robot as Robot
     from heelstrike.robot import RobotBuilder as RobotBuilder
     from heelstrike.robot import RobotWarning as RobotWarning
+    from heelstrike.robot import SpatialRobot as SpatialRobot
     from heelstrike.robot import State as State
     from heelstrike.robot import builtin_robots as builtin_robots
     from heelstrike.robot import inspect_robot as inspect_robot
@@ -173,6 +177,7 @@ _HOME = {
     "Actuated": "heelstrike.control",
     "Batch": "heelstrike.sim",
     "BatchResult": "heelstrike.sim",
+    "Box": "heelstrike.contact",
     "Bundle": "heelstrike.compiler.bundle",
     "Campaign": "heelstrike.experiments.campaigns",
     "CampaignResults": "heelstrike.experiments.campaigns",
@@ -204,6 +209,7 @@ _HOME = {
     "GroundShape": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
     "HeldTorque": "heelstrike.sim",
+    "HoldPosture": "heelstrike.control.spatial.hold_posture",
     "HuntCrossley": "heelstrike.sim",
     "ImpulseSet": "heelstrike.sim",
     "InertialUnit": "heelstrike.control",
@@ -237,6 +243,8 @@ _HOME = {
     "SimulationError": "heelstrike.errors",
     "SimulationWarning": "heelstrike.sim",
     "Snapshot": "heelstrike.sim",
+    "SpatialGround": "heelstrike.contact",
+    "SpatialRobot": "heelstrike.robot",
     "SpringMass": "heelstrike.experiments.spring_mass",
     "StandingLQR": "heelstrike.control",
     "State": "heelstrike.robot",

@@ -20,7 +20,7 @@ from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.looks import is_file
 from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.reading import read_bodies, read_mjcf
-from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS, builtin_robots, load_robot
+from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS, builtin_robots, load_planar_robot
 from heelstrike.robot.loops import coupling_words, latch_words
 from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats, label
 from heelstrike.robot.plausibility import (
@@ -113,7 +113,7 @@ def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptio
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RobotWarning)
         try:
-            found: Robot | None = load_robot(robot, **how)
+            found: Robot | None = load_planar_robot(robot, **how)
         except RobotError as error:
             if path is None:
                 raise

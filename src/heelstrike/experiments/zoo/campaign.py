@@ -26,8 +26,9 @@ from heelstrike.experiments.zoo.results import (
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, load_gait
 from heelstrike.gait.gait import fingerprint
-from heelstrike.robot import Robot, builtin_robots, load_robot
+from heelstrike.robot import Robot, builtin_robots
 from heelstrike.robot.files.options import LoadOptions
+from heelstrike.robot.library import load_planar_robot
 from heelstrike.sim.method import Method
 from heelstrike.sim.time_stepping.method import TimeStepping
 from heelstrike.wording import meant
@@ -160,7 +161,7 @@ def loaded(words: str, how: LoadOptions) -> dict[str, Robot]:
             raise RobotError(
                 f"two robots are called {name!r}: name each once, and files differently"
             )
-        robots[name] = load_robot(word) if built_in else load_robot(word, **how)
+        robots[name] = load_planar_robot(word) if built_in else load_planar_robot(word, **how)
     return robots
 
 
