@@ -17,6 +17,8 @@ from heelstrike.control.gait_lqr.flat import FlatOrbit, _sampled
 from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.held import HeldRobot
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 Floats = NDArray[np.float64]
 
 
