@@ -86,7 +86,7 @@ def test_linear_equations_are_those_of_the_robot_on_its_foot(place: int) -> None
 
 @pytest.mark.parametrize("first", [0, -1])
 def test_a_touchdown_is_that_of_heel_and_toe_one_after_the_other(first: int) -> None:
-    """Each when it is down, to first order; the clock begins anew with the first."""
+    """Each when it is down, to first order; the clock starts again with the first."""
     stance, robot = orbit().stance, walking.bravo7()
     points, mirror = list(stance.swing.contacts), robot.mirror
     one, other = (points[0], points[-1]) if first == 0 else (points[-1], points[0])

@@ -301,7 +301,7 @@ def iterate_newton(
     ridge : float
         What is added to the diagonal.
     named : bool
-        Whether the modes of the first step are those of the iterate, not named anew.
+        Whether the modes of the first step are those of the iterate, not named again.
     tally, iterate, newton
         Counts, impulses and scratch. The best impulses so far are kept.
     """

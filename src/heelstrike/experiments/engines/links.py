@@ -15,7 +15,7 @@ from heelstrike.robot.model import Floats
 
 @dataclass(frozen=True)
 class Link:
-    """A link and the joint that it hangs on; vectors are (3,), in link axes."""
+    """A link and the joint that it depends on; vectors are (3,), in link axes."""
 
     name: str
     parent: int

@@ -67,7 +67,7 @@ def free_trunk(spec: Any, held: bool, *, floating: bool, label: str) -> list[str
 
 
 def _moves(body: Any) -> bool:
-    """Whether a body or one that hangs on it has a joint."""
+    """Whether a body or one that depends on it has a joint."""
     return bool(body.joints) or any(_moves(child) for child in body.bodies)
 
 
