@@ -455,7 +455,7 @@ class RobotBuilder:
         # The massless links of one base share its name; nothing else does.
         if any(link.name == name for link in self._links) and not joint.startswith("root_"):
             raise self._error(f"there is a link {name!r} already.")
-        place = -1 if parent is None else self._index(parent, f"joint {joint!r} depends on")
+        place = -1 if parent is None else self._index(parent, f"joint {joint!r} is attached to")
         try:
             numbers, torque = _numbers(properties), _torque(properties.get("torque"))
         except RobotError as error:
