@@ -11,6 +11,7 @@ from heelstrike.cli.campaign import campaign
 from heelstrike.cli.check import check
 from heelstrike.cli.compare import compare
 from heelstrike.cli.inspect import inspect
+from heelstrike.cli.mimic import mimic
 from heelstrike.cli.paper import paper
 from heelstrike.cli.planners import planners
 from heelstrike.cli.report import report
@@ -38,6 +39,7 @@ for command in (
     zoo,
     campaign,
     check,
+    mimic,
     paper,
     compare,
     planners,

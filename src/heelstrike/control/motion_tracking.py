@@ -35,6 +35,9 @@ PRICE_OF_FORCES = 1e-6
 """ε, in (m/s²)² for forces of the robot's weight: so small that forces give way before motion."""
 EARLIEST = 0.5
 """Share of a phase before which a touchdown does not end it: the foot scuffs."""
+GRAZING = 1e-4
+"""Gap (m) of points that come down within which a phase ends by time: what lands at nearly no speed
+would land late by any small error, and its polynomials go on for nothing then."""
 LATEST = 1.1
 """Share of a phase until which its polynomials go on if no touchdown ends it."""
 
@@ -97,16 +100,20 @@ def advance_phase(t: float, contacts: Contacts, parameters: Parameters, memory: 
     """Go on to the next phase: at the touchdown that ends one, or as it is over."""
     phase = memory.phase
     gone, duration = t - memory.start, parameters.duration[phase]
-    ends_by_touchdown, touched = False, False
+    ends_by_touchdown, touched, near = False, False, True
     for i in range(parameters.fresh.shape[1]):
         if parameters.fresh[phase, i] == 1:
             ends_by_touchdown = True
             touched = touched or contacts.force[i, 0] > 0.0
+            near = near and contacts.gap[i] < GRAZING
     if parameters.following[phase] < 0:
         return
     if ends_by_touchdown:
         if touched and gone >= parameters.earliest * duration:
             memory.start = t
+            memory.phase = parameters.following[phase]
+        elif near and gone >= duration:
+            memory.start += duration
             memory.phase = parameters.following[phase]
     elif gone >= duration:
         memory.start += duration

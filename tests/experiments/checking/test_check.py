@@ -20,7 +20,7 @@ from heelstrike.errors import GaitError
 from heelstrike.experiments.checking import Check, check_motion
 from heelstrike.experiments.checking import check as check_module
 from heelstrike.experiments.checking.stance import placed
-from heelstrike.gait.motion_files import RecordedMotion
+from heelstrike.gait.recordings.motion import RecordedMotion
 
 STEPS = 3
 

@@ -20,7 +20,7 @@ from heelstrike.experiments.checking.findings import ORDER, Finding, find
 from heelstrike.experiments.checking.stance import Placed, placed
 from heelstrike.experiments.laws import servo_gains
 from heelstrike.field_texts import dataclass
-from heelstrike.gait.motion_files import RecordedMotion
+from heelstrike.gait.recordings.motion import RecordedMotion
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import OnError
@@ -103,7 +103,7 @@ def check_motion(
     robot : Robot
         A robot on two flat feet, all joints driven.
     motion : RecordedMotion
-        The trajectory; :func:`~heelstrike.gait.motion_files.load_recorded_motion` reads one.
+        The trajectory; :func:`~heelstrike.gait.recordings.motion.load_recorded_motion` reads one.
     friction : float
         Of the ground.
     stiffness, damping : float or (nu,) float, optional

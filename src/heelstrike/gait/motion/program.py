@@ -95,6 +95,16 @@ class PhaseUnknowns:
         return self.force @ casadi.sparsify(casadi.DM(values))
 
 
+def path_variables(phases: list[PhaseUnknowns], p: int, grid: Grid, distance: Any) -> Any:
+    """Variables of ``Instants.path`` at instants of a phase, (variables, N)."""
+    own, count = phases[p], grid.share.size
+    step = casadi.DM(own.lengths[grid.piece]).T * own.duration
+    places, far = (casadi.repmat(each, 1, count) for each in (own.places, distance))
+    begun = sum(each.duration for each in phases[:p])
+    time = begun + casadi.DM(phases_of(grid)).T * own.duration
+    return casadi.vertcat(*own.along(grid), own.forces(grid), places, step, far, time)
+
+
 def breakpoints(pieces: int) -> Floats:
     """Shares of a phase between which one polynomial holds, (K + 1,): closer near both ends.
 
@@ -243,12 +253,8 @@ class MotionProgram:
         numbers = np.array([request.slope, request.friction])
         copies, lower, upper, kept = [], [], [], []
         self.labels: list[tuple[Row, int, float]] = []
-        for p, (unknowns, grid) in enumerate(zip(phases, self.grids, strict=True)):
-            count = grid.share.size
-            step = casadi.DM(unknowns.lengths[grid.piece]).T * unknowns.duration
-            far = casadi.repmat(distance, 1, count)
-            places = casadi.repmat(unknowns.places, 1, count)
-            y = casadi.vertcat(*unknowns.along(grid), unknowns.forces(grid), places, step, far)
+        for p, grid in enumerate(self.grids):
+            y = path_variables(phases, p, grid, distance)
             weight = grid.weight * grid.pieces
             copies.append(Copies.of(functions.path, weight, x, y, numbers))
             low, high = self.path_bounds(p, grid)
@@ -362,6 +368,7 @@ class MotionProgram:
                 used = weighed
             elif row.kind is Kind.PUSH:
                 used = row.of[0] in stands.normal
+                lower[k] = request.force_margin_of(p, row.of[0]) / request.robot.weight
             elif row.kind is Kind.RANGE:
                 begins = (grid.piece == 0) & (grid.share == 0.0) & (p == 0)
                 used = ~(ends & ~free) & ~(begins & (request.start is not None))

@@ -9,7 +9,7 @@ import pytest
 import walking
 
 from heelstrike.errors import GaitError
-from heelstrike.gait.motion_files import load_recorded_motion
+from heelstrike.gait.recordings.motion import load_recorded_motion
 
 NAMES = walking.bravo7().actuator_names
 ROWS = np.linspace(-0.5, 0.5, 60).reshape(10, 6)
