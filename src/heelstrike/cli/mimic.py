@@ -43,10 +43,10 @@ class Recording:
             help="Which marker is which, as right_hip=R.GTRO; repeat the option for more.",
         ),
     ] = None
-    up: Annotated[
+    up_axis: Annotated[
         str | None, typer.Option(help="Axis that is up: y, z.", show_default="as usual")
     ] = None
-    forward: Annotated[
+    forward_axis: Annotated[
         str | None,
         typer.Option(help="Axis of the walk: x, -x, y, ...", show_default="from heel to toe"),
     ] = None
@@ -111,8 +111,8 @@ def mimic(
     with stage("reading", when_slow=FIRST_TIME) as doing:
         found = mimicked(
             recording, robot=machine, mass=person.mass, height=person.height, speed=person.speed,
-            rate=person.rate, unit=person.unit, markers=person.landmarks(), up=person.up,
-            forward=person.forward, forces=person.forces, friction=friction, steps=steps,
+            rate=person.rate, unit=person.unit, markers=person.landmarks(), up=person.up_axis,
+            forward=person.forward_axis, forces=person.forces, friction=friction, steps=steps,
             progress=doing.doing,
         )  # fmt: skip
     with stage("writing results"):

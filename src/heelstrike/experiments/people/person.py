@@ -81,8 +81,8 @@ def person_of(
         missing = [f"right_{each}" for each in wanted if not markers.has(f"right_{each}")]
         raise GaitError(
             f"the recording has no whole leg: {', '.join(missing)} and the same on the left are "
-            f"missing; it has {', '.join(markers.names)}. Say which marker is which, as in "
-            "--marker right_hip=NAME."
+            f"missing; it has {', '.join(markers.names)}. Say which marker is which, as "
+            "right_hip=NAME."
         )
     if not above:
         raise GaitError("the recording has no marker on the trunk: rib cage or shoulder")
@@ -98,10 +98,7 @@ def person_of(
     for side in sides:
         for joint, link in zip(JOINTS, ("trunk", f"{side}_shank", f"{side}_foot"), strict=True):
             places[f"{side}_{joint}"] = (link, origin)
-        flat = _flat(markers, side)
-        ankle = markers.of(f"{side}_ankle")[flat]
-        for end in ("heel", "toe"):
-            local = np.median(markers.of(f"{side}_{end}")[flat] - ankle, axis=0)
+        for end, local in _on_foot(markers, side).items():
             places[f"{side}_{end}"] = (f"{side}_foot", local)
     for name in above:
         length = _apart(markers, f"{sides[0]}_hip", name)
@@ -116,6 +113,24 @@ def _apart(markers: RecordedMarkers, first: str, second: str) -> float:
     if not seen.size:
         raise GaitError(f"{first} and {second} were never seen together")
     return float(np.median(seen))
+
+
+def _on_foot(markers: RecordedMarkers, side: str) -> dict[str, Floats]:
+    """Places of heel and toe markers on a foot, from its ankle, in m.
+
+    Against the line through both they are the same at all times; how that line lies on a foot that
+    is flat, the times tell at which both are low.
+    """
+    ankle, heel, toe = (markers.of(f"{side}_{name}") for name in ("ankle", "heel", "toe"))
+    sole = toe - heel
+    turned = np.exp(-1j * np.arctan2(sole[:, 1], sole[:, 0]))  # rotations as complex numbers
+    flat = np.conj(np.mean(turned[_flat(markers, side)]))
+    found = {}
+    for name, marker in (("heel", heel), ("toe", toe)):
+        away = marker - ankle
+        along = np.nanmean((away[:, 0] + 1j * away[:, 1]) * turned) * flat / abs(flat)
+        found[name] = np.array([along.real, along.imag])
+    return found
 
 
 def _flat(markers: RecordedMarkers, side: str) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

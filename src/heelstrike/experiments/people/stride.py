@@ -202,7 +202,7 @@ def _timed(motion: BodyMotion, stride: Stride, speed: float | None, travelled: f
     if not speed > 0.0:
         raise GaitError(
             f"the person does not walk forwards: the hip moves past the foot that stands at "
-            f"{speed:.3g} m/s. Say which axis is forward, or --speed."
+            f"{speed:.3g} m/s. Say which axis is forward, or the speed."
         )
     values = {**vars(stride), "speed": speed, "flat": flat, "raised": raised}
     return Stride(**values)

@@ -140,7 +140,7 @@ def load_markers(
     else:
         horizontal, ahead = _axis(forward)
     if horizontal == vertical:
-        raise GaitError(f"{path}: one axis cannot be both up and forward; say --up and --forward")
+        raise GaitError(f"{path}: one axis cannot be both up and forward")
     plane = np.stack([ahead * places[..., horizontal], upward * places[..., vertical]], axis=-1)
     used = set(found.values())
     ignored = tuple(name for k, name in enumerate(points.names) if k not in used)
@@ -203,7 +203,7 @@ def _landmarks(path: Name, points: Points, given: Mapping[str, str]) -> dict[str
     if not found:
         raise GaitError(
             f"{path}: none of its markers is a known landmark ({', '.join(points.names[:8])} …); "
-            "say which is which, as in --marker right_hip=NAME"
+            "say which is which, as right_hip=NAME"
         )
     return found
 
@@ -218,7 +218,8 @@ def _forward(path: Name, places: Floats, names: Sequence[str], vertical: int) ->
     ahead[vertical] = 0.0
     if not np.any(ahead):
         raise GaitError(
-            f"{path}: which way the person walks is not told by heel and toe; say --forward"
+            f"{path}: which way the person walks is not told by heel and toe; say which axis is "
+            "forward"
         )
     axis = int(np.argmax(np.abs(ahead)))
     return axis, float(np.sign(ahead[axis]))
