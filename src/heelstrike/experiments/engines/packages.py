@@ -27,6 +27,8 @@ class Package:
     adapter: str | None
     """Module of this package that asks it to simulate and has an `Engine` named ``ENGINE``; None if
     there is none."""
+    elsewhere: bool = False
+    """Whether it is a module of another Python: the system's, say."""
 
 
 PACKAGES = {
@@ -35,7 +37,13 @@ PACKAGES = {
     "bullet": Package("Bullet", "pybullet", "pybullet", "bullet_peer"),
     "dart": Package("DART", "dartpy", "dartpy", "dart_peer"),
     "pinocchio": Package("Pinocchio", "pinocchio", "pin", "pinocchio_peer"),
-    "siconos": Package("Siconos", "siconos", "siconos", None),
+    "pinocchio_contact": Package(
+        "Pinocchio's solvers", "pinocchio", "pin", "pinocchio_contact_peer"
+    ),
+    "physx": Package("PhysX", "sapien", "sapien", "physx_peer"),
+    "simbody": Package("Simbody", "opensim", "opensim", "simbody_peer"),
+    "ode": Package("ODE", "ode", "python3-pyode", "ode_peer", elsewhere=True),
+    "siconos": Package("Siconos", "siconos", "python3-siconos", "siconos_peer", elsewhere=True),
 }
 PARTS_OF_STEPS = ("pinocchio",)
 """Engines without a loop of their own: a part of a step is timed, never compared with a step."""
@@ -49,6 +57,8 @@ def peers() -> dict[str, str]:
 
 
 def _state(package: Package) -> str:
+    if package.elsewhere:
+        return _state_elsewhere(package)
     if importlib.util.find_spec(package.module) is None:
         return NOT_INSTALLED
     try:
@@ -62,6 +72,14 @@ def _state(package: Package) -> str:
     except Exception as error:  # whatever a broken installation raises
         return f"{found}, but it cannot be loaded: {type(error).__name__}: {error}"
     return found
+
+
+def _state_elsewhere(package: Package) -> str:
+    from heelstrike.experiments.engines.served import version_elsewhere
+
+    return version_elsewhere(package.module) or (
+        f"{NOT_INSTALLED}: Debian has it as {package.distribution}"
+    )
 
 
 def compared(found: dict[str, str]) -> list[str]:
@@ -80,7 +98,7 @@ def compared(found: dict[str, str]) -> list[str]:
     return [
         name
         for name, state in found.items()
-        if PACKAGES[name].adapter and state != NOT_INSTALLED and ", but " not in state
+        if PACKAGES[name].adapter and not state.startswith(NOT_INSTALLED) and ", but " not in state
     ]
 
 

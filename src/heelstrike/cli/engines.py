@@ -1,0 +1,82 @@
+"""``heelstrike compare --engines``: the same walk in other engines."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from heelstrike.cli.terminal import output, stage, tell, wrote
+
+if TYPE_CHECKING:
+    from heelstrike.experiments.walk import Beginning, Case
+
+QUICK_STEPS, QUICK_SIZES = 4, (1e-3,)
+"""Walking steps and step sizes (s) of a quick comparison."""
+
+
+@dataclass(frozen=True)
+class InEngines:
+    """Which engines a walk is compared in, and how."""
+
+    engines: Annotated[
+        str | None,
+        typer.Option(
+            metavar="all|NAME,...",
+            help="Walk in other engines instead, by their names with commas between.",
+        ),
+    ] = None
+    settings: Annotated[
+        str, typer.Option(help="Settings of the engines: defaults, best, or both with a comma.")
+    ] = "defaults,best"
+    sizes: Annotated[
+        str | None,
+        typer.Option(
+            help="Steps of the engines in s, with commas between.",
+            show_default="2e-3,1e-3,5e-4,2e-4",
+        ),
+    ] = None
+    quick: Annotated[
+        bool, typer.Option("--quick", help="In engines: four steps at 1 ms, for a try.")
+    ] = False
+
+
+def compare_in_engines(
+    case: Case, start: Beginning, asked: InEngines, steps: int, out: Path, *, as_json: bool
+) -> None:
+    """Walk a case in other engines; tell, write and draw what came of it."""
+    from heelstrike.experiments.engine_comparison import compare_engines
+    from heelstrike.experiments.engine_comparison.comparison import STEP_SIZES
+    from heelstrike.view.style import save_figure
+    from heelstrike.whole_file import write_whole
+
+    assert asked.engines is not None
+    assert case.followed is not None
+    sizes = QUICK_SIZES if asked.quick else STEP_SIZES
+    if asked.sizes is not None:
+        sizes = tuple(float(each) for each in asked.sizes.split(","))
+    names = asked.engines.split(",")
+    with stage("walking in engines") as show:
+        comparison = compare_engines(
+            case.robot,
+            start.controller,
+            case.followed,
+            engines="all" if names == ["all"] else names,
+            steps=QUICK_STEPS if asked.quick else steps,
+            step_sizes=sizes,
+            settings=asked.settings.split(","),
+            friction=float(case.ground.friction),
+            folder=out / "engines",
+            progress=show.doing,
+        )
+    text = json.dumps(comparison.to_dict(), indent=2, ensure_ascii=False)
+    wrote(write_whole(out / "engines.json", text + "\n"))
+    if as_json:
+        typer.echo(text)
+    else:
+        output().print(comparison)
+    save_figure(comparison.plot(), out / "engines.png")
+    tell(f"in {out}: engines.json, engines.png")
