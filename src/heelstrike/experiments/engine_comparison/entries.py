@@ -101,7 +101,7 @@ ENTRIES: dict[str, Entry] = {
     "simbody": Entry(
         "Simbody", "simbody",
         choices={
-            "damping": (0.1, 2.0),
+            "viscosity": (0.1, 2.0),
             "shape": ((0.0065905, 0.5336, 4000.0), (0.001, 0.5336, 8000.0)),
             "elasticity": (1e5, 1e6),
             "accuracy": (1e-5,),

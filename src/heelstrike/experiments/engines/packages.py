@@ -41,7 +41,7 @@ PACKAGES = {
         "Pinocchio's solvers", "pinocchio", "pin", "pinocchio_contact_peer"
     ),
     "physx": Package("PhysX", "sapien", "sapien", "physx_peer"),
-    "simbody": Package("Simbody", "opensim", "opensim", "simbody_peer"),
+    "simbody": Package("Simbody", "opensim", "opensim", "simbody_peer", elsewhere=True),
     "ode": Package("ODE", "ode", "python3-pyode", "ode_peer", elsewhere=True),
     "siconos": Package("Siconos", "siconos", "python3-siconos", "siconos_peer", elsewhere=True),
 }

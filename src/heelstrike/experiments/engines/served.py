@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import shutil
 import signal
+import sys
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
@@ -30,8 +31,9 @@ MOST_MEMORY = 16 * 2**30
 PATIENCE = 60.0
 """Seconds that an engine may take to be made or to answer."""
 
-PYTHONS = ("/usr/bin/python3", "python3")
-"""Programs that are asked for what this Python has not."""
+PYTHONS = (sys.executable, "/usr/bin/python3", "python3")
+"""Programs that are asked for a module: this Python, in a process without this package, and the
+system's."""
 
 SERVER = "heelstrike.experiments.engines.serving:answer"
 """What answers for the adapters of this package."""
