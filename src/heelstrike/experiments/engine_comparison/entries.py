@@ -38,7 +38,8 @@ ENTRIES: dict[str, Entry] = {
         choices={
             "stiff": (2.0, 4.0),
             "integrator": ("implicitfast", "rk4"),
-            "impratio": (1.0, 100.0),
+            "elliptic": (True,),
+            "impratio": (10.0, 100.0),
             "noslip": (10,),
             "tolerance": (1e-10,),
         },
@@ -85,7 +86,7 @@ ENTRIES: dict[str, Entry] = {
             "setPhysicsEngineParameter)"
         ),
     ),
-    "dart": Entry("DART", "dart", choices={"detector": ("FCL", "BULLET", "ODE")}),
+    "dart": Entry("DART", "dart", choices={"split": (True,), "detector": ("FCL", "BULLET", "ODE")}),
     "ode": Entry(
         "ODE", "ode",
         choices={
@@ -101,9 +102,10 @@ ENTRIES: dict[str, Entry] = {
     "simbody": Entry(
         "Simbody", "simbody",
         choices={
-            "viscosity": (0.1, 2.0),
-            "shape": ((0.0065905, 0.5336, 4000.0), (0.001, 0.5336, 8000.0)),
+            "shape": ((0.0065905, 0.5336, 4000.0), (0.0065905, 0.5336, 10000.0)),
+            "viscosity": (2.0, 5.0),
             "elasticity": (1e5, 1e6),
+            "grip": (1e3,),
             "accuracy": (1e-5,),
         },
         advice="parameters of ExponentialContactForce (opensim-org, ExponentialContactForce)",
@@ -118,7 +120,7 @@ ENTRIES: dict[str, Entry] = {
         },
         advice="iterations up to 255 for articulations (PhysX 5 documentation, Best Practices)",
     ),
-    "siconos": Entry("Siconos", "siconos", choices={"theta": (1.0,), "tolerance": (1e-12,)}),
+    "siconos": Entry("Siconos", "siconos", choices={"theta": (0.75, 1.0), "solver": ("nsgs",), "tolerance": (1e-12,)}),
     "pgs": Entry(
         "Pinocchio PGS", "pinocchio_contact", {"solver": "pgs"},
         choices={"tolerance": (1e-9, 1e-12), "iterations": (10000,)},

@@ -12,24 +12,26 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from heelstrike.experiments.engine_comparison.comparison import EngineComparison
+    from heelstrike.experiments.engine_comparison.figures import WalkFigures
 
-WALKING: Mapping[str, str] = {
-    "steps": "steps",
-    "tracking_rad": "tracking rad",
-    "position": "from truth m, rad",
-    "touchdown_s": "landing s",
-    "impulse_Ns": "impulse N s",
-    "zmp_m": "ZMP m",
+WALKING: Mapping[str, tuple[str, float]] = {
+    "steps": ("steps", 1),
+    "tracking_rad": ("follows mrad", 1e3),
+    "position": ("off mm,mrad", 1e3),
+    "touchdown_s": ("lands ms", 1e3),
+    "impulse_Ns": ("impulse N s", 1.0),
+    "zmp_m": ("ZMP mm", 1e3),
 }
-BY_ITSELF: Mapping[str, str] = {
-    "slip_m": "slip m",
-    "penetration_m": "depth m",
-    "energy_J": "energy J",
-    "noise": "noise",
-    "peak": "peak",
-    "step_us": "µs a step",
+BY_ITSELF: Mapping[str, tuple[str, float]] = {
+    "slip_m": ("slip mm", 1e3),
+    "penetration_m": ("deep mm", 1e3),
+    "energy_J": ("energy J", 1.0),
+    "noise": ("noise %", 1e2),
+    "peak": ("peak", 1.0),
+    "step_us": ("step µs", 1.0),
 }
-"""Figures and their headings: how walks lie apart, and what each is by itself."""
+"""Figures, their headings, and what they are multiplied by for the units of these: how walks lie
+apart, and what each is by itself."""
 
 
 def walk_table(comparison: EngineComparison) -> Group:
@@ -58,38 +60,66 @@ def walk_table(comparison: EngineComparison) -> Group:
     return Group(*parts)
 
 
-def _table(comparison: EngineComparison, title: str, columns: Mapping[str, str]) -> Table:
+def _table(
+    comparison: EngineComparison, title: str, columns: Mapping[str, tuple[str, float]]
+) -> Table:
     table = Table(
         title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0)
     )
     table.add_column("engine", no_wrap=True)
-    table.add_column("settings")
-    table.add_column("step ms", justify="right")
-    table.add_column("walks")
-    for heading in columns.values():
+    table.add_column("set", no_wrap=True)
+    table.add_column("h ms", justify="right", no_wrap=True)
+    table.add_column("walks", no_wrap=True)
+    for heading, _ in columns.values():
         table.add_column(heading, justify="right")
     for row in comparison.rows:
         if row.figures is None:
             continue
-        values = [getattr(row.figures, name) for name in columns]
         table.add_row(
             row.title,
-            row.settings,
+            row.settings[:4],
             f"{1e3 * row.step_s:g}",
             "yes" if row.figures.walks else "no",
-            *(number(value) for value in values),
+            *(cells(row.figures, columns)),
         )
     return table
 
 
-def number(value: float) -> str:
-    """Write a figure in two digits.
+def cells(figures: WalkFigures, columns: Mapping[str, tuple[str, float]]) -> list[str]:
+    """Write the figures of some columns.
 
     Parameters
     ----------
-    value : float or int
-        The figure; NaN is a dash.
+    figures : WalkFigures
+        Of a walk.
+    columns : mapping
+        `WALKING` or `BY_ITSELF`.
+
+    Returns
+    -------
+    list of str
+        A text each; differences from the truth of a walk that fell are dashes.
     """
-    if isinstance(value, int):
-        return str(value)
-    return "–" if math.isnan(value) else f"{value:.2g}"
+    told = []
+    for name, (_, factor) in columns.items():
+        value = getattr(figures, name)
+        if isinstance(value, int):
+            told.append(str(value))
+        elif math.isnan(value) or (columns is WALKING and not figures.walks):
+            told.append("–")
+        else:
+            told.append(short(factor * value))
+    return told
+
+
+def short(value: float) -> str:
+    """Write a number in two digits, without a power of ten where it is near one.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    """
+    if value != 0.0 and (abs(value) < 1e-3 or abs(value) >= 1e5):
+        return f"{value:.0e}".replace("e-0", "e-").replace("e+0", "e")
+    return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"

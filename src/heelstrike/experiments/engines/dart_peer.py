@@ -28,14 +28,19 @@ class DartPeer(Peer):
         Seconds.
     detector : str
         Of collisions: ``"DART"``, its own and the quickest, ``"FCL"``, ``"ODE"`` or ``"BULLET"``.
+    split : bool
+        Whether penetrations are taken back apart from velocities.
     """
 
     settling = 0.2
     lacks = ("armature",)
 
-    def __init__(self, scenario: Scenario, step: float, *, detector: str = "DART") -> None:
+    def __init__(
+        self, scenario: Scenario, step: float, *, detector: str = "DART", split: bool = False
+    ) -> None:
         super().__init__(scenario, step)
         self._world, self._robot = _world(scenario, step, detector)
+        self._world.getConstraintSolver().setSplitImpulseEnabled(split)
         model = scenario.robot.model
         self._forces = np.zeros((len(self.commands), scenario.robot.nv))
         self._forces[:, model.actuator_joint] = self.commands

@@ -37,6 +37,12 @@ class MuJoCoPeer(Peer):
         it allows, elliptic cones and sharper friction; None for its defaults.
     tolerance : float or None
         Tolerance of its contact solver; None for the default.
+    impratio : float or None
+        How much harder friction is than the normal direction; None for 1, or 10 if `stiff`.
+    elliptic : bool
+        Whether cones are elliptic; they are if `stiff`.
+    noslip : int
+        Iterations of its solver that takes slip away after the others.
     """
 
     settling = 3.0
@@ -49,6 +55,9 @@ class MuJoCoPeer(Peer):
         integrator: str = "euler",
         stiff: float | None = None,
         tolerance: float | None = None,
+        impratio: float | None = None,
+        elliptic: bool = False,
+        noslip: int = 0,
     ) -> None:
         super().__init__(scenario, step)
         spec = _spec(scenario)
@@ -63,6 +72,11 @@ class MuJoCoPeer(Peer):
             for geom in spec.geoms:
                 geom.solref = stiff * step, 1.0
                 geom.solimp = 0.9999, 0.9999, 1e-3, 0.5, 2.0
+        if elliptic:
+            spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        if impratio is not None:
+            spec.option.impratio = impratio
+        spec.option.noslip_iterations = noslip
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.zero = np.zeros(self.model.nq)

@@ -126,6 +126,8 @@ class Robot:
     def step(self, torque: list[float]) -> None:
         """Simulate a step under torques of the actuators."""
         poses, motions = self._poses()
+        for _, joint in self.pressed:
+            joint.setFeedback(False)  # what is freed later must have none
         self.group.empty()
         self.pressed = []
         for i in self.tree.bodies:

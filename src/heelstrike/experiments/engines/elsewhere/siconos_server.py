@@ -1,8 +1,9 @@
 """Siconos, in a Python that has it: a Lagrangian system in coordinates of the joints.
 
 Siconos asks whoever uses it for the mass matrix, the forces and the relations of the contacts; they
-are computed here from the links, at the beginning of each step. What it does itself is the rest: Moreau-Jean's time stepping with
-its index sets, Newton's impact law with Coulomb's friction in the plane, and the solver.
+are computed here from the links, at the beginning of each step. What it does itself is the rest:
+Moreau-Jean's time stepping with its index sets, Newton's impact law with Coulomb's friction in the
+plane, and the solver.
 """
 
 from __future__ import annotations

@@ -23,6 +23,12 @@ Server, Tree = shared["Server"], shared["Tree"]
 STOP, STOP_DAMPING, STOP_WIDTH = 1e3, 1.0, 0.5
 """Stiffness (N m/degree), damping (N m s/degree) and width (degrees) of the stops of joints."""
 
+FAINT = 1e-3
+"""Normal force in parts of the weight below which a point is told not to touch."""
+
+SHAPE = (0.0065905, 0.5336, 1150.0)
+"""OpenSim's own d0, d1 and d2 of the normal force."""
+
 
 class Robot:
     """A robot in Simbody.
@@ -30,19 +36,21 @@ class Robot:
     Its settings are ``integrator``, one that OpenSim's Manager knows, whose longest step is ours
     and which takes shorter ones by itself, and its ``accuracy``; of the contacts ``shape``, d0 (m),
     d1 (N) and d2 (1/m) of the normal force d1 exp(-d2 (z - d0)), ``viscosity`` of that (s/m), and
-    ``elasticity`` of the springs that friction is (N/m).
+    ``elasticity`` (N/m) and viscosity ``grip`` (N s/m) of the springs that friction is.
     """
 
     def __init__(self, asked: dict[str, Any]) -> None:
         settings = {
             "integrator": "RungeKuttaMerson", "accuracy": 1e-3, "shape": None, "viscosity": None,
-            "elasticity": None,
+            "elasticity": None, "grip": None,
         } | asked["settings"]  # fmt: skip
         opensim.Logger.setLevelString("Off")
         self.asked, self.settings = asked, settings
         self.tree = Tree(asked["links"])
         if any(point[3] for link in self.tree.links for point in link["points"]):
             raise ValueError("its contacts are points: discs are not handed over")
+        mass = sum(link["mass"] for link in self.tree.links)
+        self.weight = mass * math.hypot(*self.tree.gravity)
         self.turns = [-turn if turn else 1.0 for turn in self.tree.turns]
         self.model = opensim.Model()
         gravity = self.tree.gravity
@@ -98,18 +106,29 @@ class Robot:
     def _spring(self, body: Any, place: tuple[float, float], contact: int) -> Any:
         settings = self.settings
         upright = opensim.Transform(
-            opensim.Rotation(-0.5 * math.pi, opensim.CoordinateAxis(0)), opensim.Vec3(0.0)
+            opensim.Rotation(-0.5 * math.pi, opensim.CoordinateAxis(0)),
+            opensim.Vec3(0.0, -self._level(), 0.0),
         )
         spring = opensim.ExponentialContactForce(upright, body, _vector(place))
         spring.setName(f"contact{contact}")
         if settings["shape"] is not None:
-            spring.setExponentialShapeParameters(*settings["shape"])
+            spring.setExponentialShapeParameters(opensim.Vec3(*settings["shape"]))
         if settings["viscosity"] is not None:
             spring.setNormalViscosity(settings["viscosity"])
         if settings["elasticity"] is not None:
             spring.setFrictionElasticity(settings["elasticity"])
+        if settings["grip"] is not None:
+            spring.setFrictionViscosity(settings["grip"])
         self.model.addForce(spring)
         return spring
+
+    def _level(self) -> float:
+        """Height (m) over OpenSim's plane at which a point bears half the weight.
+
+        The force reaches beyond the plane without end; that height is where our ground is.
+        """
+        d0, d1, d2 = self.settings["shape"] or SHAPE
+        return d0 - math.log(0.5 * self.weight / d1) / d2
 
     def _drive(self) -> Any:
         model, tree = self.model, self.tree
@@ -179,12 +198,16 @@ class Robot:
         return q, [turn * each.getSpeedValue(self.now) for each, turn in pairs]
 
     def forces(self) -> list[tuple[float, float]]:
-        """On the contact points at the end of the last step, upwards and forward."""
+        """On the contact points at the end of the last step, upwards and forward.
+
+        The law reaches far above the ground; what is fainter than `FAINT` is told as nothing.
+        """
         self.model.realizeDynamics(self.now)
         found = []
         for contact in range(self.tree.contacts):
             force = self.springs[contact].getForce(self.now, True)
-            found.append((force.get(1), force.get(0)))
+            felt = force.get(1) > FAINT * self.weight
+            found.append((force.get(1), force.get(0)) if felt else (0.0, 0.0))
         return found
 
 
