@@ -39,6 +39,10 @@ class InEngines:
             show_default="2e-3,1e-3,5e-4,2e-4",
         ),
     ] = None
+    search: Annotated[
+        bool,
+        typer.Option("--search", help="Search for the best settings of the engines instead."),
+    ] = False
     quick: Annotated[
         bool, typer.Option("--quick", help="In engines: four steps at 1 ms, for a try.")
     ] = False
@@ -54,8 +58,13 @@ def compare_in_engines(
     from heelstrike.whole_file import write_whole
 
     assert asked.engines is not None
+    assert start.controller is not None
+    _check(case)
     assert case.followed is not None
-    sizes = QUICK_SIZES if asked.quick else STEP_SIZES
+    if asked.search:
+        _search(case, start, asked, out)
+        return
+    sizes: tuple[float, ...] = QUICK_SIZES if asked.quick else STEP_SIZES
     if asked.sizes is not None:
         sizes = tuple(float(each) for each in asked.sizes.split(","))
     names = asked.engines.split(",")
@@ -68,7 +77,7 @@ def compare_in_engines(
             steps=QUICK_STEPS if asked.quick else steps,
             step_sizes=sizes,
             settings=asked.settings.split(","),
-            friction=float(case.ground.friction),
+            friction=_friction(case),
             folder=out / "engines",
             progress=show.doing,
         )
@@ -80,3 +89,60 @@ def compare_in_engines(
         output().print(comparison)
     save_figure(comparison.plot(), out / "engines.png")
     tell(f"in {out}: engines.json, engines.png")
+
+
+def _check(case: Case) -> None:
+    """Refuse what engines are not asked for."""
+    from heelstrike.errors import SimulationError
+
+    ground = case.ground.model()
+    level = case.ground.shape is None and not ground.vertices[:, 1].any()
+    if not level or case.pushes or ground.restitution.any():
+        raise SimulationError(
+            "engines are compared on level ground without restitution or pushes: leave --ground, "
+            "--restitution and --push out"
+        )
+    if case.followed is None:
+        raise SimulationError("engines are compared by a walk under a gait, which this one is not")
+
+
+def _friction(case: Case) -> float:
+    return float(case.ground.model().friction.min())
+
+
+def _search(case: Case, start: Beginning, asked: InEngines, out: Path) -> None:
+    """Search for the best settings, and write them with what made them."""
+    from dataclasses import asdict
+
+    from heelstrike.experiments.engine_comparison import search
+    from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
+    from heelstrike.experiments.engine_comparison.entries import entries_called
+    from heelstrike.experiments.engine_comparison.walk import Walk
+    from heelstrike.experiments.engines import InvalidRunError
+    from heelstrike.experiments.engines.packages import peers
+    from heelstrike.whole_file import write_whole
+
+    assert asked.engines is not None
+    assert case.followed is not None
+    assert start.controller is not None
+    walk = Walk(
+        case.robot, start.controller, case.followed, search.STEPS, CONTROL_PERIOD,
+        _friction(case), 60.0,
+    )  # fmt: skip
+    versions = peers(load=False)
+    file = out / "best_settings.json"
+    out.mkdir(parents=True, exist_ok=True)
+    found = json.loads(file.read_text()) if file.exists() else {}
+    for name, entry in entries_called(asked.engines.split(",")).items():
+        with stage(f"searching for the best settings of {entry.title}") as show:
+            try:
+                best = search.search_settings(
+                    name, entry, walk, versions, lambda text: show.doing(text, 0.0)
+                )
+            except InvalidRunError as error:
+                tell(f"{entry.title}: {error}")
+                continue
+        found[name] = asdict(best)
+        write_whole(file, json.dumps(found, indent=2) + "\n")
+        tell(f"{entry.title}: {dict(best.settings) or 'the defaults'}, {best.error:.2g}")
+    wrote(file)

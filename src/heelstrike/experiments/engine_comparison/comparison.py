@@ -165,7 +165,7 @@ def compare_engines(
     say = progress or (lambda text, share: None)  # noqa: ARG005
     say("the truth, event by event", 0.0)
     truth = walk.ours(TRUTH)
-    versions = peers()
+    versions = peers(load=False)
     kept = KeptRows(folder, walk.entries())
     asked = [("heelstrike", "heelstrike", DEFAULTS, step) for step in step_sizes]
     for name, entry in entries.items():

@@ -30,11 +30,17 @@ class Entry:
     """Settings that are tried by the search for the best, and their values, beside the default."""
     advice: str = ""
     """What its maintainers advise for contact, and where."""
+    bounces: bool = True
+    """Whether it takes a coefficient of restitution."""
+    exact: Mapping[str, Any] = field(default_factory=dict)
+    """Settings with which it flies as exactly as it can, where its steps are not all of its
+    error."""
 
 
 ENTRIES: dict[str, Entry] = {
     "mujoco": Entry(
         "MuJoCo", "mujoco",
+        bounces=False,
         choices={
             "stiff": (2.0, 4.0),
             "integrator": ("implicitfast", "rk4"),
@@ -50,6 +56,7 @@ ENTRIES: dict[str, Entry] = {
     ),
     "drake": Entry(
         "Drake TAMSI", "drake", {"approximation": "tamsi"},
+        bounces=False,
         choices={
             "stiffness": (1e5, 1e6, 1e7),
             "dissipation": (1.0, 10.0, 50.0),
@@ -62,6 +69,7 @@ ENTRIES: dict[str, Entry] = {
     ),
     "drake_sap": Entry(
         "Drake SAP", "drake", {"approximation": "sap"},
+        bounces=False,
         choices={
             "stiffness": (1e5, 1e6, 1e7),
             "dissipation": (1.0, 10.0, 50.0),
@@ -101,6 +109,7 @@ ENTRIES: dict[str, Entry] = {
     ),
     "simbody": Entry(
         "Simbody", "simbody",
+        bounces=False,
         choices={
             "shape": ((0.0065905, 0.5336, 4000.0), (0.0065905, 0.5336, 10000.0)),
             "viscosity": (2.0, 5.0),
@@ -109,6 +118,7 @@ ENTRIES: dict[str, Entry] = {
             "accuracy": (1e-5,),
         },
         advice="parameters of ExponentialContactForce (opensim-org, ExponentialContactForce)",
+        exact={"accuracy": 1e-11},
     ),
     "physx": Entry(
         "PhysX", "physx",
@@ -120,13 +130,18 @@ ENTRIES: dict[str, Entry] = {
         },
         advice="iterations up to 255 for articulations (PhysX 5 documentation, Best Practices)",
     ),
-    "siconos": Entry("Siconos", "siconos", choices={"theta": (0.75, 1.0), "solver": ("nsgs",), "tolerance": (1e-12,)}),
+    "siconos": Entry(
+        "Siconos", "siconos",
+        choices={"theta": (0.75, 1.0), "solver": ("nsgs",), "tolerance": (1e-12,)},
+    ),
     "pgs": Entry(
         "Pinocchio PGS", "pinocchio_contact", {"solver": "pgs"},
+        bounces=False,
         choices={"tolerance": (1e-9, 1e-12), "iterations": (10000,)},
     ),
     "admm": Entry(
         "Pinocchio ADMM", "pinocchio_contact", {"solver": "admm"},
+        bounces=False,
         choices={"tolerance": (1e-9, 1e-12), "iterations": (10000,)},
     ),
 }  # fmt: skip

@@ -75,5 +75,7 @@ class KeptRows:
 
 
 def _figures(entries: Mapping[str, Any]) -> WalkFigures:
-    numbers = {name: math.nan if each is None else each for name, each in entries.items()}
+    numbers: dict[str, Any] = {
+        name: math.nan if each is None else each for name, each in entries.items()
+    }
     return WalkFigures(**numbers)

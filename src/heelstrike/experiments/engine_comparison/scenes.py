@@ -7,16 +7,21 @@ what the closed form gives.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
+from heelstrike.experiments.engine_comparison.entries import Entry
+from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.scenario import Scenario
+from heelstrike.experiments.engines.served import served
 from heelstrike.field_texts import dataclass
 from heelstrike.robot import Robot, RobotBuilder, State, load_robot
 from heelstrike.robot.model import Floats
+from heelstrike.sim.method import Method
 
 GRAVITY = 9.81
 FRICTION = 0.75
@@ -221,3 +226,59 @@ def _landing_rate(q: Floats, v: Floats, half: float) -> float:
     lean = float(q[2]) % (2.0 * half) - half
     down = GRAVITY * (math.cos(lean + DESCENT) - math.cos(half + DESCENT))
     return math.sqrt(max(0.0, float(v[2]) ** 2 + 2.0 * down))
+
+
+def scene_error(
+    scene: Scene, entry: Entry, step: float, given: Mapping[str, Any]
+) -> tuple[float, float]:
+    """Simulate a scene in an engine.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    entry : Entry
+        The engine's row.
+    step : float
+        Seconds.
+    given : mapping
+        Settings of the engine.
+
+    Returns
+    -------
+    error : float
+        What is measured less what the closed form gives.
+    seconds : float
+        Computing time.
+
+    Raises
+    ------
+    InvalidRunError
+        If the engine is missing, ends, hangs or refuses, or takes no restitution.
+    """
+    if scene.scenario.restitution and not entry.bounces:
+        raise InvalidRunError("takes no coefficient of restitution")
+    peer = served(entry.package, scene.scenario, step, **given)
+    try:
+        peer.restart()
+        rows = peer.record(peer.steps)
+    finally:
+        peer.close()
+    nq = scene.scenario.robot.nq
+    end = rows[-1]
+    found = scene.measured(end[:nq], end[nq : nq + scene.scenario.robot.nv])
+    return found - scene.exact, peer.seconds
+
+
+def our_scene_error(scene: Scene, method: Method) -> float:
+    """Simulate a scene by a method of ours; return the error as of :func:`scene_error`.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    method : Method
+        The way through time.
+    """
+    run = scene.scenario.run(method)
+    return scene.measured(run.position[-1], run.velocity[-1]) - scene.exact

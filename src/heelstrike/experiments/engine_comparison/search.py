@@ -112,5 +112,8 @@ def search_settings(
         tried=tried,
         version=versions[entry.package],
         date=date.today().isoformat(),
-        command=f"heelstrike compare {walk.robot.name} --engines {name} --search",
+        command=(
+            f"heelstrike compare {walk.robot.name} --engines {name} --search --controller "
+            f"{type(walk.controller).__name__}"
+        ),
     )

@@ -111,7 +111,7 @@ def walk_in(
     torques[done] = torques[max(done - 1, 0)]
     return recorded_run(
         peer, name,
-        time=step * np.arange(done + 1),
+        time=np.asarray(step * np.arange(done + 1), dtype=np.float64),
         position=rows[: done + 1, :nq], velocity=rows[: done + 1, nq:both],
         torque=torques[: done + 1], force=force.reshape(done + 1, -1, 2),
         status=status, saturations=saturations,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pybullet
-from pybullet_utils.bullet_client import BulletClient  # type: ignore[import-not-found,unused-ignore]
+from pybullet_utils.bullet_client import BulletClient
 
 from heelstrike.dynamics import contact_positions
 from heelstrike.experiments.engines.links import Link, links

@@ -51,12 +51,18 @@ PARTS_OF_STEPS = ("pinocchio",)
 NOT_INSTALLED = "not installed"
 
 
-def peers() -> dict[str, str]:
-    """Engines by name, each with its version or why it is not compared with."""
-    return {name: _state(package) for name, package in PACKAGES.items()}
+def peers(*, load: bool = True) -> dict[str, str]:
+    """Engines by name, each with its version or why it is not compared with.
+
+    Parameters
+    ----------
+    load : bool
+        Whether those that this process can have are loaded, to see that they can be.
+    """
+    return {name: _state(package, load) for name, package in PACKAGES.items()}
 
 
-def _state(package: Package) -> str:
+def _state(package: Package, load: bool) -> str:
     if package.elsewhere:
         return _state_elsewhere(package)
     if importlib.util.find_spec(package.module) is None:
@@ -67,6 +73,8 @@ def _state(package: Package) -> str:
         found = "unknown version"
     if package.adapter is None:
         return f"{found}, but there is no adapter for it"
+    if not load:
+        return found
     try:
         _adapter(package)
     except Exception as error:  # whatever a broken installation raises

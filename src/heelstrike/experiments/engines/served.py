@@ -13,7 +13,7 @@ import signal
 import sys
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -319,6 +319,6 @@ def served(name: str, scenario: Scenario, step: float, **settings: Any) -> Serve
         If the engine ends, hangs or refuses.
     """
     if PACKAGES[name].elsewhere:
-        found: ServedPeer = simulators([name])[name].peer(scenario, step, **settings)
-        return found
+        found: Any = simulators([name])[name].peer(scenario, step, **settings)
+        return cast(ServedPeer, found)
     return ServedPeer(scenario, step, engine=name, **settings)
