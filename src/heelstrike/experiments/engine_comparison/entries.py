@@ -111,10 +111,10 @@ ENTRIES: dict[str, Entry] = {
         "Simbody", "simbody",
         bounces=False,
         choices={
-            "shape": ((0.0065905, 0.5336, 4000.0), (0.0065905, 0.5336, 10000.0)),
-            "viscosity": (2.0, 5.0),
             "elasticity": (1e5, 1e6),
             "grip": (1e3,),
+            "viscosity": (2.0, 5.0),
+            "shape": ((0.0065905, 0.5336, 4000.0), (0.0065905, 0.5336, 10000.0)),
             "accuracy": (1e-5,),
         },
         advice="parameters of ExponentialContactForce (opensim-org, ExponentialContactForce)",

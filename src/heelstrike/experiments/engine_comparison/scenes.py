@@ -135,7 +135,7 @@ def _launched() -> Scene:
 
 
 def _bouncing(restitution: float) -> Scene:
-    robot, height, duration = disc(), 0.5, 1.0
+    robot, height, duration = disc(), 0.5, 0.8
     name = f"ball bouncing, e = {restitution:g}"
     q = robot.model.reference + np.array([0.0, height, 0.0])
     return Scene(
@@ -195,11 +195,15 @@ DESCENT = math.radians(8.0)
 
 
 def _rimless() -> Scene:
-    """A rimless wheel on its walk that repeats, whose speed has a closed form."""
+    """A rimless wheel on its walk that repeats, whose speed has a closed form.
+
+    The library's wheel has 1e-6 kg m² about its hub, which is in the formula here.
+    """
     half = math.pi / SPOKES
     robot = leaning(load_robot("rimless_wheel"), DESCENT)
-    kept = math.cos(2.0 * half) ** 2
-    gained = 4.0 * GRAVITY * math.sin(half) * math.sin(DESCENT)
+    mass, inertia = float(robot.model.mass.sum()), float(robot.model.inertia.sum())
+    kept = ((mass * math.cos(2.0 * half) + inertia) / (mass + inertia)) ** 2
+    gained = 4.0 * mass * GRAVITY * math.sin(half) * math.sin(DESCENT) / (mass + inertia)
     rate = math.sqrt(gained * kept / (1.0 - kept))
     lean = -half
     start = robot.state(
@@ -215,16 +219,19 @@ def _rimless() -> Scene:
 
     return Scene(
         name, Scenario(name, robot, start, duration, friction=FRICTION),
-        partial(_landing_rate, half=half),
+        partial(_landing_rate, half=half, share=mass / (mass + inertia)),
         rate / math.sqrt(kept), "rad/s",
-        "speed just before a landing: ω² = 4 g sin α sin γ / (r (1 − cos² 2α)) (Coleman 1998)",
+        "rate just before a landing: ω² = 4 g sin α sin γ / (r (1 − cos² 2α)) (Coleman 1998)",
     )  # fmt: skip
 
 
-def _landing_rate(q: Floats, v: Floats, half: float) -> float:
-    """Rate at which a wheel of spokes of 1 m that turns about the lowest will land on the next."""
+def _landing_rate(q: Floats, v: Floats, half: float, share: float) -> float:
+    """Rate at which a wheel of spokes of 1 m that turns about the lowest will land on the next.
+
+    `share` is its mass in that with its moment of inertia.
+    """
     lean = float(q[2]) % (2.0 * half) - half
-    down = GRAVITY * (math.cos(lean + DESCENT) - math.cos(half + DESCENT))
+    down = share * GRAVITY * (math.cos(lean + DESCENT) - math.cos(half + DESCENT))
     return math.sqrt(max(0.0, float(v[2]) ** 2 + 2.0 * down))
 
 

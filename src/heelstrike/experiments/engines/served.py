@@ -28,6 +28,9 @@ from heelstrike.robot.model import Floats
 MOST_MEMORY = 16 * 2**30
 """Bytes that an engine may ask for: some reserve much and use little."""
 
+LONGEST = 200
+"""Letters of what an engine says that are told on."""
+
 PATIENCE = 60.0
 """Seconds that an engine may take to be made or to answer."""
 
@@ -204,7 +207,8 @@ def told_links(scenario: Scenario) -> dict[str, Any]:
 def _in_words(error: ReadingError, patience: float) -> str:
     """Say what became of an engine."""
     if error.kind:
-        return str(error) if error.kind == "InvalidRunError" else f"{error.kind}: {error}"
+        words = str(error).strip().partition("\n")[0].partition(". ")[0]
+        return words if error.kind == "InvalidRunError" else f"{error.kind}: {words[:LONGEST]}"
     text = str(error)
     if "crashes" in text:
         code = int(text.rpartition("exit ")[2].rstrip(")") or 0)
