@@ -104,6 +104,7 @@ if TYPE_CHECKING:
     from heelstrike.experiments.campaigns import Campaign as Campaign
     from heelstrike.experiments.campaigns import CampaignResults as CampaignResults
     from heelstrike.experiments.comparison import compare as compare
+    from heelstrike.experiments.engine_comparison import compare_engines as compare_engines
     from heelstrike.experiments.spring_mass import SpringMass as SpringMass
     from heelstrike.gait import ContactPhase as ContactPhase
     from heelstrike.gait import Gait as Gait
@@ -249,6 +250,7 @@ _HOME = {
     "builtin_robots": "heelstrike.robot",
     "cell": "heelstrike.compiler.bundle",
     "compare": "heelstrike.experiments.comparison",
+    "compare_engines": "heelstrike.experiments.engine_comparison",
     "constrained": "heelstrike.sim",
     "contact_forward_dynamics": "heelstrike.contact",
     "contact_inverse_dynamics": "heelstrike.contact",

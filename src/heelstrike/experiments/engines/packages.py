@@ -28,7 +28,9 @@ class Package:
     """Module of this package that asks it to simulate and has an `Engine` named ``ENGINE``; None if
     there is none."""
     elsewhere: bool = False
-    """Whether it is a module of another Python: the system's, say."""
+    """Whether it is imported in a process without this package: by the system's Python, say."""
+    raced: bool = True
+    """Whether its steps are timed beside ours: not where their loop is in Python."""
 
 
 PACKAGES = {
@@ -38,12 +40,16 @@ PACKAGES = {
     "dart": Package("DART", "dartpy", "dartpy", "dart_peer"),
     "pinocchio": Package("Pinocchio", "pinocchio", "pin", "pinocchio_peer"),
     "pinocchio_contact": Package(
-        "Pinocchio's solvers", "pinocchio", "pin", "pinocchio_contact_peer"
+        "Pinocchio's solvers", "pinocchio", "pin", "pinocchio_contact_peer", raced=False
     ),
-    "physx": Package("PhysX", "sapien", "sapien", "physx_peer"),
-    "simbody": Package("Simbody", "opensim", "opensim", "simbody_peer", elsewhere=True),
-    "ode": Package("ODE", "ode", "python3-pyode", "ode_peer", elsewhere=True),
-    "siconos": Package("Siconos", "siconos", "python3-siconos", "siconos_peer", elsewhere=True),
+    "physx": Package("PhysX", "sapien", "sapien", "physx_peer", raced=False),
+    "simbody": Package(
+        "Simbody", "opensim", "opensim", "simbody_peer", elsewhere=True, raced=False
+    ),
+    "ode": Package("ODE", "ode", "python3-pyode", "ode_peer", elsewhere=True, raced=False),
+    "siconos": Package(
+        "Siconos", "siconos", "python3-siconos", "siconos_peer", elsewhere=True, raced=False
+    ),
 }
 PARTS_OF_STEPS = ("pinocchio",)
 """Engines without a loop of their own: a part of a step is timed, never compared with a step."""
@@ -108,6 +114,22 @@ def compared(found: dict[str, str]) -> list[str]:
         for name, state in found.items()
         if PACKAGES[name].adapter and not state.startswith(NOT_INSTALLED) and ", but " not in state
     ]
+
+
+def raced(found: dict[str, str]) -> list[str]:
+    """Names of the peers whose steps can be timed beside ours.
+
+    Parameters
+    ----------
+    found : dict
+        What :func:`peers` returned.
+
+    Returns
+    -------
+    list of str
+        Their names.
+    """
+    return [name for name in compared(found) if PACKAGES[name].raced]
 
 
 def simulators(names: Sequence[str] | None = None) -> dict[str, Engine]:
