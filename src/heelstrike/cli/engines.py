@@ -12,6 +12,7 @@ import typer
 from heelstrike.cli.terminal import output, stage, tell, wrote
 
 if TYPE_CHECKING:
+    from heelstrike.experiments.engine_comparison import EngineComparison
     from heelstrike.experiments.walk import Beginning, Case
 
 QUICK_STEPS, QUICK_SIZES = 4, (1e-3,)
@@ -43,6 +44,18 @@ class InEngines:
         bool,
         typer.Option("--search", help="Search for the best settings of the engines instead."),
     ] = False
+    scenes: Annotated[
+        bool,
+        typer.Option(
+            "--scenes", help="Ask engines for scenes with closed forms, too, and for guards."
+        ),
+    ] = False
+    page: Annotated[
+        Path | None,
+        typer.Option(
+            dir_okay=False, help="Write a page of what engines made of walks and scenes in --out."
+        ),
+    ] = None
     quick: Annotated[
         bool, typer.Option("--quick", help="In engines: four steps at 1 ms, for a try.")
     ] = False
@@ -81,14 +94,63 @@ def compare_in_engines(
             folder=out / "engines",
             progress=show.doing,
         )
+    law = type(start.controller).__name__
     text = json.dumps(comparison.to_dict(), indent=2, ensure_ascii=False)
-    wrote(write_whole(out / "engines.json", text + "\n"))
+    wrote(write_whole(out / f"engines-{law}.json", text + "\n"))
     if as_json:
         typer.echo(text)
     else:
         output().print(comparison)
     save_figure(comparison.plot(), out / "engines.png")
-    tell(f"in {out}: engines.json, engines.png")
+    tell(f"in {out}: engines-{law}.json, engines.png")
+    if asked.scenes:
+        _scenes(case, names, out, as_json=as_json)
+    if asked.page is not None:
+        _write_page(comparison, out, asked.page)
+
+
+def _scenes(case: Case, names: list[str], out: Path, *, as_json: bool) -> None:
+    """Ask engines for scenes whose ends are known, and whether they have the robot at all."""
+    from dataclasses import asdict
+
+    from heelstrike.experiments.engine_comparison import compare_scenes, guard
+    from heelstrike.experiments.engine_comparison.entries import entries_called
+    from heelstrike.experiments.engines import InvalidRunError
+    from heelstrike.whole_file import write_whole
+
+    engines: str | list[str] = "all" if names == ["all"] else names
+    with stage("simulating scenes with closed forms") as show:
+        table = compare_scenes(engines=engines, progress=show.doing)
+    guards: dict[str, dict[str, object]] = {}
+    with stage("asking whether engines have the robot") as show:
+        for name, entry in entries_called(engines).items():
+            show.doing(f"asking whether {entry.title} has the robot", 0.0)
+            try:
+                found = guard(entry, case.robot, entry.given)
+            except InvalidRunError as error:
+                guards[name] = {"reason": str(error)}
+            else:
+                guards[name] = asdict(found) | {"holds": found.holds}
+    told = {**table.to_dict(), "guards": guards}
+    text = json.dumps(told, indent=2, ensure_ascii=False)
+    wrote(write_whole(out / "scenes.json", text + "\n"))
+    if not as_json:
+        output().print(table)
+    tell(f"in {out}: scenes.json")
+
+
+def _write_page(comparison: EngineComparison, out: Path, page: Path) -> None:
+    """Write the page of all that lies in a folder, and its figure beside it."""
+    from heelstrike.experiments.engine_comparison.page import engines_page
+    from heelstrike.view.style import save_figure
+    from heelstrike.whole_file import write_whole
+
+    images = page.parent / "images"
+    images.mkdir(parents=True, exist_ok=True)
+    figure = images / f"{page.stem}.png"
+    wrote(write_whole(page, engines_page(out, f"images/{figure.name}")))
+    save_figure(comparison.plot(), figure)
+    tell(f"{page}, {figure}")
 
 
 def _check(case: Case) -> None:

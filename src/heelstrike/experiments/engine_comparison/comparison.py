@@ -174,21 +174,24 @@ def compare_engines(
                 continue  # none is better than the defaults
             asked += [(name, entry.title, which, step) for step in step_sizes]
     rows = []
-    for k, (name, title, which, step) in enumerate(asked):
-        say(f"{title}, {which}, {1e3 * step:g} ms", k / len(asked))
-        row = EngineRow(
-            name, title, which, step, None, "",
-            f"heelstrike compare {robot.name} --engines {name} --settings {which} "
-            f"--sizes {step:g} --steps {steps}",
-        )  # fmt: skip
-        if name in OURS:
-            rows.append(kept.row(row, {}, partial(walk.by, OURS[name](step), truth)))
-            continue
-        entry = entries[name]
-        given = settings_of(name, entry, which)
-        told = {"given": given, "version": versions[entry.package]}
-        make = partial(walk.in_engine, entry, step, given, truth, versions)
-        rows.append(kept.row(row, told, make))
+    try:
+        for k, (name, title, which, step) in enumerate(asked):
+            say(f"{title}, {which}, {1e3 * step:g} ms", k / len(asked))
+            row = EngineRow(
+                name, title, which, step, None, "",
+                f"heelstrike compare {robot.name} --engines {name} --settings {which} "
+                f"--sizes {step:g} --steps {steps}",
+            )  # fmt: skip
+            if name in OURS:
+                rows.append(kept.row(row, {}, partial(walk.by, OURS[name](step), truth)))
+                continue
+            entry = entries[name]
+            given = settings_of(name, entry, which)
+            told = {"given": given, "version": versions[entry.package]}
+            make = partial(walk.in_engine, entry, step, given, truth, versions)
+            rows.append(kept.row(row, told, make))
+    finally:
+        walk.close()
     return EngineComparison(
         robot=robot.name,
         steps=steps,

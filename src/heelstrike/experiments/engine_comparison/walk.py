@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import deepcopy
+from dataclasses import field
 from typing import Any
 
 from heelstrike.contact.ground import Ground
@@ -13,11 +14,12 @@ from heelstrike.experiments.engine_comparison.walking import walk_in
 from heelstrike.experiments.engines.packages import PACKAGES, compared
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.scenario import Scenario
-from heelstrike.experiments.engines.served import served
+from heelstrike.experiments.engines.served import engine_process, served
 from heelstrike.experiments.walk import LAST_STEP
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.gait.file import entries_of
+from heelstrike.reader_process import ReaderProcess
 from heelstrike.robot import Robot
 from heelstrike.robot.files.robot_json import robot_entries
 from heelstrike.sim import Controller, EventDriven, Run, simulate
@@ -42,6 +44,13 @@ class Walk:
     patience: float
     """robot, controller, gait, steps, control_period, friction, patience: As of
     :func:`compare_engines`."""
+    processes: dict[str, ReaderProcess] = field(default_factory=dict)
+    """Processes of the engines that have walked, by their names."""
+
+    def close(self) -> None:
+        """End the processes of the engines."""
+        for process in self.processes.values():
+            process.end()
 
     def entries(self) -> dict[str, Any]:
         """Return all that a walk follows from but the engine, as JSON has it."""
@@ -143,12 +152,14 @@ class Walk:
         state = versions[entry.package]
         if not compared({entry.package: state}):
             raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
-        peer = served(entry.package, self.scenario, step, patience=self.patience, **given)
+        if entry.package not in self.processes:
+            self.processes[entry.package] = engine_process(entry.package)
+        peer = served(
+            entry.package, self.scenario, step, patience=self.patience,
+            process=self.processes[entry.package], **given,
+        )  # fmt: skip
         controller = self.controller
         if not isinstance(controller, Law):
             controller = deepcopy(controller)
-        try:
-            run = walk_in(peer, controller, control_period=self.control_period, name=entry.title)
-        finally:
-            peer.close()
+        run = walk_in(peer, controller, control_period=self.control_period, name=entry.title)
         return run, bool(peer.facts["tells_friction"])

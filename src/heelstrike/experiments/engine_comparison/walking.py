@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.analysis.motion import motion
+from heelstrike.analysis.motion import in_world, motion
 from heelstrike.dynamics import center_of_mass, contact_positions
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engines.peer import Peer
@@ -154,7 +154,12 @@ def recorded_run(
     given: dict[str, Any] = {
         "position": position, "velocity": velocity, "torque": torque, "contact_force": force
     }  # fmt: skip
-    points = np.array([contact_positions(robot, q) for q in position]).reshape(rows, robot.nc, 2)
+    points = np.zeros((rows, robot.nc, 2))
+    placed = motion(robot, position, velocity, points)
+    link = model.contact_link
+    points = in_world(
+        placed.link_origin[:, link], placed.link_angle[:, link], model.contact_position
+    )
     points[..., 1] -= model.contact_radius
     given["contact_point"] = points
     given["gap"] = points[..., 1]

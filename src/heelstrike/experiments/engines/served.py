@@ -56,6 +56,8 @@ class ServedPeer(Peer):
         What answers: ``module:name``, or ``file.py:name`` that imports nothing of this package.
     python : str, optional
         Program of another Python.
+    process : ReaderProcess, optional
+        Where the engine has been before and runs again; by default it gets a process of its own.
     patience : float
         Seconds that an answer may take.
     **settings
@@ -75,12 +77,14 @@ class ServedPeer(Peer):
         engine: str,
         job: str = SERVER,
         python: str | None = None,
+        process: ReaderProcess | None = None,
         patience: float = PATIENCE,
         **settings: Any,
     ) -> None:
         super().__init__(scenario, step)
         self._job, self._patience = job, patience
-        self._process = ReaderProcess(python=python, remembers=True)
+        self._process = process or ReaderProcess(python=python, remembers=True)
+        self._owned = process is None
         order = {
             "do": "make", "engine": engine, "step": step, "friction": scenario.friction,
             "restitution": scenario.restitution, "settings": settings,
@@ -135,8 +139,9 @@ class ServedPeer(Peer):
         return [(force, depth) for force, depth in found["contacts"]]
 
     def close(self) -> None:
-        """End the process."""
-        self._process.end()
+        """End the process, if it is of this scenario alone."""
+        if self._owned:
+            self._process.end()
 
     def _go(self, steps: int) -> Floats:
         robot = self.scenario.robot
@@ -298,6 +303,19 @@ class ScriptedPeer(ServedPeer):
         self.facts = {"tells_friction": self.tells_friction, "float32": self.float32} | self.facts
 
 
+def engine_process(name: str) -> ReaderProcess:
+    """Return a process for an engine, which is started when it is asked something.
+
+    Parameters
+    ----------
+    name : str
+        Name of the engine.
+    """
+    package = PACKAGES[name]
+    python = other_python(package.module)[0] if package.elsewhere else None
+    return ReaderProcess(python=python or None, remembers=True)
+
+
 def served(name: str, scenario: Scenario, step: float, **settings: Any) -> ServedPeer:
     """Return a scenario in an engine that runs in a process of its own.
 
@@ -310,7 +328,7 @@ def served(name: str, scenario: Scenario, step: float, **settings: Any) -> Serve
     step : float
         Seconds.
     **settings
-        Of the engine, and ``patience`` of :class:`ServedPeer`.
+        Of the engine, and ``patience`` and ``process`` of :class:`ServedPeer`.
 
     Returns
     -------
