@@ -167,7 +167,7 @@ def recorded_run(
     moved = motion(robot, position, velocity, points)
     touching = force[..., 0] > LEAST_FORCE * robot.weight
     slip = np.zeros((rows, robot.nc))
-    slip[1:] = np.where(touching[:-1], moved.contact_velocity[1:, :, 0], 0.0)
+    slip[:-1] = np.where(touching[:-1], moved.contact_velocity[1:, :, 0], 0.0)
     given["slip_velocity"] = slip
     recorded: dict[str, Any] = {
         name: np.ascontiguousarray(
