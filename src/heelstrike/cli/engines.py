@@ -94,6 +94,7 @@ def compare_in_engines(
             folder=out / "engines",
             progress=show.doing,
         )
+    out.mkdir(parents=True, exist_ok=True)
     law = type(start.controller).__name__
     text = json.dumps(comparison.to_dict(), indent=2, ensure_ascii=False)
     wrote(write_whole(out / f"engines-{law}.json", text + "\n"))

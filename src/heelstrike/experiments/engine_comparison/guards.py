@@ -12,9 +12,10 @@ from heelstrike.experiments.engine_comparison.entries import Entry
 from heelstrike.experiments.engine_comparison.walking import walk_in
 from heelstrike.experiments.engines.peer import flight
 from heelstrike.experiments.engines.scenario import Scenario
-from heelstrike.experiments.engines.served import ServedPeer, served
+from heelstrike.experiments.engines.served import ServedPeer, engine_process, served
 from heelstrike.experiments.laws import law_called
 from heelstrike.field_texts import dataclass
+from heelstrike.reader_process import ReaderProcess
 from heelstrike.robot import Robot
 from heelstrike.robot.model import Floats
 from heelstrike.sim import EventDriven
@@ -86,10 +87,16 @@ def guard(entry: Entry, robot: Robot, given: Mapping[str, Any]) -> Guards:
     ours = scenario.run(FLOW).position[-1]
     ends = []
     facts: dict[str, Any] = {}
-    for step in FLIGHT_STEPS:
-        peer = served(entry.package, scenario, step, **{**given, **entry.exact})
-        ends.append(_end(peer))
-        facts = peer.facts
+    process = engine_process(entry.package)
+    try:
+        for step in FLIGHT_STEPS:
+            settings = {**given, **entry.exact}
+            peer = served(entry.package, scenario, step, process=process, **settings)
+            ends.append(_end(peer))
+            facts = peer.facts
+        weight, sunk = _at_rest(entry, robot, given, process)
+    finally:
+        process.end()
     errors = [float(np.max(np.abs(end - ours))) for end in ends]
     first, second, third = ends
     apart = [float(np.max(np.abs(a - b))) for a, b in ((first, second), (second, third))]
@@ -97,28 +104,23 @@ def guard(entry: Entry, robot: Robot, given: Mapping[str, Any]) -> Guards:
     once = [2.0 * second - first, 2.0 * third - second]
     twice = (4.0 * once[1] - once[0]) / 3.0
     extrapolated = min(float(np.max(np.abs(each - ours))) for each in (twice, third))
-    weight, sunk = _at_rest(entry, robot, given)
     return Guards(errors[-1], order, extrapolated, weight, sunk, bool(facts["float32"]))
 
 
 def _end(peer: ServedPeer) -> Floats:
     """Where a peer is at the end of its scenario."""
-    try:
-        peer.restart()
-        rows = peer.record(peer.steps)
-    finally:
-        peer.close()
+    peer.restart()
+    rows = peer.record(peer.steps)
     return np.asarray(rows[-1, : peer.scenario.robot.nq])
 
 
-def _at_rest(entry: Entry, robot: Robot, given: Mapping[str, Any]) -> tuple[float, float]:
+def _at_rest(
+    entry: Entry, robot: Robot, given: Mapping[str, Any], process: ReaderProcess
+) -> tuple[float, float]:
     """Weight that the ground bears, in the robot's, and how deep its deepest point is (m)."""
     trial = law_called("JointFeedback").trial(robot, None)
     scenario = Scenario("at rest", robot, trial.state, REST)
-    peer = served(entry.package, scenario, REST_STEP, **given)
-    try:
-        run = walk_in(peer, trial.controller, control_period=REST_PERIOD, name=entry.title)
-    finally:
-        peer.close()
+    peer = served(entry.package, scenario, REST_STEP, process=process, **given)
+    run = walk_in(peer, trial.controller, control_period=REST_PERIOD, name=entry.title)
     last = run.contact_force[-round(0.2 * len(run.time)) :, :, 0].sum(axis=1)
     return float(last.mean() / robot.weight), float(max(0.0, -run.gap[-1].min()))

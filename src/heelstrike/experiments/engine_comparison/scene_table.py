@@ -19,6 +19,7 @@ from heelstrike.experiments.engine_comparison.settings import DEFAULTS, settings
 from heelstrike.experiments.engine_comparison.tables import short
 from heelstrike.experiments.engines.packages import PACKAGES, compared, peers
 from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.experiments.engines.served import engine_process
 from heelstrike.field_texts import dataclass
 from heelstrike.sim import EventDriven, TimeStepping
 
@@ -126,21 +127,27 @@ def compare_scenes(
     everything = scenes()
     rows = []
     say = progress or (lambda text, share: None)  # noqa: ARG005
-    for k, scene in enumerate(everything):
-        for name, method in OURS.items():
-            error = our_scene_error(scene, method)
-            rows.append(SceneRow(scene.name, name, f"heelstrike, {name}", error, ""))
-        for name, entry in entries.items():
-            say(f"{scene.name}, {entry.title}", k / len(everything))
-            found, reason = None, ""
-            state = versions[entry.package]
-            if compared({entry.package: state}):
-                try:
-                    found, _ = scene_error(scene, entry, step, settings_of(name, entry, settings))
-                except InvalidRunError as refused:
-                    reason = str(refused)
-            else:
-                reason = f"{PACKAGES[entry.package].title} is {state}"
-            rows.append(SceneRow(scene.name, name, entry.title, found, reason))
+    processes = {entry.package: engine_process(entry.package) for entry in entries.values()}
+    try:
+        for k, scene in enumerate(everything):
+            for name, method in OURS.items():
+                error = our_scene_error(scene, method)
+                rows.append(SceneRow(scene.name, name, f"heelstrike, {name}", error, ""))
+            for name, entry in entries.items():
+                say(f"{scene.name}, {entry.title}", k / len(everything))
+                found, reason = None, ""
+                state = versions[entry.package]
+                if compared({entry.package: state}):
+                    try:
+                        given = settings_of(name, entry, settings)
+                        found, _ = scene_error(scene, entry, step, given, processes[entry.package])
+                    except InvalidRunError as refused:
+                        reason = str(refused)
+                else:
+                    reason = f"{PACKAGES[entry.package].title} is {state}"
+                rows.append(SceneRow(scene.name, name, entry.title, found, reason))
+    finally:
+        for process in processes.values():
+            process.end()
     told = tuple((s.name, s.exact, s.unit, s.source) for s in everything)
     return SceneTable(told, settings, step, tuple(rows))

@@ -19,6 +19,7 @@ from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.experiments.engines.served import served
 from heelstrike.field_texts import dataclass
+from heelstrike.reader_process import ReaderProcess
 from heelstrike.robot import Robot, RobotBuilder, State, load_robot
 from heelstrike.robot.model import Floats
 from heelstrike.sim.method import Method
@@ -236,7 +237,11 @@ def _landing_rate(q: Floats, v: Floats, half: float, share: float) -> float:
 
 
 def scene_error(
-    scene: Scene, entry: Entry, step: float, given: Mapping[str, Any]
+    scene: Scene,
+    entry: Entry,
+    step: float,
+    given: Mapping[str, Any],
+    process: ReaderProcess | None = None,
 ) -> tuple[float, float]:
     """Simulate a scene in an engine.
 
@@ -250,6 +255,8 @@ def scene_error(
         Seconds.
     given : mapping
         Settings of the engine.
+    process : ReaderProcess, optional
+        Where the engine has been before.
 
     Returns
     -------
@@ -265,7 +272,7 @@ def scene_error(
     """
     if scene.scenario.restitution and not entry.bounces:
         raise InvalidRunError("takes no coefficient of restitution")
-    peer = served(entry.package, scene.scenario, step, **given)
+    peer = served(entry.package, scene.scenario, step, process=process, **given)
     try:
         peer.restart()
         rows = peer.record(peer.steps)

@@ -64,6 +64,11 @@ def peers(*, load: bool = True) -> dict[str, str]:
     ----------
     load : bool
         Whether those that this process can have are loaded, to see that they can be.
+
+    Returns
+    -------
+    dict
+        Versions, or reasons, by the names of engines.
     """
     return {name: _state(package, load) for name, package in PACKAGES.items()}
 

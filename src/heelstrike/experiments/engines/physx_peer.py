@@ -21,9 +21,9 @@ with warnings.catch_warnings():
     import sapien
     from sapien import physx
 
-RADIUS = 1e-4
+SMALL_SPHERE = 1e-4
 """Least radius of a contact point, in m: its spheres have some size."""
-LEAST = 1e-6
+NEARLY_NOTHING = 1e-6
 """Mass (kg) and inertia (kg m²) of what has none: a millionth of the lightest link."""
 FAST = 1e6
 """Speed that nothing reaches, in m/s and rad/s."""
@@ -100,7 +100,7 @@ class PhysxPeer(Peer):
         _weigh(root, HEAVY_ROOT, np.zeros(3), HEAVY_ROOT)
         made, entities = [root], [entity]
         armature = scenario.robot.model.armature
-        for i, link in enumerate(links(scenario.robot, least_radius=RADIUS)):
+        for i, link in enumerate(links(scenario.robot, least_radius=SMALL_SPHERE)):
             body = physx.PhysxArticulationLinkComponent(made[link.parent + 1])
             entity = sapien.Entity()
             entity.add_component(body)
@@ -121,7 +121,9 @@ class PhysxPeer(Peer):
                 shape.set_local_pose(sapien.Pose(center))
                 shape.set_collision_groups([1, 1, 2, 7])  # alike: they do not meet each other
                 body.attach(shape)
-            _weigh(body, max(link.mass, LEAST), link.center, max(link.inertia, LEAST))
+            _weigh(
+                body, max(link.mass, NEARLY_NOTHING), link.center, max(link.inertia, NEARLY_NOTHING)
+            )
             made.append(body)
             entities.append(entity)
         for each in entities:
