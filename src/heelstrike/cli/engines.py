@@ -56,6 +56,9 @@ class InEngines:
             dir_okay=False, help="Write a page of what engines made of walks and scenes in --out."
         ),
     ] = None
+    films: Annotated[
+        bool, typer.Option("--films", help="Write films of the walks in engines that fall.")
+    ] = False
     quick: Annotated[
         bool, typer.Option("--quick", help="In engines: four steps at 1 ms, for a try.")
     ] = False
@@ -92,6 +95,7 @@ def compare_in_engines(
             settings=asked.settings.split(","),
             friction=_friction(case),
             folder=out / "engines",
+            films=asked.films,
             progress=show.doing,
         )
     out.mkdir(parents=True, exist_ok=True)

@@ -110,8 +110,9 @@ def compare_engines(
     settings: Sequence[str] = (DEFAULTS, BEST),
     control_period: float = CONTROL_PERIOD,
     friction: float = 0.75,
-    patience: float = 600.0,
+    patience: float = 60.0,
     folder: Path | str | None = None,
+    films: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> EngineComparison:
     """Walk a gait under a controller in other engines, and say what each gets right.
@@ -145,6 +146,8 @@ def compare_engines(
     folder : path, optional
         Where walks are kept as they come. What is there already, of the same robot, gait,
         controller and program, is not walked again.
+    films : bool
+        Whether to write a film (.mp4) of each walk that falls into the folder.
     progress : callable, optional
         Called before each walk with a text, and the share of walks that is done.
 
@@ -188,7 +191,8 @@ def compare_engines(
             entry = entries[name]
             given = settings_of(name, entry, which)
             told = {"given": given, "version": versions[entry.package]}
-            make = partial(walk.in_engine, entry, step, given, truth, versions)
+            film = Path(folder) / f"{name}-{which}-{step:g}.mp4" if films and folder else None
+            make = partial(walk.in_engine, entry, step, given, truth, versions, film)
             rows.append(kept.row(row, told, make))
     finally:
         walk.close()

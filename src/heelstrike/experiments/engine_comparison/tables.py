@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from heelstrike.experiments.engine_comparison.figures import WalkFigures
 
 WALKING: Mapping[str, tuple[str, float]] = {
-    "steps": ("steps", 1),
     "tracking_rad": ("follows mrad", 1e3),
     "position": ("off mm,mrad", 1e3),
     "touchdown_s": ("lands ms", 1e3),
@@ -79,7 +78,7 @@ def _table(
             row.title,
             row.settings[:4],
             f"{1e3 * row.step_s:g}",
-            "yes" if row.figures.walks else "no",
+            "yes" if row.figures.walks else f"no, {row.figures.steps}",
             *(cells(row.figures, columns)),
         )
     return table
@@ -103,9 +102,7 @@ def cells(figures: WalkFigures, columns: Mapping[str, tuple[str, float]]) -> lis
     told = []
     for name, (_, factor) in columns.items():
         value = getattr(figures, name)
-        if isinstance(value, int):
-            told.append(str(value))
-        elif math.isnan(value) or (columns is WALKING and not figures.walks):
+        if math.isnan(value) or (columns is WALKING and not figures.walks):
             told.append("–")
         else:
             told.append(short(factor * value))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import field
+from pathlib import Path
 from typing import Any
 
 from heelstrike.contact.ground import Ground
@@ -103,7 +104,7 @@ class Walk:
 
     def in_engine(
         self, entry: Entry, step: float, given: Mapping[str, Any], truth: Run,
-        versions: Mapping[str, str],
+        versions: Mapping[str, str], film: Path | None = None,
     ) -> WalkFigures:  # fmt: skip
         """Walk in an engine, and measure it.
 
@@ -119,6 +120,8 @@ class Walk:
             What is held for true.
         versions : mapping
             What :func:`~heelstrike.experiments.engines.peers` says of the engines.
+        film : Path, optional
+            File to show the walk in, if the robot does not walk.
 
         Raises
         ------
@@ -126,7 +129,10 @@ class Walk:
             If the engine is missing, ends, hangs or refuses.
         """
         run, told = self.run_in(entry, step, given, versions)
-        return walk_figures(run, truth, self.gait, self.steps, friction_told=told)
+        found = walk_figures(run, truth, self.gait, self.steps, friction_told=told)
+        if film is not None and not found.walks:
+            run.animate(film)
+        return found
 
     def run_in(
         self, entry: Entry, step: float, given: Mapping[str, Any], versions: Mapping[str, str]
