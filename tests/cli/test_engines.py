@@ -46,6 +46,7 @@ def test_engines_are_compared_as_asked(tmp_path: Path, asked: list[dict[str, Any
     assert call["engines"] == ["mujoco", "ode"]
     assert call["step_sizes"] == (1e-3, 5e-4)
     assert call["settings"] == ["best"]
+    assert call["control_period"] == 2e-3
     assert (call["steps"], call["friction"]) == (5, 0.8)
     written = sorted(file.name for file in (tmp_path / "out").iterdir())
     assert written == ["engines-JointPD.json", "engines.png"]

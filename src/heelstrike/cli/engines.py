@@ -40,6 +40,9 @@ class InEngines:
             show_default="2e-3,1e-3,5e-4,2e-4",
         ),
     ] = None
+    period: Annotated[
+        float, typer.Option(help="Seconds between two calls of the law, in engines.")
+    ] = 2e-3
     search: Annotated[
         bool,
         typer.Option("--search", help="Search for the best settings of the engines instead."),
@@ -69,7 +72,7 @@ def compare_in_engines(
 ) -> None:
     """Walk a case in other engines; tell, write and draw what came of it."""
     from heelstrike.experiments.engine_comparison import compare_engines
-    from heelstrike.experiments.engine_comparison.comparison import STEP_SIZES
+    from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD, STEP_SIZES
     from heelstrike.view.style import save_figure
     from heelstrike.whole_file import write_whole
 
@@ -93,6 +96,7 @@ def compare_in_engines(
             steps=QUICK_STEPS if asked.quick else steps,
             step_sizes=sizes,
             settings=asked.settings.split(","),
+            control_period=asked.period,
             friction=_friction(case),
             folder=out / "engines",
             films=asked.films,
@@ -100,6 +104,8 @@ def compare_in_engines(
         )
     out.mkdir(parents=True, exist_ok=True)
     law = type(start.controller).__name__
+    if asked.period != CONTROL_PERIOD:
+        law += f"-every-{1e3 * asked.period:g}-ms"
     text = json.dumps(comparison.to_dict(), indent=2, ensure_ascii=False)
     wrote(write_whole(out / f"engines-{law}.json", text + "\n"))
     if as_json:

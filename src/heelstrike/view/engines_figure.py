@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from heelstrike.view.style import INK, new_figure, styled
+from heelstrike.view.style import INK, label_powers, new_figure, styled
 
 MARKS = "osD^v<>Phd*Xp"
 OURS = "heelstrike"
@@ -55,6 +55,8 @@ def draw_engines(walks: Sequence[tuple[str, str, float, Mapping[str, Any]]]) -> 
                 )  # fmt: skip
         axes.set_xscale("log")
         axes.set_yscale("log")
+        label_powers(axes.xaxis)
+        label_powers(axes.yaxis)
         axes.set_xlabel("computing time of the walk (s)")
         axes.set_ylabel("distance from the truth (m, rad)")
         handles = [

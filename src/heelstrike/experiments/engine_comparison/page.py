@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from heelstrike.errors import SimulationError
+from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
 from heelstrike.experiments.engine_comparison.settings import best_settings
@@ -41,7 +42,9 @@ def engines_page(folder: Path, figure: str) -> str:
         If it has not.
     """
     walks = {
-        file.stem.removeprefix("engines-"): json.loads(file.read_text(encoding="utf-8"))
+        file.stem.removeprefix("engines-").replace("-", " "): json.loads(
+            file.read_text(encoding="utf-8")
+        )
         for file in sorted(folder.glob("engines-*.json"))
     }
     scenes_file = folder / "scenes.json"
@@ -188,8 +191,13 @@ def _walks(law: str, found: Mapping[str, Any]) -> str:
     columns = {**WALKING, **BY_ITSELF}
     rows = []
     reasons = []
+    sizes = {row["step_s"] for row in found["rows"]}
+    shown = SHOWN if SHOWN in sizes else max(sizes)
+    name, *_ = law.partition(" ")
+    period = found["control_period_s"]
+    often = "" if period == CONTROL_PERIOD else f" --period {period:g}"
     for row in found["rows"]:
-        if row["step_s"] != SHOWN:
+        if row["step_s"] != shown:
             continue
         title = _title(row["engine"])
         if row["figures"] is None:
@@ -205,13 +213,13 @@ def _walks(law: str, found: Mapping[str, Any]) -> str:
     headings = ["engine", "settings", "walks", *(heading for heading, _ in columns.values())]
     said = "\nWhy they did not walk:\n\n" + "\n".join(reasons) + "\n" if reasons else ""
     return (
-        f"## {found['steps']} steps under {law}\n\nAt a step of {1e3 * SHOWN:g} ms. *off* is the "
+        f"## {found['steps']} steps under {law}\n\nAt a step of {1e3 * shown:g} ms. *off* is the "
         "root mean square distance of all coordinates from the truth over the walk; *lands* the "
         "largest difference of a landing's time, in which errors of every step add up; *noise* "
         "what the ground's force differs by from its mean over 10 ms in single support, in "
         "percent of the weight; *peak* the largest force on a foot over a step, in weights. "
-        f"Each row is `heelstrike compare {found['robot']} --controller {law} --engines NAME "
-        f"--settings SETTINGS --sizes {SHOWN:g} --steps {found['steps']}`.\n\n"
+        f"Each row is `heelstrike compare {found['robot']} --controller {name} --engines NAME "
+        f"--settings SETTINGS --sizes {shown:g} --steps {found['steps']}{often}`.\n\n"
         + _table(headings, rows) + said
     )  # fmt: skip
 
