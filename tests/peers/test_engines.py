@@ -31,6 +31,7 @@ from heelstrike.experiments.engines import (
 )
 from heelstrike.experiments.engines.packages import PACKAGES, PARTS_OF_STEPS
 from heelstrike.experiments.engines.peer import flight
+from heelstrike.experiments.engines.served import engine_process, served
 from heelstrike.robot import State, load_robot
 from heelstrike.sim import TimeStepping
 
@@ -121,6 +122,26 @@ def test_a_robot_with_dampers_flies_as_ours(engine: Engine, request: pytest.Fixt
     allowed = 1.5e-4 + FLIGHT.get(name, 0.0)
     with refusals():
         assert check_flight(engine, load_robot("walker2d")) <= allowed
+
+
+def test_a_process_has_one_scenario_after_another(
+    engine: Engine, request: pytest.FixtureRequest
+) -> None:
+    """What an engine leaves behind of a robot that stood does nothing to the next."""
+    name = request.node.callspec.params["engine"]
+    robot = load_robot("bravo7")
+    scenario = Scenario("standing", robot, robot.reference_state(), 0.02)
+    process = engine_process(name)
+    rows = []
+    try:
+        for _ in range(2):
+            there = served(name, scenario, STEP, process=process)
+            there.restart()
+            rows.append(there.record(20))
+    finally:
+        process.end()
+    assert rows[0][:, robot.nq + robot.nv :].any()
+    np.testing.assert_allclose(rows[0], rows[1], rtol=1e-9, atol=1e-9)
 
 
 def test_another_robot_is_refused(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,8 @@ It is read by its path, and imports nothing of this package. A script has a clas
 - ``place(q, v)``: put the robot somewhere;
 - ``step(torque)``: simulate a step under torques of the actuators;
 - ``state()``: position and velocity, two lists;
-- ``forces()``: of the last step on each contact point, a list of pairs, upwards and forward.
+- ``forces()``: of the last step on each contact point, a list of pairs, upwards and forward;
+- ``close()``: before another is made.
 """
 
 from __future__ import annotations
@@ -44,6 +45,8 @@ class Server:
         head: dict[str, Any] = {}
         numbers = array("d")
         if asked["do"] == "make":
+            if self._made is not None:
+                self._made.close()
             self._made = self._engine(asked)
         elif asked["do"] == "place":
             self._made.place(asked["q"], asked["v"])

@@ -126,10 +126,7 @@ class Robot:
     def step(self, torque: list[float]) -> None:
         """Simulate a step under torques of the actuators."""
         poses, motions = self._poses()
-        for _, joint in self.pressed:
-            joint.setFeedback(False)  # what is freed later must have none
-        self.group.empty()
-        self.pressed = []
+        self.close()
         for i in self.tree.bodies:
             for contact, x, z in self.tree.points(poses[i], i):
                 if z < self.settings["margin"]:
@@ -156,6 +153,13 @@ class Robot:
             force = joint.getFeedback()[0]
             found[contact] = (force[1], force[0])
         self.told = found
+
+    def close(self) -> None:
+        """Take the contact joints away; what is freed later must tell no forces, or ODE aborts."""
+        for _, joint in self.pressed:
+            joint.setFeedback(False)
+        self.group.empty()
+        self.pressed = []
 
     def state(self) -> tuple[list[float], list[float]]:
         """Position and velocity."""

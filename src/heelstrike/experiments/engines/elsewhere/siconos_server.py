@@ -177,6 +177,9 @@ class Robot:
             found.append((impulse[0] / self.asked["step"], impulse[1] / self.asked["step"]))
         return found
 
+    def close(self) -> None:
+        """Leave nothing behind that needs to be ended."""
+
     def state(self) -> tuple[list[float], list[float]]:
         """Position and velocity."""
         return list(self.body.q()), list(self.body.velocity())

@@ -191,6 +191,9 @@ class Robot:
         self.steps += 1
         self.now = self.manager.integrate(self.steps * self.asked["step"])
 
+    def close(self) -> None:
+        """Leave nothing behind that needs to be ended."""
+
     def state(self) -> tuple[list[float], list[float]]:
         """Position and velocity."""
         pairs = list(zip(self.coordinates, self.turns, strict=True))
