@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +123,7 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
     for law in walks:
         headings += [f"{law} walks, defaults", f"{law} walks, best"]
     return (
-        "## Table 1, renewed\n\nIn the paper's columns:\n\n"
+        f"## Table 1, renewed\n\nOf {date.today().isoformat()}, in the paper's columns:\n\n"
         + _table(
             ["simulator", "version", "languages", "engine", "graphics", "licence", "systems",
              "open source", "documented"],

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import importlib
 import subprocess
+from contextlib import suppress
 
 DEBIAN = {"ode": "python3-pyode", "siconos": "python3-siconos"}
-"""Modules without a version of their own, and the packages of Debian they come in."""
+"""Modules that do not know their version, and the packages of Debian they come in."""
 
 
 def version(order: bytes) -> bytes:
@@ -23,10 +24,8 @@ def version(order: bytes) -> bytes:
     except ImportError:
         return b""
     found = getattr(module, "__version__", None)
-    if found is None and name in DEBIAN:
+    if name in DEBIAN:
         asked = ["dpkg-query", "-W", "-f", "${Version}", DEBIAN[name]]
-        try:
+        with suppress(OSError, subprocess.CalledProcessError):  # it is not Debian's
             found = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
-        except (OSError, subprocess.CalledProcessError):
-            found = None
     return str(found or "unknown version").encode()
