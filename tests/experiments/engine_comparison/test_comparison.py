@@ -113,6 +113,31 @@ def test_the_comparison_is_told_in_a_table_in_json_and_in_a_figure(
     assert "MuJoCo" in [each.get_text() for each in axes.get_legend().get_texts()]
 
 
+def test_an_interruption_ends_it_and_keeps_what_was_walked(
+    bravo7: hs.Robot, gait: hs.Gait, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C while an engine walks: the rows before it are in the folder."""
+
+    def interrupt(*_: object) -> WalkFigures:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module.Walk, "in_engine", interrupt)
+    monkeypatch.setattr(module, "TRUTH", hs.TimeStepping(step=1e-3))
+    with pytest.raises(KeyboardInterrupt):
+        hs.compare_engines(
+            bravo7,
+            hs.ComputedTorque(bravo7, gait),
+            gait,
+            engines=["mujoco"],
+            steps=1,
+            step_sizes=[1e-3],
+            settings=["defaults"],
+            folder=tmp_path,
+        )
+    (kept,) = tmp_path.iterdir()
+    assert kept.name.startswith("heelstrike-defaults-0.001-")
+
+
 def test_names_of_engines_are_checked(bravo7: hs.Robot, gait: hs.Gait) -> None:
     with pytest.raises(SimulationError, match=r"no engine 'mujocco'\. Did you mean 'mujoco'"):
         hs.compare_engines(bravo7, hs.ComputedTorque(bravo7, gait), gait, engines=["mujocco"])

@@ -27,6 +27,7 @@ from heelstrike.sim import Controller, EventDriven, Run, simulate
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.law import Law
 from heelstrike.sim.method import Method
+from heelstrike.sim.whole_run import whole
 
 TRUTH = EventDriven(rtol=1e-9, atol=1e-11, output_period=1e-3)
 """What the engines are held against."""
@@ -84,11 +85,17 @@ class Walk:
             Which.
         """
         scenario = self.scenario
-        return simulate(
-            self.robot, self.controller, state=scenario.state, duration=scenario.duration,
-            method=method, ground=Ground(friction=self.friction),
-            control_period=self.control_period,
-        )  # fmt: skip
+        return whole(
+            simulate(
+                self.robot,
+                self.controller,
+                state=scenario.state,
+                duration=scenario.duration,
+                method=method,
+                ground=Ground(friction=self.friction),
+                control_period=self.control_period,
+            )
+        )
 
     def by(self, method: Method, truth: Run) -> WalkFigures:
         """Walk by a method of ours, and measure it.
