@@ -70,6 +70,28 @@ class Server:
         return seconds
 
 
+def settings_of(asked: dict[str, Any], known: dict[str, Any]) -> dict[str, Any]:
+    """Return the settings that are asked for, and the defaults of the others.
+
+    Parameters
+    ----------
+    asked : dict
+        What is to be made.
+    known : dict
+        All settings, with their defaults.
+
+    Raises
+    ------
+    ValueError
+        If one is asked for that is not known.
+    """
+    given = asked["settings"]
+    unknown = ", ".join(sorted(set(given) - set(known)))
+    if unknown:
+        raise ValueError(f"there is no setting {unknown}; there are {', '.join(known)}")
+    return {**known, **given}
+
+
 class Tree:
     """A floating robot as links in the plane, each a body with its place and its joint.
 

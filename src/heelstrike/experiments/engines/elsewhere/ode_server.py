@@ -14,6 +14,7 @@ import ode
 
 shared = runpy.run_path(str(Path(__file__).with_name("exchange.py")))
 Server, Tree = shared["Server"], shared["Tree"]
+settings_of = shared["settings_of"]
 
 LEAST = 1e-9
 """Mass (kg) and inertia (kg m²) that stand for none."""
@@ -28,10 +29,11 @@ class Robot:
     """
 
     def __init__(self, asked: dict[str, Any]) -> None:
-        settings = {
+        known = {
             "solver": "step", "iterations": 20, "erp": None, "cfm": None, "layer": 0.0,
             "margin": 0.0,
-        } | asked["settings"]  # fmt: skip
+        }  # fmt: skip
+        settings = settings_of(asked, known)
         self.tree = tree = Tree(asked["links"])
         self.h = asked["step"]
         self.settings = settings

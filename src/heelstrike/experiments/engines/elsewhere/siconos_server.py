@@ -18,6 +18,7 @@ import siconos.numerics as numerics
 
 shared = runpy.run_path(str(Path(__file__).with_name("exchange.py")))
 Server, Tree = shared["Server"], shared["Tree"]
+settings_of = shared["settings_of"]
 
 SOLVERS = {
     "lemke": numerics.SICONOS_FRICTION_2D_LEMKE,
@@ -115,9 +116,10 @@ class Robot:
     """
 
     def __init__(self, asked: dict[str, Any]) -> None:
-        settings = {
+        known = {
             "theta": 0.5, "solver": "lemke", "tolerance": 1e-8, "iterations": 1000,
-        } | asked["settings"]  # fmt: skip
+        }  # fmt: skip
+        settings = settings_of(asked, known)
         self.asked, self.settings = asked, settings
         self.tree = Tree(asked["links"])
         self.chain = Chain(self.tree)

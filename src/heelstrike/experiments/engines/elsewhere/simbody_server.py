@@ -19,6 +19,7 @@ import opensim
 
 shared = runpy.run_path(str(Path(__file__).with_name("exchange.py")))
 Server, Tree = shared["Server"], shared["Tree"]
+settings_of = shared["settings_of"]
 
 STOP, STOP_DAMPING, STOP_WIDTH = 1e3, 1.0, 0.5
 """Stiffness (N m/degree), damping (N m s/degree) and width (degrees) of the stops of joints."""
@@ -40,10 +41,11 @@ class Robot:
     """
 
     def __init__(self, asked: dict[str, Any]) -> None:
-        settings = {
+        known = {
             "integrator": "RungeKuttaMerson", "accuracy": 1e-3, "shape": None, "viscosity": None,
             "elasticity": None, "grip": None,
-        } | asked["settings"]  # fmt: skip
+        }  # fmt: skip
+        settings = settings_of(asked, known)
         opensim.Logger.setLevelString("Off")
         self.asked, self.settings = asked, settings
         self.tree = Tree(asked["links"])
