@@ -67,7 +67,7 @@ class WalkFigures:
 
 
 def walk_figures(
-    run: Run, truth: Run, gait: Gait, steps: int, *, friction_told: bool = True
+    run: Run, truth: Run, gait: Gait, steps: int, *, forces_told: bool = True
 ) -> WalkFigures:
     """Measure a walk.
 
@@ -81,8 +81,8 @@ def walk_figures(
         What both followed.
     steps : int
         Steps that it was to take.
-    friction_told : bool
-        Whether the engine tells tangential forces.
+    forces_told : bool
+        Whether the engine tells all forces, as means over steps: what energy follows from.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def walk_figures(
         zmp_m=root_mean_square(ours["zmp"] - real["zmp"]),
         slip_m=max_slip(run),
         penetration_m=run.certificates.penetration,
-        energy_J=float(np.max(np.abs(energy_balance(run).residual))) if friction_told else NONE,
+        energy_J=float(np.max(np.abs(energy_balance(run).residual))) if forces_told else NONE,
         noise=_noise(run, normal, [each.touchdown for each in taken]),
         peak=float(max(each.max() for each in feet) / run.robot.weight) if feet else NONE,
         step_us=1e6 * run.timing.wall_s / max(run.steps, 1),

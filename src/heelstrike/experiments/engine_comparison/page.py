@@ -74,7 +74,8 @@ The paper's Table 1 compares simulators by what their pages say. Here the same r
 gait under the same law of control in each of their engines, and what each makes of it is held
 against an event-driven run at a tolerance of 1e-9. `heelstrike compare bravo7 --engines all` makes
 these tables; with `--scenes --page docs/engines.md` it writes this page. One engine is
-`--engines mujoco`. How to add one: CONTRIBUTING.
+`--engines mujoco`, a try `--quick`; `--films` shows the walks that fall. How to add one:
+CONTRIBUTING.
 
 Each engine has the robot link by link, and touches the ground by our contact points. It runs in a
 process of its own, is given torques, and tells its state and its contact forces. The law is the
@@ -218,7 +219,8 @@ def _walks(law: str, found: Mapping[str, Any]) -> str:
         "root mean square distance of all coordinates from the truth over the walk; *lands* the "
         "largest difference of a landing's time, in which errors of every step add up; *noise* "
         "what the ground's force differs by from its mean over 10 ms in single support, in "
-        "percent of the weight; *peak* the largest force on a foot over a step, in weights. "
+        "percent of the weight; *energy* what came or went that no work explains, where all forces "
+        "are told as means over steps; *peak* the largest force on a foot over a step, in weights. "
         f"Each row is `heelstrike compare {found['robot']} --controller {name} --engines NAME "
         f"--settings SETTINGS --sizes {shown:g} --steps {found['steps']}{often}`.\n\n"
         + _table(headings, rows) + said

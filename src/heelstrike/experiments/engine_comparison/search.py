@@ -92,7 +92,7 @@ def search_settings(
                 raise
             say(f"{settings}: {refused}")
             return math.inf
-        figures: WalkFigures = walk_figures(run, truth, walk.gait, walk.steps, friction_told=told)
+        figures: WalkFigures = walk_figures(run, truth, walk.gait, walk.steps, forces_told=told)
         found = figures.position if figures.walks else math.inf
         say(f"{settings}: {found:.3g}")
         return found

@@ -136,7 +136,7 @@ class Walk:
             If the engine is missing, ends, hangs or refuses.
         """
         run, told = self.run_in(entry, step, given, versions)
-        found = walk_figures(run, truth, self.gait, self.steps, friction_told=told)
+        found = walk_figures(run, truth, self.gait, self.steps, forces_told=told)
         if film is not None and not found.walks:
             run.animate(film)
         return found
@@ -144,7 +144,7 @@ class Walk:
     def run_in(
         self, entry: Entry, step: float, given: Mapping[str, Any], versions: Mapping[str, str]
     ) -> tuple[Run, bool]:
-        """Walk in an engine; return the run, and whether it tells tangential forces.
+        """Walk in an engine; return the run, and whether all forces are told, as means over steps.
 
         Parameters
         ----------
@@ -175,4 +175,4 @@ class Walk:
         if not isinstance(controller, Law):
             controller = deepcopy(controller)
         run = walk_in(peer, controller, control_period=self.control_period, name=entry.title)
-        return run, bool(peer.facts["tells_friction"])
+        return run, bool(peer.facts["tells_friction"] and peer.facts["tells_means"])

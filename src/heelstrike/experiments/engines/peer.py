@@ -78,6 +78,9 @@ class Peer(ABC):
     tells_friction: ClassVar[bool] = True
     """Whether the engine says what the tangential forces of its contacts are."""
 
+    tells_means: ClassVar[bool] = True
+    """Whether the forces that it tells are means over a step, not those of the end of it."""
+
     bounces: ClassVar[bool] = True
     """Whether the engine takes a coefficient of restitution."""
 

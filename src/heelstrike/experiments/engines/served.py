@@ -300,7 +300,11 @@ class ScriptedPeer(ServedPeer):
         super().__init__(
             scenario, step, engine=self.module, job=f"{job}:answer", python=python, **settings
         )
-        self.facts = {"tells_friction": self.tells_friction, "float32": self.float32} | self.facts
+        self.facts = {
+            "tells_friction": self.tells_friction,
+            "tells_means": self.tells_means,
+            "float32": self.float32,
+        }
 
 
 def engine_process(name: str) -> ReaderProcess:

@@ -52,6 +52,7 @@ def _make(asked: dict[str, Any]) -> tuple[dict[str, Any], Any]:
     _made[:] = [peer]
     return {
         "tells_friction": peer.tells_friction,
+        "tells_means": peer.tells_means,
         "float32": peer.float32,
         "settling": peer.settling,
         "lacks": list(peer.lacks),

@@ -13,6 +13,7 @@ class SimbodyPeer(ScriptedPeer):
     module = "opensim"
     settling = 1.0
     lacks = ("armature",)
+    tells_means = False
     bounces = False
 
 
