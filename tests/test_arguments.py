@@ -71,6 +71,7 @@ def usual() -> dict[str, dict[str, Any]]:
         "Batch": walked,
         "HeldTorque": {"robot": robot},
         "compare": {**walked, "methods": [hs.TimeStepping()], "duration": 0.1},
+        "compare_engines": {**on_a_gait, "controller": law, "engines": ["mujoco"], "steps": 0},
         "constrained": {"robot": robot},
         "contact_forward_dynamics": {**there, "torque": np.zeros(robot.nu)},
         "contact_inverse_dynamics": {**there, "acceleration": np.zeros(robot.nv)},

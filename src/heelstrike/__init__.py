@@ -107,6 +107,7 @@ if TYPE_CHECKING:
     from heelstrike.experiments.campaigns import Campaign as Campaign
     from heelstrike.experiments.campaigns import CampaignResults as CampaignResults
     from heelstrike.experiments.comparison import compare as compare
+    from heelstrike.experiments.engine_comparison import compare_engines as compare_engines
     from heelstrike.experiments.planners import PlannerComparison as PlannerComparison
     from heelstrike.experiments.planners import compare_planners as compare_planners
     from heelstrike.experiments.spring_mass import SpringMass as SpringMass
@@ -263,6 +264,7 @@ _HOME = {
     "builtin_robots": "heelstrike.robot",
     "cell": "heelstrike.compiler.bundle",
     "compare": "heelstrike.experiments.comparison",
+    "compare_engines": "heelstrike.experiments.engine_comparison",
     "compare_planners": "heelstrike.experiments.planners",
     "constrained": "heelstrike.sim",
     "contact_forward_dynamics": "heelstrike.contact",
