@@ -242,7 +242,6 @@ def solve_step_of(
             steps = memory.tally.steps
             if solve_positions(step, steps, table, memory.solver, assembly, impact) != SOLVED:
                 worst = assembly.answer.residual
-            memory.tally.residual = max(memory.tally.residual, assembly.answer.residual)
             add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
             for row in range(assembly.problem.first[assembly.count]):
                 impact.impulse[row] = assembly.answer.impulse[row]
@@ -251,7 +250,6 @@ def solve_step_of(
                 status = solve_impact_of(step, before, table, memory.solver, assembly, impact)
                 if status != SOLVED:
                     worst = impact.answer.residual
-                memory.tally.residual = max(memory.tally.residual, impact.answer.residual)
                 add_impulses(model, impact.impulse, equations, assembly, next_v)
             else:
                 for k in range(model.nv):
@@ -380,6 +378,10 @@ def take_step(
             step, length, memory.tally.steps, memory.impact.impulse, memory.assembly, memory.blocks
         )  # fmt: skip
         gain += memory.impact.gain
+        if memory.assembly.count > 0:
+            memory.tally.residual = max(memory.tally.residual, memory.assembly.answer.residual)
+        if memory.impact.happens == 1:
+            memory.tally.residual = max(memory.tally.residual, memory.impact.answer.residual)
         memory.tally.relaxed += memory.impact.relaxed
         if done + 1 == parts:
             find_slip(model, memory.equations.tree, memory.next_v, memory.feet)
