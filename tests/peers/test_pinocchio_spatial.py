@@ -32,7 +32,8 @@ def random_urdf(seed: int, *, held: bool) -> str:
         moments = " ".join(f'{n}="{float(tensor[at])!r}"' for n, at in MOMENTS.items())
         links.append(
             f'<link name="l{k}"><inertial><origin xyz="{_three(draw)}" rpy="{_three(draw)}"/>'
-            f'<mass value="{float(draw.uniform(0.5, 3.0))!r}"/><inertia {moments}/></inertial></link>'
+            f'<mass value="{float(draw.uniform(0.5, 3.0))!r}"/><inertia {moments}/></inertial>'
+            "</link>"
         )
         if k:
             kind = draw.choice(["revolute", "continuous", "prismatic", "fixed"])
