@@ -16,6 +16,7 @@ from heelstrike.compiler.bundle import Bundle, cell
 from heelstrike.compiler.compilation import kernel, loop_for
 from heelstrike.contact.spatial.certified_solve import try_ways
 from heelstrike.contact.spatial.ground import SpatialGroundModel
+from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.controller.law import controller_in
 from heelstrike.sim.frame import (
@@ -31,11 +32,15 @@ from heelstrike.sim.frame import (
 )
 from heelstrike.sim.record.recording import FARTHEST, FASTEST
 from heelstrike.sim.spatial.controlled import SpatialControl, ask_law
-from heelstrike.sim.spatial.memory import SpatialEquations, SpatialMemory
+from heelstrike.sim.spatial.memory import SpatialEquations, SpatialMemory, SpatialTally
 from heelstrike.sim.spatial.record import (
+    ENERGY_GAIN,
+    NO_IMPULSE,
+    UNCERTIFIED,
     SpatialRecord,
     begin_row,
     finish_row,
+    log_spatial_event,
     note_deepest,
     note_spatial_events,
 )
@@ -72,36 +77,38 @@ class SpatialClock(Bundle):
 
 
 @kernel
-def limit_commands(model: SpatialModel, memory: SpatialMemory) -> bool:
+def limit_commands(
+    model: SpatialModel, v: Floats, command: Floats, tally: SpatialTally, torque: Floats
+) -> bool:
     """Find the torques of an instant from its commands; return whether all of these are finite.
 
     Torques keep to the limits of their actuators, and to the line from stall torque to no-load
     speed where a motor has one.
     """
     for i in range(model.nu):
-        wanted = memory.command[i]
+        wanted = command[i]
         if not abs(wanted) < FASTEST * FASTEST:
-            memory.tally.bad_torque = i
+            tally.bad_torque = i
             return False
-        torque = min(max(wanted, model.torque_lower[i]), model.torque_upper[i])
+        applied = min(max(wanted, model.torque_lower[i]), model.torque_upper[i])
         k = model.actuator_velocity[i]
         stall = model.stall_torque[k]
         if stall < FASTEST * FASTEST:
-            drag = stall / model.no_load_speed[k] * memory.v[k]
-            torque = min(max(torque, -stall - drag), stall - drag)
-        memory.tally.saturations += torque != wanted
-        memory.torque[i] = torque
+            drag = stall / model.no_load_speed[k] * v[k]
+            applied = min(max(applied, -stall - drag), stall - drag)
+        tally.saturations += applied != wanted
+        torque[i] = applied
     return True
 
 
 @kernel
-def is_sound(memory: SpatialMemory) -> bool:
+def is_sound(q: Floats, v: Floats) -> bool:
     """Whether the state is finite and not absurd."""
     bad = 0
-    for i in range(memory.q.shape[0]):
-        bad += not abs(memory.q[i]) < FARTHEST
-    for i in range(memory.v.shape[0]):
-        bad += not abs(memory.v[i]) < FASTEST
+    for i in range(q.shape[0]):
+        bad += not abs(q[i]) < FARTHEST
+    for i in range(v.shape[0]):
+        bad += not abs(v[i]) < FASTEST
     return bad == 0
 
 
@@ -133,22 +140,25 @@ def advance_in_space(
         full = record.events + clock.event_margin > record.event_time.shape[0]
         if full or record.rows + 1 > record.time.shape[0]:
             return RECORD_FULL
-        if not is_sound(memory):
+        if not is_sound(memory.q, memory.v):
             return DIVERGED
         time = clock.start + clock.index * clock.step
-        find_state(model, ground, memory)
+        find_state(
+            model, ground, memory.q, memory.v, memory.equations, memory.blocks, memory.contacts,
+            memory.feet,
+        )  # fmt: skip
         if clock.index % clock.control_every == 0 or clock.begun == 0:
             if control.in_python == 0:
                 ask_law(controller, time, model, control, memory)
             elif clock.answered == 0:
                 return ASKING
         clock.answered = 0
-        if not limit_commands(model, memory):
+        if not limit_commands(model, memory.v, memory.command, memory.tally, memory.torque):
             return BAD_CONTROLLER
-        note_deepest(model, memory)
+        note_deepest(memory.contacts.gap, memory.tally)
         due = clock.index % clock.record_every == 0 or clock.finishing == 1
         if due:
-            begin_row(time, memory, record)
+            begin_row(time, memory.q, memory.v, memory.torque, memory.contacts, record)
         for i in range(model.nq):
             memory.kept_q[i] = memory.q[i]
         for k in range(model.nv):
@@ -159,7 +169,10 @@ def advance_in_space(
             model, ground, time, clock.step, clock.resolves == 1, memory
         )  # fmt: skip
         if due:
-            finish_row(memory, record)
+            finish_row(
+                memory.stop_torque, memory.friction_torque, memory.contacts.force, memory.feet.slip,
+                memory.assembly.answer.residual, record,
+            )  # fmt: skip
         ended = below or clock.finishing == 1 or control.robot.ending >= 0
         if not done or ended:
             for i in range(model.nq):
@@ -172,10 +185,14 @@ def advance_in_space(
             if clock.finishing == 1:
                 return DONE
             return FELL if below else STOPPED
-        gained = memory.tally.energy_gain > gain
         note_spatial_events(
-            time, clock.step, clock.begun == 0, certified, gained, memory, record
+            time, clock.step, clock.begun == 0, memory.v, memory.feet.slip, memory.blocks,
+            memory.reported, record,
         )  # fmt: skip
+        if not certified:
+            log_spatial_event(time + clock.step, UNCERTIFIED, -1, NO_IMPULSE, record)
+        if memory.tally.energy_gain > gain:
+            log_spatial_event(time + clock.step, ENERGY_GAIN, -1, NO_IMPULSE, record)
         clock.begun = 1
         clock.index += 1
 

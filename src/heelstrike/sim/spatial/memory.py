@@ -17,7 +17,7 @@ from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.spatial.table import BlockTable, lay_out_table, most_rows_of
+from heelstrike.sim.spatial.table import NEVER_TOUCHED, BlockTable, lay_out_table, most_rows_of
 
 KNOWN_SPEED = 1e-12
 """Velocity times the root of a mass (m/s kg^(1/2)) below which nothing is known of free velocities:
@@ -100,7 +100,10 @@ class SpatialImpact(Bundle):
     happens: int = cell(int)
     """Whether there is one."""
     relaxed: int = cell(int)
-    """Whether the step is not asked to come out of the ground."""
+    wedged: int = cell(int)
+    since: int = cell(int)
+    """relaxed, wedged, since: Whether the step is not asked to come out of the ground; the last
+    step that was not; the first of those without a break."""
     gain: float = cell(float)
     """Kinetic energy that restitution made in it (J)."""
     member: Integers = array("entries", of=int)
@@ -179,7 +182,10 @@ def allocate_spatial_memory(robot: SpatialRobot, pushes: SpatialPushes) -> Spati
         extents, problem=block_problem(blocks, rows), answer=block_answer(blocks, rows)
     )
     impact = SpatialImpact.allocate(
-        extents, problem=block_problem(blocks, rows), answer=block_answer(blocks, rows)
+        extents,
+        wedged=NEVER_TOUCHED,
+        problem=block_problem(blocks, rows),
+        answer=block_answer(blocks, rows),
     )
     solver = block_workspace(blocks, rows, ready=False)
     solver.settings.floor = KNOWN_SPEED

@@ -7,10 +7,10 @@ import enum
 from heelstrike.compiler.bundle import Bundle, array, cell
 from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats, Integers
-from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot
-from heelstrike.sim.spatial.memory import SpatialMemory
-from heelstrike.sim.spatial.table import DRY_JOINT, POINT
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.spatial.memory import SpatialReported, SpatialTally
+from heelstrike.sim.spatial.table import DRY_JOINT, POINT, BlockTable
 
 GONE = 1e-7
 """A contact point has left the ground when its gap exceeds this (m)."""
@@ -53,6 +53,9 @@ TOUCHDOWN, LIFTOFF, SLIP, STICK, JOINT_STOP, JOINT_SLIP, JOINT_STICK, ENERGY_GAI
     map(int, SpatialEventKind)
 )
 
+NO_IMPULSE = (0.0, 0.0, 0.0)
+"""Impulse of an event that has none."""
+
 
 class SpatialRecord(Bundle):
     """Rows of a run, one row an instant, and events."""
@@ -83,17 +86,18 @@ def allocate_spatial_record(robot: SpatialRobot, rows: int, events: int) -> Spat
 
 
 @kernel
-def begin_row(time: float, memory: SpatialMemory, record: SpatialRecord) -> None:
+def begin_row(
+    time: float, q: Floats, v: Floats, torque: Floats, contacts: Contacts, record: SpatialRecord
+) -> None:
     """Write what is known of an instant before its step."""
     row = record.rows
     record.time[row] = time
-    for i in range(memory.q.shape[0]):
-        record.position[row, i] = memory.q[i]
-    for i in range(memory.v.shape[0]):
-        record.velocity[row, i] = memory.v[i]
-    for i in range(memory.torque.shape[0]):
-        record.torque[row, i] = memory.torque[i]
-    contacts = memory.contacts
+    for i in range(q.shape[0]):
+        record.position[row, i] = q[i]
+    for i in range(v.shape[0]):
+        record.velocity[row, i] = v[i]
+    for i in range(torque.shape[0]):
+        record.torque[row, i] = torque[i]
     for contact in range(contacts.gap.shape[0]):
         record.gap[row, contact] = contacts.gap[contact]
         for k in range(3):
@@ -102,18 +106,21 @@ def begin_row(time: float, memory: SpatialMemory, record: SpatialRecord) -> None
 
 
 @kernel
-def finish_row(memory: SpatialMemory, record: SpatialRecord) -> None:
+def finish_row(
+    stop_torque: Floats, friction_torque: Floats, force: Floats, slip: Floats, residual: float,
+    record: SpatialRecord,
+) -> None:  # fmt: skip
     """Write the forces of the step that follows an instant."""
     row = record.rows
-    for i in range(memory.v.shape[0]):
-        record.stop_torque[row, i] = memory.stop_torque[i]
-        record.friction_torque[row, i] = memory.friction_torque[i]
-    for contact in range(memory.contacts.gap.shape[0]):
+    for i in range(stop_torque.shape[0]):
+        record.stop_torque[row, i] = stop_torque[i]
+        record.friction_torque[row, i] = friction_torque[i]
+    for contact in range(force.shape[0]):
         for k in range(3):
-            record.contact_force[row, contact, k] = memory.contacts.force[contact, k]
+            record.contact_force[row, contact, k] = force[contact, k]
         for k in range(2):
-            record.slip[row, contact, k] = memory.feet.slip[contact, k]
-    record.residual[row] = memory.assembly.answer.residual
+            record.slip[row, contact, k] = slip[contact, k]
+    record.residual[row] = residual
     record.rows = row + 1
 
 
@@ -133,29 +140,29 @@ def log_spatial_event(
 
 
 @kernel
-def note_deepest(model: SpatialModel, memory: SpatialMemory) -> None:
+def note_deepest(gap: Floats, tally: SpatialTally) -> None:
     """Keep the deepest penetration of the run."""
-    for contact in range(model.nc):
-        memory.tally.penetration = max(memory.tally.penetration, -memory.contacts.gap[contact])
+    for contact in range(gap.shape[0]):
+        tally.penetration = max(tally.penetration, -gap[contact])
 
 
 @kernel
 def note_spatial_events(
-    time: float, step: float, first_step: bool, certified: bool,
-    gained: bool, memory: SpatialMemory, record: SpatialRecord,
+    time: float, step: float, first_step: bool, v: Floats, slip: Floats, table: BlockTable,
+    reported: SpatialReported, record: SpatialRecord,
 ) -> None:  # fmt: skip
     """Find what happened in a step that has been taken, to every entry of the table.
 
     What stands on the ground, or at a stop, as the run begins does not get there.
     """
-    table, closed, slipping = memory.blocks, memory.reported.closed, memory.reported.slipping
+    closed, slipping = reported.closed, reported.slipping
     end = time + step
     for entry in range(table.kind.shape[0]):
         owner, kind = table.owner[entry], table.kind[entry]
         force = table.force[entry, 0], table.force[entry, 1], table.force[entry, 2]
         impulse = step * force[0], step * force[1], step * force[2]
         if kind == DRY_JOINT:
-            moves = int(abs(memory.v[owner]) > SLIDING)
+            moves = int(abs(v[owner]) > SLIDING)
             if not first_step and moves != slipping[entry]:
                 log_spatial_event(
                     end, JOINT_SLIP if moves == 1 else JOINT_STICK, owner, impulse, record
@@ -175,12 +182,8 @@ def note_spatial_events(
             if kind == POINT:
                 log_spatial_event(time, LIFTOFF, owner, impulse, record)
         if kind == POINT and closed[entry] == 1 and pushed:
-            s, t = memory.feet.slip[owner, 0], memory.feet.slip[owner, 1]
+            s, t = slip[owner, 0], slip[owner, 1]
             slides = int(s * s + t * t > SLIDING * SLIDING)
             if slides != slipping[entry]:
                 slipping[entry] = slides
                 log_spatial_event(end, SLIP if slides == 1 else STICK, owner, impulse, record)
-    if not certified:
-        log_spatial_event(end, UNCERTIFIED, -1, (0.0, 0.0, 0.0), record)
-    if gained:
-        log_spatial_event(end, ENERGY_GAIN, -1, (0.0, 0.0, 0.0), record)

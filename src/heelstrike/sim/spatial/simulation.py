@@ -173,7 +173,7 @@ class SpatialSimulation:
         self._loop, self._compile_s = spatial_loop()
         self._wall_s = 0.0
         self._records: list[SpatialRecord] = []
-        find_state(robot.model, self._ground.model(), self._memory)
+        self._find_state()
         if stop_when_fallen is None:
             stop_when_fallen = robot.floating and len(robot.feet) > 1
         height = height_of_mass(robot.model, self._ground.model(), self._memory.equations)
@@ -181,6 +181,13 @@ class SpatialSimulation:
         self.status: RunStatus = RunStatus.COMPLETED
         self.message = "not begun"
         self.error: BaseException | None = None
+
+    def _find_state(self) -> None:
+        memory = self._memory
+        find_state(
+            self.robot.model, self._ground.model(), memory.q, memory.v, memory.equations,
+            memory.blocks, memory.contacts, memory.feet,
+        )  # fmt: skip
 
     def _control_with(self, controller: Controller | None) -> None:
         """Begin with a controller."""
@@ -224,7 +231,7 @@ class SpatialSimulation:
     @property
     def contacts(self) -> Contacts:
         """Contact points now, with the forces of the step before."""
-        find_state(self.robot.model, self._ground.model(), self._memory)
+        self._find_state()
         return read_only(self._memory.contacts)
 
     @property

@@ -14,6 +14,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.spatial.certified_solve import solve_block_problem
 from heelstrike.contact.spatial.ground import SpatialGroundModel
 from heelstrike.contact.spatial.modes import SOLVED
+from heelstrike.contact.spatial.workspace import BlockWorkspace
 from heelstrike.dynamics.spatial.algebra import dot, spatial, velocity_at
 from heelstrike.dynamics.spatial.configurations import integrate
 from heelstrike.dynamics.spatial.equations import (
@@ -23,8 +24,10 @@ from heelstrike.dynamics.spatial.equations import (
 )
 from heelstrike.dynamics.spatial.kinematics import place_of, point_position
 from heelstrike.dynamics.spatial.rows import velocity_change
-from heelstrike.robot.model import Floats
+from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import SpatialModel
+from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.spatial.candidates import (
     NO_ANGLE,
     assemble,
@@ -38,6 +41,8 @@ from heelstrike.sim.spatial.impact import closes, solve_impact_of, touches_at_en
 from heelstrike.sim.spatial.memory import (
     SpatialAssembly,
     SpatialEquations,
+    SpatialFeet,
+    SpatialImpact,
     SpatialMemory,
     SpatialPushes,
 )
@@ -64,14 +69,14 @@ LEFT_IN_THE_GROUND = 1e-4
 
 
 @kernel
-def find_state(model: SpatialModel, ground: SpatialGroundModel, memory: SpatialMemory) -> None:
+def find_state(
+    model: SpatialModel, ground: SpatialGroundModel, q: Floats, v: Floats,
+    equations: SpatialEquations, table: BlockTable, contacts: Contacts, feet: SpatialFeet,
+) -> None:  # fmt: skip
     """Equations of motion and contact points of the state now."""
-    equations = memory.equations
-    state_equations(
-        model, memory.q, memory.v, equations.tree, equations.factor, equations.bias
-    )  # fmt: skip
-    locate_points(model, ground, equations.tree, memory.blocks, memory.contacts, memory.feet)
-    locate_ends(model, memory.q, memory.blocks)
+    state_equations(model, q, v, equations.tree, equations.factor, equations.bias)
+    locate_points(model, ground, equations.tree, table, contacts, feet)
+    locate_ends(model, q, table)
 
 
 @kernel
@@ -129,21 +134,20 @@ def add_impulses(
 
 @kernel
 def call_what_is_missed(
-    model: SpatialModel, step: float, equations: SpatialEquations, v: Floats,
-    memory: SpatialMemory,
+    model: SpatialModel, step: float, tree: SpatialWorkspace, feet: SpatialFeet, q: Floats,
+    v: Floats, count: int, candidate: Integers, table: BlockTable,
 ) -> bool:  # fmt: skip
     """Call what the velocity that was found takes through the ground or a stop; return if any."""
-    table = memory.blocks
     called = False
     for entry in range(table.kind.shape[0]):
         if table.kind[entry] == DRY_JOINT:
             continue
         taking_part = table.called[entry] == 1
-        for place in range(memory.assembly.count):
-            taking_part = taking_part or memory.assembly.candidate[place] == entry
+        for place in range(count):
+            taking_part = taking_part or candidate[place] == entry
         if taking_part:
             continue
-        speed = entry_speed(model, equations.tree, entry, table, memory.feet, memory.q, v)
+        speed = entry_speed(model, tree, entry, table, feet, q, v)
         if table.gap[entry] + step * speed < -CLOSED_GAP:
             table.called[entry] = 1
             called = True
@@ -167,15 +171,40 @@ def forgive_depth(step: float, table: BlockTable, assembly: SpatialAssembly) -> 
 
 
 @kernel
-def solve_positions(step: float, memory: SpatialMemory) -> int:
-    """Solve the problem of the positions; where there is no way out, without asking for one."""
-    assembly, impact = memory.assembly, memory.impact
-    status = solve_block_problem(assembly.problem, memory.solver, assembly.answer)
+def goes_on_wedged(steps: int, impact: SpatialImpact) -> bool:
+    """Whether the step before had no way out, and is not asked again: at 1, 2, 4, 8, ... steps."""
+    age = steps - impact.since
+    return impact.wedged == steps - 1 and age & (age - 1) != 0
+
+
+@kernel
+def note_relaxed(steps: int, impact: SpatialImpact) -> None:
+    """Keep that a step is not asked to come out of the ground."""
+    impact.relaxed = 1
+    if impact.wedged < steps - 1:
+        impact.since = steps
+    impact.wedged = steps
+
+
+@kernel
+def solve_positions(
+    step: float, steps: int, table: BlockTable, solver: BlockWorkspace,
+    assembly: SpatialAssembly, impact: SpatialImpact,
+) -> int:  # fmt: skip
+    """Solve the problem of the positions; where there is no way out, without asking for one.
+
+    Limbs that lie on several points, at the ends of their ranges, find none where each of their
+    points is in the ground by another billionth: each would have to slide its own way. They are
+    left there, and asked again when that is twice as long ago.
+    """
     impact.relaxed = 0
-    if status != SOLVED and forgive_depth(step, memory.blocks, assembly):
-        impact.relaxed = 1
-        memory.tally.relaxed += 1
-        status = solve_block_problem(assembly.problem, memory.solver, assembly.answer)
+    at_once = goes_on_wedged(steps, impact) and forgive_depth(step, table, assembly)
+    if at_once:
+        note_relaxed(steps, impact)
+    status = solve_block_problem(assembly.problem, solver, assembly.answer)
+    if status != SOLVED and not at_once and forgive_depth(step, table, assembly):
+        note_relaxed(steps, impact)
+        status = solve_block_problem(assembly.problem, solver, assembly.answer)
     return status
 
 
@@ -210,7 +239,8 @@ def solve_step_of(
             assemble(
                 model, step, table, memory.feet, memory.q, v, next_v, equations, assembly
             )  # fmt: skip
-            if solve_positions(step, memory) != SOLVED:
+            steps = memory.tally.steps
+            if solve_positions(step, steps, table, memory.solver, assembly, impact) != SOLVED:
                 worst = assembly.answer.residual
             memory.tally.residual = max(memory.tally.residual, assembly.answer.residual)
             add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
@@ -226,15 +256,20 @@ def solve_step_of(
             else:
                 for k in range(model.nv):
                     next_v[k] = impact.arriving[k]
-        if not call_what_is_missed(model, step, equations, impact.arriving, memory):
+        if not call_what_is_missed(
+            model, step, equations.tree, memory.feet, memory.q, impact.arriving, assembly.count,
+            assembly.candidate, table,
+        ):  # fmt: skip
             break
     return worst
 
 
 @kernel
-def note_answer_of(step: float, length: float, memory: SpatialMemory) -> None:
+def note_answer_of(
+    step: float, length: float, steps: int, impulse: Floats, assembly: SpatialAssembly,
+    table: BlockTable,
+) -> None:  # fmt: skip
     """Keep modes and impulses for the next step, and add up forces over the whole step."""
-    assembly, impact, table = memory.assembly, memory.impact, memory.blocks
     first = assembly.problem.first
     place = 0
     for entry in range(table.kind.shape[0]):
@@ -246,44 +281,44 @@ def note_answer_of(step: float, length: float, memory: SpatialMemory) -> None:
             continue
         table.mode[entry] = assembly.answer.mode[place]
         if table.kind[entry] != DRY_JOINT and touches_at_end(step, place, assembly):
-            table.touching[entry] = memory.tally.steps
+            table.touching[entry] = steps
         for i in range(table.size[entry]):
-            impulse = impact.impulse[first[place] + i]
             table.impulse[entry, i] = assembly.answer.impulse[first[place] + i]
-            table.force[entry, i] += impulse / length
+            table.force[entry, i] += impulse[first[place] + i] / length
         place += 1
 
 
 @kernel
-def share_forces(model: SpatialModel, q: Floats, memory: SpatialMemory) -> None:
+def share_forces(
+    model: SpatialModel, q: Floats, table: BlockTable, contact_force: Floats, stop_torque: Floats,
+    friction_torque: Floats,
+) -> None:  # fmt: skip
     """Write the mean forces of the step where records and controllers look for them."""
-    table = memory.blocks
     for k in range(model.nv):
-        memory.stop_torque[k] = 0.0
-        memory.friction_torque[k] = 0.0
+        stop_torque[k] = 0.0
+        friction_torque[k] = 0.0
     for entry in range(table.kind.shape[0]):
         owner, kind = table.owner[entry], table.kind[entry]
         if kind == POINT:
             for i in range(3):
-                memory.contacts.force[owner, i] = table.force[entry, i]
+                contact_force[owner, i] = table.force[entry, i]
         elif kind == STOP:
             k = model.first_velocity[owner]
-            memory.stop_torque[k] += table.side[entry] * table.force[entry, 0]
+            stop_torque[k] += table.side[entry] * table.force[entry, 0]
         elif kind == BALL_STOP:
             x, y, z = turn_of_ball(model, owner, q)
             share = table.force[entry, 0] / max(math.sqrt(x * x + y * y + z * z), NO_ANGLE)
             k = model.first_velocity[owner]
-            memory.stop_torque[k] -= share * x
-            memory.stop_torque[k + 1] -= share * y
-            memory.stop_torque[k + 2] -= share * z
+            stop_torque[k] -= share * x
+            stop_torque[k + 1] -= share * y
+            stop_torque[k + 2] -= share * z
         else:
-            memory.friction_torque[owner] += table.force[entry, 0]
+            friction_torque[owner] += table.force[entry, 0]
 
 
 @kernel
-def find_slip(model: SpatialModel, memory: SpatialMemory) -> None:
+def find_slip(model: SpatialModel, tree: SpatialWorkspace, v: Floats, feet: SpatialFeet) -> None:
     """Write the tangential velocity of every contact point at the end of the step."""
-    tree, feet = memory.equations.tree, memory.feet
     for contact in range(model.nc):
         foot = feet.foot[contact, 0], feet.foot[contact, 1], feet.foot[contact, 2]
         place = place_of(tree, foot)
@@ -294,16 +329,15 @@ def find_slip(model: SpatialModel, memory: SpatialMemory) -> None:
         for a in range(model.depth[last] + 1):
             k = model.chain[last, a]
             column = velocity_at(spatial(tree.motion, k), place)
-            first += dot(one, column) * memory.next_v[k]
-            second += dot(two, column) * memory.next_v[k]
+            first += dot(one, column) * v[k]
+            second += dot(two, column) * v[k]
         feet.slip[contact, 0] = first
         feet.slip[contact, 1] = second
 
 
 @kernel
-def begin_step(memory: SpatialMemory) -> None:
+def begin_step(table: BlockTable) -> None:
     """Forget the forces of the step before."""
-    table = memory.blocks
     for entry in range(table.kind.shape[0]):
         for i in range(3):
             table.force[entry, i] = 0.0
@@ -318,7 +352,7 @@ def take_step(
 
     Returns whether it could be done, and whether all of it is certified.
     """
-    begin_step(memory)
+    begin_step(memory.blocks)
     halvings, done = 0, 0
     parts = 1
     certified = True
@@ -326,7 +360,10 @@ def take_step(
     while done < parts:
         step = length / parts
         if done > 0:
-            find_state(model, ground, memory)
+            find_state(
+                model, ground, memory.q, memory.v, memory.equations, memory.blocks,
+                memory.contacts, memory.feet,
+            )  # fmt: skip
         worst = solve_step_of(model, time + done * step, step, resolves, memory)
         if worst > 0.0 and halvings < HALVINGS_OF_A_STEP:
             if halvings == 0:
@@ -339,10 +376,13 @@ def take_step(
             return False, False
         if worst > 0.0:
             certified = False
-        note_answer_of(step, length, memory)
+        note_answer_of(
+            step, length, memory.tally.steps, memory.impact.impulse, memory.assembly, memory.blocks
+        )  # fmt: skip
         gain += memory.impact.gain
+        memory.tally.relaxed += memory.impact.relaxed
         if done + 1 == parts:
-            find_slip(model, memory)
+            find_slip(model, memory.equations.tree, memory.next_v, memory.feet)
         integrate(model, memory.q, memory.impact.arriving, step, memory.q)
         for k in range(model.nv):
             memory.v[k] = memory.next_v[k]
@@ -350,5 +390,8 @@ def take_step(
         done += 1
     memory.tally.energy_gain += gain
     memory.tally.uncertified += not certified
-    share_forces(model, memory.q, memory)
+    share_forces(
+        model, memory.q, memory.blocks, memory.contacts.force, memory.stop_torque,
+        memory.friction_torque,
+    )  # fmt: skip
     return True, certified
