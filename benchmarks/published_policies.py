@@ -240,7 +240,7 @@ def hard(path: Path, policy: Policy, name: str, command: str, given: Any, step: 
 def mujoco_own(
     path: Path, policy: Policy, name: str, command: str, given: Any, step: float
 ) -> Walk:
-    """Walk in MuJoCo's own loop, as published: springs at every step, Euler, its default contact."""
+    """Walk in MuJoCo's own loop, as published: springs at every step, its default contact."""
     import mujoco
 
     text = path.read_text(encoding="utf-8")
