@@ -51,14 +51,14 @@ def spatial_robot(
             text,
             lambda spec, held: free_trunk(spec, held, floating=options.floating, label=label),
         )
-        return _robot(file, name or model_name(file, source))
+        return _robot(file, name or model_name(file, source), options)
 
 
-def _robot(file: MujocoFile, name: str) -> SpatialRobot:
+def _robot(file: MujocoFile, name: str, options: Options) -> SpatialRobot:
     links = read_spatial_links(file)
     held = {"equality constraints (closed loops, coupled joints, welds)": _holds(file)}
     tell_of_left_out(file, held | acting_parts(file))
-    points = read_spatial_points(file, links)
+    points = read_spatial_points(file, links, options.mesh_points)
     actuators = read_spatial_actuators(file)
     numbers = read_spatial_numbers(file)
     numbers["armature"] = numbers["armature"] + actuators.armature
