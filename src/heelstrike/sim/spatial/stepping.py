@@ -32,6 +32,7 @@ from heelstrike.sim.spatial.candidates import (
     NO_ANGLE,
     assemble,
     entry_speed,
+    is_far,
     list_candidates,
     locate_ends,
     locate_points,
@@ -145,7 +146,7 @@ def call_what_is_missed(
         taking_part = table.called[entry] == 1
         for place in range(count):
             taking_part = taking_part or candidate[place] == entry
-        if taking_part:
+        if taking_part or is_far(step, entry, table):
             continue
         speed = entry_speed(model, tree, entry, table, feet, q, v)
         if table.gap[entry] + step * speed < -CLOSED_GAP:
