@@ -22,7 +22,12 @@ from heelstrike.dynamics.spatial.equations import (
     solve_factorized,
     state_equations,
 )
-from heelstrike.dynamics.spatial.kinematics import place_of, point_position
+from heelstrike.dynamics.spatial.kinematics import (
+    link_velocities,
+    place_of,
+    point_position,
+    point_velocity,
+)
 from heelstrike.dynamics.spatial.rows import velocity_change
 from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
 from heelstrike.robot.model import Floats, Integers
@@ -316,22 +321,21 @@ def share_forces(
 
 
 @kernel
-def find_slip(model: SpatialModel, tree: SpatialWorkspace, v: Floats, feet: SpatialFeet) -> None:
-    """Write the tangential velocity of every contact point at the end of the step."""
+def find_slip(
+    model: SpatialModel, v: Floats, feet: SpatialFeet, tree: SpatialWorkspace, slip: Floats
+) -> None:
+    """Write the tangential velocity of every contact point at the end of the step.
+
+    The links of the tree have the velocities of then, afterwards.
+    """
+    link_velocities(model, v, tree)
     for contact in range(model.nc):
         foot = feet.foot[contact, 0], feet.foot[contact, 1], feet.foot[contact, 2]
-        place = place_of(tree, foot)
-        last = model.last_velocity[model.contact_link[contact]]
-        first = second = 0.0
+        speed = point_velocity(tree, model.contact_link[contact], foot)
         one = feet.frame[contact, 3], feet.frame[contact, 4], feet.frame[contact, 5]
         two = feet.frame[contact, 6], feet.frame[contact, 7], feet.frame[contact, 8]
-        for a in range(model.depth[last] + 1):
-            k = model.chain[last, a]
-            column = velocity_at(spatial(tree.motion, k), place)
-            first += dot(one, column) * v[k]
-            second += dot(two, column) * v[k]
-        feet.slip[contact, 0] = first
-        feet.slip[contact, 1] = second
+        slip[contact, 0] = dot(one, speed)
+        slip[contact, 1] = dot(two, speed)
 
 
 @kernel
@@ -385,7 +389,9 @@ def take_step(
             memory.tally.residual = max(memory.tally.residual, memory.impact.answer.residual)
         memory.tally.relaxed += memory.impact.relaxed
         if done + 1 == parts:
-            find_slip(model, memory.equations.tree, memory.next_v, memory.feet)
+            find_slip(
+                model, memory.next_v, memory.feet, memory.equations.tree, memory.feet.slip
+            )  # fmt: skip
         integrate(model, memory.q, memory.impact.arriving, step, memory.q)
         for k in range(model.nv):
             memory.v[k] = memory.next_v[k]
