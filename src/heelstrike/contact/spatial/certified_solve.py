@@ -19,11 +19,13 @@ from heelstrike.contact.spatial.modes import (
     NOT_FOUND,
     PROXIMAL,
     REGULARISED,
+    RESTARTS,
     SLIP,
     SOLVED,
 )
 from heelstrike.contact.spatial.newton import RIDGE, iterate_newton
 from heelstrike.contact.spatial.proximal import approach
+from heelstrike.contact.spatial.restarts import try_other_starts
 from heelstrike.contact.spatial.scaling import give_impulses, scale_blocks, take_impulses
 from heelstrike.contact.spatial.sticking import try_sticking
 from heelstrike.contact.spatial.workspace import (
@@ -32,7 +34,7 @@ from heelstrike.contact.spatial.workspace import (
     BlockWorkspace,
 )
 
-WAYS = 5
+WAYS = 6
 """How many ways there are."""
 
 FIRST_STEPS, NEXT_STEPS = 12, 40
@@ -110,6 +112,8 @@ def try_way(way: int, slips: bool, problem: BlockProblem, work: BlockWorkspace) 
                 break
             strength *= STRONGER
             ties *= 2
+    elif way == RESTARTS:
+        try_other_starts(problem, settings, scaled, tally, iterate, newton)
 
 
 @separate_kernel(_signature)

@@ -9,7 +9,7 @@ import enum
 
 OPEN, STICK, SLIP = range(3)
 
-LAST_MODES, NEWTON, GAUSS_SEIDEL, REGULARISED, PROXIMAL = range(5)
+LAST_MODES, NEWTON, GAUSS_SEIDEL, REGULARISED, PROXIMAL, RESTARTS = range(6)
 
 SOLVED, NOT_FOUND, IMPOSSIBLE = range(3)
 
@@ -39,6 +39,8 @@ class SpatialSolver(enum.Enum):
         The same, with small numbers added to the diagonal of Newton's matrix.
     ``PROXIMAL``
         Problems with a larger diagonal, one after the other, whose answers tend to one of this.
+    ``RESTARTS``
+        Newton's method from other impulses.
     """
 
     LAST_MODES = "last_modes"
@@ -46,6 +48,7 @@ class SpatialSolver(enum.Enum):
     GAUSS_SEIDEL = "gauss_seidel"
     REGULARISED = "regularised"
     PROXIMAL = "proximal"
+    RESTARTS = "restarts"
 
     @classmethod
     def from_code(cls, code: int) -> SpatialSolver:

@@ -116,6 +116,8 @@ class SpatialSimulation:
         Forces (x, y, z) from outside, each on a point of the robot over a window of time.
     on_error : OnError or str
         What becomes of an error in the controller, as for :class:`~heelstrike.Simulation`.
+    **others
+        Options that only the plane has; each is refused by its name.
 
     Attributes
     ----------

@@ -32,6 +32,7 @@ from heelstrike.sim.spatial.candidates import (
     NO_ANGLE,
     assemble,
     entry_speed,
+    is_far,
     list_candidates,
     locate_ends,
     locate_points,
@@ -145,7 +146,7 @@ def call_what_is_missed(
         taking_part = table.called[entry] == 1
         for place in range(count):
             taking_part = taking_part or candidate[place] == entry
-        if taking_part:
+        if taking_part or is_far(step, entry, table):
             continue
         speed = entry_speed(model, tree, entry, table, feet, q, v)
         if table.gap[entry] + step * speed < -CLOSED_GAP:
@@ -242,7 +243,6 @@ def solve_step_of(
             steps = memory.tally.steps
             if solve_positions(step, steps, table, memory.solver, assembly, impact) != SOLVED:
                 worst = assembly.answer.residual
-            memory.tally.residual = max(memory.tally.residual, assembly.answer.residual)
             add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
             for row in range(assembly.problem.first[assembly.count]):
                 impact.impulse[row] = assembly.answer.impulse[row]
@@ -251,7 +251,6 @@ def solve_step_of(
                 status = solve_impact_of(step, before, table, memory.solver, assembly, impact)
                 if status != SOLVED:
                     worst = impact.answer.residual
-                memory.tally.residual = max(memory.tally.residual, impact.answer.residual)
                 add_impulses(model, impact.impulse, equations, assembly, next_v)
             else:
                 for k in range(model.nv):
@@ -380,6 +379,10 @@ def take_step(
             step, length, memory.tally.steps, memory.impact.impulse, memory.assembly, memory.blocks
         )  # fmt: skip
         gain += memory.impact.gain
+        if memory.assembly.count > 0:
+            memory.tally.residual = max(memory.tally.residual, memory.assembly.answer.residual)
+        if memory.impact.happens == 1:
+            memory.tally.residual = max(memory.tally.residual, memory.impact.answer.residual)
         memory.tally.relaxed += memory.impact.relaxed
         if done + 1 == parts:
             find_slip(model, memory.equations.tree, memory.next_v, memory.feet)
