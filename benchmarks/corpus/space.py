@@ -149,6 +149,10 @@ class Pinocchio:
             self.model = pin.buildModelFromXML(mechanics(text), *root)
         except (ValueError, RuntimeError) as error:
             raise Refused(str(error)) from error
+        known = {*robot.joint_names, "root_joint"}
+        fixed = [self.model.getJointId(each) for each in self.model.names[1:] if each not in known]
+        if fixed:  # what moves no mass
+            self.model = pin.buildReducedModel(self.model, fixed, pin.neutral(self.model))
         if self.model.nv != robot.nv:
             raise Refused(f"Pinocchio has {self.model.nv} velocities")
         self.data = self.model.createData()
