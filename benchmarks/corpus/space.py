@@ -152,7 +152,10 @@ class Pinocchio:
         known = {*robot.joint_names, "root_joint"}
         fixed = [self.model.getJointId(each) for each in self.model.names[1:] if each not in known]
         if fixed:  # what moves no mass
-            self.model = pin.buildReducedModel(self.model, fixed, pin.neutral(self.model))
+            try:
+                self.model = pin.buildReducedModel(self.model, fixed, pin.neutral(self.model))
+            except ValueError as error:  # joints and links of one name
+                raise Refused(str(error)) from error
         if self.model.nv != robot.nv:
             raise Refused(f"Pinocchio has {self.model.nv} velocities")
         self.data = self.model.createData()
