@@ -20,7 +20,13 @@ from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.looks import is_file
 from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.reading import read_bodies, read_mjcf
-from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS, builtin_robots, load_robot
+from heelstrike.robot.library import (
+    NO_CONTACTS,
+    NO_MOTORS,
+    builtin_robots,
+    load_planar_robot,
+    load_robot,
+)
 from heelstrike.robot.loops import coupling_words, latch_words
 from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats, Integers, label
 from heelstrike.robot.plausibility import (
@@ -119,11 +125,15 @@ def inspect_robot(
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RobotWarning)
         try:
-            found: Robot | SpatialRobot | None = load_robot(robot, **how)
+            found: Robot | SpatialRobot | None = load_planar_robot(robot, **how)
         except RobotError as error:
             if path is None:
                 raise
-            refused, found = error, None
+            said_in_plane = len(caught)
+            found = _in_space(path, how)
+            refused = error if found is None else None
+            # What was said of the robot that it is not.
+            del caught[slice(said_in_plane, None) if found is None else slice(said_in_plane)]
         if path is not None:
             findings += _of_inertias(path, how, whole=isinstance(found, SpatialRobot))
         if refused is not None and path is not None:
@@ -142,6 +152,18 @@ def inspect_robot(
     if isinstance(found, Robot):
         findings += _of_robot(found)
     return Inspection(str(robot), found, tuple(dict.fromkeys(findings)), refused is None)
+
+
+def _in_space(path: Path, how: LoadOptions) -> SpatialRobot | None:
+    """Robot of three dimensions out of a file, None of one whose trunk does not move freely.
+
+    Such a one is a robot of the plane, of which a joint has slipped out of it.
+    """
+    try:
+        robot: Robot | SpatialRobot = load_robot(path, **how)
+    except RobotError:
+        return None
+    return robot if isinstance(robot, SpatialRobot) and robot.floating else None
 
 
 IN_SPACE = "They are taken as they are."

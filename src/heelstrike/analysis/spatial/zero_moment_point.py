@@ -17,7 +17,7 @@ from heelstrike.analysis.spatial.motion import centroidal_motion
 from heelstrike.analysis.spatial.support import carrying, plane_of, support_polygon
 from heelstrike.analysis.support import NOTHING
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.model import Floats
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.spatial.run import SpatialRun
 
 
@@ -66,7 +66,7 @@ def spatial_zero_moment_point(run: SpatialRun) -> SpatialZeroMomentPoint:
 
 
 def _place(
-    run: SpatialRun, row: int, contacts: Floats, force: Floats, origin: Floats, normal: Floats,
+    run: SpatialRun, row: int, contacts: Integers, force: Floats, origin: Floats, normal: Floats,
     least: float,
 ) -> Floats:  # fmt: skip
     """Zero moment point of some contact forces on the plane of an origin and a normal."""

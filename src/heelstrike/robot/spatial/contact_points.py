@@ -100,20 +100,20 @@ def read_spatial_points(file: MujocoFile, links: SpatialLinks, most: int) -> lis
     scales = contact_scales(file)
     touching = geoms_that_touch(file, links.of_body)
     _tell_of_self_collision(file, touching)
-    of_meshes: dict[tuple[int, float, float, float], list[Floats]] = {}
+    of_meshes: dict[tuple[int, tuple[float, ...]], list[Floats]] = {}
     for geom in touching:
         own = scales.get(file.given_name("geom", geom), {})
         if file.model.geom_type[geom] == MESH:
             link, place = _of_link(file, geom, links, mesh_corners(file, geom))
             friction = float(file.model.geom_friction[geom, 0])
-            key = link, friction, *(own.get(name, 1.0) for name in SCALES)
-            of_meshes.setdefault(key, []).append(place)
+            surface = friction, *(own.get(name, 1.0) for name in SCALES)
+            of_meshes.setdefault((link, surface), []).append(place)
             continue
         shape = list(_shape(file, geom, links))
         points += [_scaled(point, **own) for point in shape]
         if not shape:
             skipped.append(file.name("geom", geom))
-    for (link, friction, *own_scales), places in of_meshes.items():
+    for (link, (friction, *own_scales)), places in of_meshes.items():
         corners, reach = few_corners(np.concatenate(places), most)
         if reach > SAID:
             beyond[link] = max(reach, beyond.get(link, 0.0))
