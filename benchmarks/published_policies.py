@@ -10,8 +10,8 @@ unitreerobotics/unitree_rl_gym.
     python benchmarks/published_policies.py CLONE [--robots g1 h1 h1_2] [--commands forwards ...]
         [--steps 0.002] [--duration 60] [--friction 1.0] [--json FILE]
 
-Both engines get the same robot: the file's, without its meshes, so that its feet meet the ground as
-the file has them; its spheres and nothing else. A row tells how long the robot stayed up, its mean
+Both engines get the same robot: the file's, without the meshes of links that have something else to
+stand on, or nothing to do with the ground. A row tells how long the robot stayed up, its mean
 velocity along its own heading and yaw rate, the largest mean of the ground's force over 10 ms and
 over a step, the slip of feet that carry, how deep they are, and the time of a step (the policy's
 own apart). Mean values leave out the first two seconds.
@@ -95,7 +95,7 @@ class Policy:
 
     def targets(self, t: float, q: Floats, v: Floats) -> Floats:
         """Return where the springs pull from now on."""
-        begin = time.perf_counter()
+        begin = time.process_time()
         w, x, y, z = q[3:7]
         down = [2 * (w * y - z * x), -2 * (z * y + w * x), 1 - 2 * (w * w + z * z)]
         phase = 2.0 * np.pi * (t % CYCLE) / CYCLE
@@ -111,7 +111,7 @@ class Policy:
         given = self.torch.from_numpy(sensed.astype(np.float32)).unsqueeze(0)
         with self.torch.no_grad():
             self.action = self.network(given).numpy().squeeze().astype(np.float64)
-        self.seconds += time.perf_counter() - begin
+        self.seconds += time.process_time() - begin
         return self.action * self.config["action_scale"] + self.still
 
 
@@ -145,13 +145,27 @@ class Walk:
 
 
 def bare_file(clone: Path, robot: str, folder: Path) -> Path:
-    """Write a robot's file without its meshes; both engines read that."""
-    source = clone / "resources/robots" / FILES[robot]
+    """Write a robot's file with no meshes but those of leaves that have nothing else to stand on.
+
+    Both engines read that: what its feet are made of, and no hulls that meet each other.
+    """
+    source = (clone / "resources/robots" / FILES[robot]).resolve()
     root = ElementTree.parse(source).getroot()
-    for element in root.iter():
-        for child in list(element):
-            if child.tag == "mesh" or "mesh" in (child.get("type"), *child.attrib):
-                element.remove(child)
+    kept: set[str] = set()
+    for body in root.iter("body"):
+        shapes = [each for each in body.findall("geom") if each.get("contype") != "0"]
+        hulls = [each for each in shapes if "mesh" in each.attrib]
+        needed = body.find("body") is None and len(hulls) == len(shapes)
+        for geom in body.findall("geom"):
+            if "mesh" in geom.attrib and not (needed and geom in hulls):
+                body.remove(geom)
+        kept |= {geom.get("mesh", "") for geom in hulls if needed}
+    for asset in root.findall("asset"):
+        for mesh in asset.findall("mesh"):
+            if (mesh.get("name") or Path(mesh.get("file", "")).stem) not in kept:
+                asset.remove(mesh)
+    for compiler in root.findall("compiler"):
+        compiler.set("meshdir", str(source.parent / compiler.get("meshdir", "")))
     path = folder / f"{robot}.xml"
     path.write_text(ElementTree.tostring(root, encoding="unicode"), encoding="utf-8")
     return path
@@ -197,7 +211,7 @@ def hard(path: Path, policy: Policy, name: str, command: str, given: Any, step: 
         ground=hs.Ground(friction=given.friction), stop_when_fallen=True,
     )  # fmt: skip
     simulation.step()  # compiled before the clock starts
-    begin, policy.seconds = time.perf_counter(), 0.0
+    begin, policy.seconds = time.process_time(), 0.0
     first = float(simulation.state.q[2])
     instants = np.arange(1, round(given.duration / policy.period) + 1) * policy.period
     for instant in instants:
@@ -206,7 +220,7 @@ def hard(path: Path, policy: Policy, name: str, command: str, given: Any, step: 
         if status is not hs.RunStatus.COMPLETED or state.q[2] < FALLEN * first:
             break
         law.target[:] = policy.targets(float(instant), state.q, state.v)
-    seconds = time.perf_counter() - begin - policy.seconds
+    seconds = time.process_time() - begin - policy.seconds
     run: Any = simulation.record
     carries = run.contact_force[..., 0] > CARRIES
     slides = np.linalg.norm(run.slip, axis=-1) * carries
@@ -226,7 +240,7 @@ def hard(path: Path, policy: Policy, name: str, command: str, given: Any, step: 
 def mujoco_own(
     path: Path, policy: Policy, name: str, command: str, given: Any, step: float
 ) -> Walk:
-    """Walk in MuJoCo's own loop, as published: springs at every step, Euler, usual contact."""
+    """Walk in MuJoCo's own loop, as published: springs at every step, its default contact."""
     import mujoco
 
     text = path.read_text(encoding="utf-8")
@@ -247,9 +261,9 @@ def mujoco_own(
     for k in range(count):
         rows[0][k], rows[1][k] = data.qpos, data.qvel
         data.ctrl[:] = (target - data.qpos[7:]) * gains[0] - data.qvel[6:] * gains[1]
-        begin = time.perf_counter()
+        begin = time.process_time()
         mujoco.mj_step(model, data)
-        seconds += time.perf_counter() - begin
+        seconds += time.process_time() - begin
         sliding = []
         for one in range(data.ncon):
             mujoco.mj_contactForce(model, data, one, wrench)

@@ -75,6 +75,8 @@ _OUTCOMES = tuple(Outcome)
 _USUAL = TimeStepping()
 _CLOCK = Mold(Clock())
 
+AnyRobot = Robot | SpatialRobot
+
 CAN_GO_ON = (RunStatus.COMPLETED, RunStatus.INTERRUPTED)
 
 
@@ -998,7 +1000,7 @@ def simulate(
 
 @takes(SimulationError)
 def simulate(
-    robot: Robot | SpatialRobot,
+    robot: AnyRobot,
     controller: Controller | None = None,
     *,
     duration: float,
@@ -1009,7 +1011,7 @@ def simulate(
 
     Parameters
     ----------
-    robot : Robot
+    robot : Robot or SpatialRobot
         The robot.
     controller : object with ``torque(t, state, contacts)``, or None
         Decides the joint torques; None applies none.

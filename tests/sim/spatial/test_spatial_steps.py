@@ -162,7 +162,7 @@ def test_a_ball_lands_on_a_box_and_rolls_off_its_edge(made: Maker) -> None:
     )
     assert run.position[-1, 0] > 0.7
     assert run.position[-1, 2] == pytest.approx(0.1, abs=1e-9)
-    assert np.min(run.gap) >= -1e-6
+    assert np.min(run.gap) >= -2e-5  # the way round the edge bends by (h v)² / r in a step
 
 
 def test_a_controller_in_python_is_asked_every_period(made: Maker) -> None:
