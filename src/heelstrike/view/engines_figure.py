@@ -40,11 +40,13 @@ def draw_engines(walks: Sequence[tuple[str, str, float, Mapping[str, Any]]]) -> 
             place = names.index(name)
             color = INK if name == OURS else f"C{place % 10}"
             best = settings == "best" or (name, "best") not in series
-            own = sorted(
-                (f["computing_s"], f["position"], f["walks"])
-                for n, s, _, f in walks
+            mine = [
+                (step, f)
+                for n, s, step, f in walks
                 if (n, s) == (name, settings) and f["position"] > 0.0
-            )
+            ]
+            found = sorted(mine, key=lambda each: each[0])
+            own = [(f["computing_s"], f["position"], f["walks"]) for _, f in found]
             opacity = 1.0 if best else FAINT
             times, errors = [t for t, *_ in own], [e for _, e, _ in own]
             axes.plot(times, errors, "-" if best else ":", color=color, lw=1.0, alpha=opacity)

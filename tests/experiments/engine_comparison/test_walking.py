@@ -87,7 +87,9 @@ def test_its_figures_do_not_differ_from_itself(walked: Run, direct: Run, gait: h
 def test_a_walk_that_is_not_far_enough_does_not_walk(
     walked: Run, direct: Run, gait: hs.Gait
 ) -> None:
-    assert not walk_figures(walked, direct, gait, STEPS + 1).walks
+    found = walk_figures(walked, direct, gait, STEPS + 1)
+    assert not found.walks
+    assert found.ending == "completed: 2 of 3 steps"
 
 
 def test_without_torques_it_falls_and_says_so(scenario: Scenario, gait: hs.Gait) -> None:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from heelstrike.analysis import energy_balance, max_slip
-from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
+from heelstrike.analysis.diagnosis.falls import Fall, first_cause, walked_on
 from heelstrike.analysis.support import walking_steps
 from heelstrike.analysis.tracking import tracking_error
 from heelstrike.experiments.comparison import landing_impulse, root_mean_square, sampled
@@ -109,7 +109,7 @@ def walk_figures(
     return WalkFigures(
         walks=walks,
         steps=len(taken),
-        ending=run.status.value + (f": {fall}" if fall else ""),
+        ending=_ending(run, fall, len(taken), steps),
         tracking_rad=tracking_error(run, gait).rms,
         position=float(np.sqrt(np.mean(apart**2))),
         touchdown_s=max((abs(a.touchdown - b.touchdown) for a, b in pairs), default=NONE),
@@ -123,6 +123,14 @@ def walk_figures(
         step_us=1e6 * run.timing.wall_s / max(run.steps, 1),
         computing_s=run.timing.wall_s,
     )
+
+
+def _ending(run: Run, fall: Fall | None, taken: int, steps: int) -> str:
+    """How a walk ended, and what went wrong."""
+    if fall is not None:
+        return f"{run.status.value}: {fall}"
+    short = run.completed and taken < steps
+    return f"{run.status.value}: {taken} of {steps} steps" if short else run.status.value
 
 
 def _noise(run: Run, normal: Floats, landings: list[float]) -> float:

@@ -118,11 +118,11 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
             _creep(scenes, name),
         ]
         for found in walks.values():
-            row += [_walks_at(found, name, which) for which in ("defaults", "best")]
+            row += [_walks_at(found, name, which) for which in _settings(found)]
         ours.append(row)
     headings = ["simulator", "contact", "Coulomb's law", "restitution", "certificate", "creep mm/s"]
-    for law in walks:
-        headings += [f"{law} walks, defaults", f"{law} walks, best"]
+    for law, found in walks.items():
+        headings += [f"{law}, {which}" for which in _settings(found)]
     return (
         f"## Table 1, renewed\n\nOf {date.today().isoformat()}, in the paper's columns:\n\n"
         + _table(
@@ -132,9 +132,14 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
         )
         + "\nIn ours. Creep is how fast a cube slides on a slope that is 0.05 rad less steep than "
         "its angle of friction, at defaults and a step of 1 ms. The last columns have the steps of "
-        "the engine, in ms, at which bravo7 takes all its steps.\n\n"
+        "the engine, in ms, at which bravo7 takes all its steps under a law.\n\n"
         + _table(headings, ours)
     )  # fmt: skip
+
+
+def _settings(found: Mapping[str, Any]) -> list[str]:
+    """Settings that a comparison has rows of."""
+    return list(dict.fromkeys(row["settings"] for row in found["rows"]))
 
 
 def _creep(scenes: Mapping[str, Any], name: str) -> str:
@@ -148,7 +153,11 @@ def _creep(scenes: Mapping[str, Any], name: str) -> str:
 def _walks_at(found: Mapping[str, Any], name: str, which: str) -> str:
     rows = [r for r in found["rows"] if r["engine"] == name and r["settings"] == which]
     if not rows:
-        return "as it comes" if which == "best" else "–"
+        return (
+            "as it comes"
+            if which == "best" and not best_settings().get(name, {}).get("settings")
+            else "–"
+        )
     told = [f"{1e3 * r['step_s']:g}" for r in rows if r["figures"] and r["figures"]["walks"]]
     return ", ".join(told) or "none"
 
