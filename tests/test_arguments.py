@@ -101,6 +101,7 @@ def usual() -> dict[str, dict[str, Any]]:
         "load_run": {"path": "run.nc"},
         "load_snapshot": {"path": "kept.npz"},
         "make_invariant": {"gait": PhasedGait()},
+        "mimic": {"path": "walk.csv"},
         "monodromy": walked,
         "compare_planners": {"robot": robot},
         "optimize_gait": {"robot": robot},

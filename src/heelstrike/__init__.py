@@ -108,6 +108,7 @@ if TYPE_CHECKING:
     from heelstrike.experiments.campaigns import CampaignResults as CampaignResults
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.experiments.engine_comparison import compare_engines as compare_engines
+    from heelstrike.experiments.people import mimic as mimic
     from heelstrike.experiments.planners import PlannerComparison as PlannerComparison
     from heelstrike.experiments.planners import compare_planners as compare_planners
     from heelstrike.experiments.spring_mass import SpringMass as SpringMass
@@ -291,6 +292,7 @@ _HOME = {
     "load_run": "heelstrike.sim",
     "load_snapshot": "heelstrike.sim",
     "make_invariant": "heelstrike.gait",
+    "mimic": "heelstrike.experiments.people",
     "monodromy": "heelstrike.analysis.stability.monodromy",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",

@@ -175,7 +175,7 @@ def test_robots_that_cannot(stride: Stride) -> None:
 
 
 def test_moments_of_one_who_stands() -> None:
-    """One leg ahead, each plate's force under an ankle: what an ankle bears is its foot's weight."""
+    """One leg ahead, a force under each ankle: what an ankle bears is the weight of its foot."""
     robot = hs.human(70.0, 1.75)
     time = np.arange(50) / 50.0
     posture = np.array([-0.3, 0.0, 0.3, 0.3, 0.0, -0.3])

@@ -22,6 +22,8 @@ from heelstrike.robot.robot import Robot
 
 FORCE_MARGIN = 0.1
 """Share of the weight that both ends of a flat sole bear at least: the law can correct the rest."""
+LANDING = 0.15
+"""Least speed (m/s) at which heels, and toes as the foot rolls flat, come down."""
 CLEARANCE = 0.01
 """How high a foot in the air is kept half-way, as a share of the leg: people clear little."""
 SHORTER, LONGER = 0.5, 1.6
@@ -102,6 +104,7 @@ def nearest_motion(
         asked: dict[str, Any] = {
             "distance": 0.5 * wanted.length, "duration": 0.5 * wanted.duration,
             "friction": friction, "force_margin": FORCE_MARGIN * robot.weight,
+            "landing_speed": LANDING,
             "clearance": CLEARANCE * wanted.stride.leg,
         }  # fmt: skip
         try:

@@ -11,7 +11,7 @@ import casadi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.arguments import are_numbers, takes
+from heelstrike.arguments import are_numbers, shown, takes
 from heelstrike.dynamics import contact_jacobian, contact_positions
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.cost import Cost, OwnCost, costs_of
@@ -64,6 +64,7 @@ def optimize_motion(
     clearance: float = 0.03,
     slope: float = 0.0,
     force_margin: float = 0.0,
+    landing_speed: float = 0.0,
     cost: Cost | str | Mapping[Cost | str, float] | OwnCost = "torque",
     warm_start: Motion | None = None,
     guess: Callable[[float], ArrayLike] | None = None,
@@ -106,6 +107,9 @@ def optimize_motion(
     force_margin : float
         Least normal force (N) at both ends of a sole that stands flat: it keeps the zero moment
         point off its edges, so that a law that follows the motion can correct it.
+    landing_speed : float
+        Least speed towards the ground (m/s) of points that come down. What lands slowly lands late,
+        or early, by small errors.
     cost : str, mapping or function
         As for :func:`~heelstrike.gait.optimize.optimize_gait`; per metre where neither the distance
         nor speed and duration are fixed.
@@ -149,7 +153,7 @@ def optimize_motion(
     request = checked_request(
         robot, phases, repeat=repeat, distance=distance, duration=duration, speed=speed,
         start=start, end=end, friction=friction, clearance=clearance, slope=slope, cost=cost,
-        force_margin=force_margin, guess=guess,
+        force_margin=force_margin, landing_speed=landing_speed, guess=guess,
     )  # fmt: skip
     if not 1 <= starts <= len(STARTS):
         raise GaitError(f"starts must be from 1 to {len(STARTS)}, got {starts!r}")
@@ -196,7 +200,7 @@ def checked_request(
     for name, value in asked.items():
         if value is not None and not (np.isfinite(value) and value > 0.0):
             raise GaitError(f"{name} must be positive, got {value}")
-    for name in ("friction", "clearance", "force_margin"):
+    for name in ("friction", "clearance", "force_margin", "landing_speed"):
         if not (np.isfinite(others[name]) and others[name] >= 0.0):
             raise GaitError(f"{name} must not be negative, got {others[name]}")
     if not abs(others["slope"]) < STEEPEST:
@@ -306,6 +310,8 @@ def _known(program: MotionProgram, motion: Motion | None) -> list[Floats]:
     """Unknowns of a motion that is given to start from."""
     if motion is None:
         return []
+    if not isinstance(motion, Motion):
+        raise GaitError(f"warm_start must be a Motion or None, got {shown(motion)}")
     request = program.request
     motion.check_robot(request.robot)
     names = request.robot.contact_names

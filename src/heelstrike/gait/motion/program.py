@@ -412,6 +412,8 @@ class MotionProgram:
                 Kind.IMPULSE: point in landing.normal,
                 Kind.IMPULSE_FRICTION: not landing.points.isdisjoint(row.of),
             }[row.kind]
+            if row.kind is Kind.ARRIVE:
+                upper[k] = -request.landing_speed
             if not used:
                 lower[k], upper[k] = -np.inf, np.inf
         return lower, upper

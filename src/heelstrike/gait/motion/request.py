@@ -49,6 +49,8 @@ class MotionRequest:
     """Angle (rad) at which the ground ascends ahead."""
     force_margin: float
     """Least normal force (N) at both ends of a sole that stands flat."""
+    landing_speed: float
+    """Least speed towards the ground (m/s) of points that come down."""
     cost: Any
     """What is to be least."""
     speed: float | None
