@@ -12,7 +12,7 @@ from spatial_robots import Maker
 import heelstrike as hs
 from heelstrike.errors import ControllerError, RunFileError, SimulationError
 from heelstrike.sim.spatial.record import SpatialEventKind
-from heelstrike.sim.spatial.run import SpatialRun
+from heelstrike.sim.spatial.run import SpatialRun, tangents_of
 
 G = 9.81
 BLOCK = (
@@ -321,3 +321,33 @@ def test_world_forces_are_those_of_contact_axes_turned(made: Maker) -> None:
     run = hs.simulate(robot, state=hs.State(q, np.zeros(6)), ground=ground, duration=0.05)
     total = np.sum(run.world_force[-1], axis=0)
     assert total == pytest.approx([0.0, 0.0, 2.0 * G], abs=1e-9)
+
+
+def test_ground_of_the_plane_is_taken_for_all_y(made: Maker) -> None:
+    """A slope that climbs along x is the same ground; one with a profile is refused."""
+    robot = made(BALL)
+    state = moved(robot, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0], 0.3)
+    slope = 0.2
+    normal = (-np.sin(slope), 0.0, np.cos(slope))
+    flat = hs.simulate(
+        robot, state=state, duration=0.4, ground=hs.Ground(friction=0.4, slope=slope)
+    )
+    space = hs.simulate(
+        robot, state=state, duration=0.4, ground=hs.SpatialGround(friction=0.4, normal=normal)
+    )
+    assert flat.position[-1] == pytest.approx(space.position[-1], abs=1e-12)
+    assert flat.velocity[-1, 0] < -0.1  # it rolls down
+    with pytest.raises(SimulationError, match="profile"):
+        hs.simulate(
+            robot, state=state, duration=0.1,
+            ground=hs.Ground.stairs(rise=0.1, tread=0.3, count=2),
+        )  # fmt: skip
+
+
+def test_the_first_tangent_is_that_of_the_conventions() -> None:
+    """World x less its part along the normal; world y where the normal is along x."""
+    normal = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, 0.6, 0.8], [1.0, 0.0, 0.0]])
+    first, second = tangents_of(normal)
+    wanted = [[1.0, 0.0, 0.0], [0.8, 0.0, -0.6], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    assert first == pytest.approx(np.array(wanted), abs=1e-15)
+    assert second == pytest.approx(np.cross(normal, first), abs=1e-15)
