@@ -351,3 +351,55 @@ def test_the_first_tangent_is_that_of_the_conventions() -> None:
     wanted = [[1.0, 0.0, 0.0], [0.8, 0.0, -0.6], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
     assert first == pytest.approx(np.array(wanted), abs=1e-15)
     assert second == pytest.approx(np.cross(normal, first), abs=1e-15)
+
+
+def test_a_snapshot_is_taken_up_exactly(made: Maker) -> None:
+    """In the middle of sliding, with what a compiled law remembers; others are refused."""
+    robot = made(BLOCK)
+    state = moved(robot, [0.5, 0.2, 0.0, 0.1, 0.0, 2.0])
+    simulation = hs.Simulation(robot, state=state)
+    simulation.advance(0.02)
+    kept = simulation.snapshot()
+    assert kept.time == pytest.approx(0.02)
+    simulation.advance(0.05)
+    there = simulation.state
+    simulation.restore(kept)
+    assert simulation.time == pytest.approx(0.02)
+    simulation.advance(0.05)
+    assert np.array_equal(simulation.state.q, there.q)
+    assert np.array_equal(simulation.state.v, there.v)
+    other = made(BALL)
+    with pytest.raises(SimulationError, match="another robot"):
+        hs.Simulation(other, state=other.reference_state()).restore(kept)
+
+
+def test_a_controller_in_python_takes_part_in_snapshots_or_is_asked_to(made: Maker) -> None:
+    robot = made(ARM.format(joint=""), MOTOR)
+
+    class Counts:
+        calls = 0
+
+        def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+            self.calls += 1
+            return np.array([0.1 * self.calls])
+
+    class Remembers(Counts):
+        def snapshot(self) -> list[float]:
+            return [self.calls]
+
+        def restore(self, numbers: np.ndarray) -> None:
+            self.calls = int(numbers[0])
+
+    simulation = hs.Simulation(robot, Counts(), state=robot.reference_state())
+    with pytest.raises(ControllerError, match="takes no part in snapshots"):
+        simulation.snapshot()
+    law = Remembers()
+    simulation = hs.Simulation(robot, law, state=robot.reference_state())
+    simulation.advance(0.005)
+    kept, calls = simulation.snapshot(), law.calls
+    simulation.advance(0.01)
+    there = simulation.state
+    simulation.restore(kept)
+    assert law.calls == calls
+    simulation.advance(0.01)
+    assert np.array_equal(simulation.state.q, there.q)
