@@ -10,7 +10,7 @@ import numpy as np
 from heelstrike.experiments.engines.packages import simulators
 from heelstrike.experiments.engines.peer import Peer
 from heelstrike.experiments.engines.scenario import Scenario
-from heelstrike.robot import State
+from heelstrike.robot import Robot, State
 from heelstrike.robot.files.robot_json import robot_of_entries
 
 _made: list[Peer] = []
@@ -42,6 +42,7 @@ NOTHING = np.zeros(0)
 
 def _make(asked: dict[str, Any]) -> tuple[dict[str, Any], Any]:
     robot = robot_of_entries(asked["robot"])
+    assert isinstance(robot, Robot)  # engines walk in the plane
     state = State(robot.model.reference, np.zeros(robot.nv))
     scenario = Scenario(
         "served", robot, state, asked["step"], friction=asked["friction"],
