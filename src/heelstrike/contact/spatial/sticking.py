@@ -45,36 +45,33 @@ STUCK = 1e-12
 
 @kernel
 def factorize(size: int, matrix: Floats) -> bool:
-    """Replace the upper half of a positive matrix by D U, with A = Uᵀ D U and 1/D on the diagonal.
-
-    Rows are subtracted from rows, which compiled code does several numbers at a time.
-    """
-    for k in range(size):
-        if not matrix[k, k] > 0.0:
-            return False
-        inverse = 1.0 / matrix[k, k]
-        for i in range(k + 1, size):
-            factor = matrix[k, i] * inverse
-            if factor != 0.0:
-                for j in range(i, size):
-                    matrix[i, j] -= factor * matrix[k, j]
-        matrix[k, k] = inverse
+    """Replace the lower half of a positive matrix by its Cholesky factor, 1/d on the diagonal."""
+    for i in range(size):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            if i > j:
+                matrix[i, j] = total * matrix[j, j]
+                continue
+            if not total > 0.0:
+                return False
+            matrix[i, i] = 1.0 / math.sqrt(total)
     return True
 
 
 @kernel
 def solve_factored(size: int, factor: Floats, right: Floats) -> None:
     """Replace a right side by the solution, with the factor of :func:`factorize`."""
-    for k in range(size):
-        own = right[k] * factor[k, k]
-        for i in range(k + 1, size):
-            right[i] -= factor[k, i] * own
-        right[k] = own
-    for k in range(size - 1, -1, -1):
-        total = 0.0
-        for i in range(k + 1, size):
-            total += factor[k, i] * right[i]
-        right[k] -= total * factor[k, k]
+    for i in range(size):
+        total = right[i]
+        for k in range(i):
+            total -= factor[i, k] * right[k]
+        right[i] = total * factor[i, i]
+    for i in range(size - 1, -1, -1):
+        right[i] *= factor[i, i]
+        for k in range(i):
+            right[k] -= factor[i, k] * right[i]
 
 
 @kernel
@@ -101,7 +98,7 @@ def hold(size: int, scaled: ScaledBlocks, newton: NewtonSystem, x: Floats) -> bo
     """Find the impulses of least norm that hold the listed rows; return success."""
     row, system, right, matrix = newton.row, newton.system, newton.right, scaled.matrix
     for i in range(size):
-        for j in range(i, size):
+        for j in range(i + 1):
             system[i, j] = matrix[row[i], row[j]]
         system[i, i] += FIRM
     if not factorize(size, system):
