@@ -196,6 +196,7 @@ def _members(bundle: Any) -> dict[str, Any]:
 def calls() -> dict[str, Callable[..., Any]]:
     """Calls, right but for what is added to them, of all that take keywords by any name."""
     robot = synthetic_runs.box()
+    in_space = heelstrike.load_robot("bravo7", dimension=3)
     run = synthetic_runs.make_run(robot, np.linspace(0.0, 0.1, 3))
     based = heelstrike.RobotBuilder("made up")
     trunk = based.floating_base("trunk", mass=1.0, inertia=1.0)
@@ -212,6 +213,9 @@ def calls() -> dict[str, Callable[..., Any]]:
             heelstrike.simulate, robot, state=robot.reference_state(), duration=0.0
         ),
         "heelstrike.robot.Model.made": partial(type(robot.model).made, **_members(robot.model)),
+        "heelstrike.robot.SpatialModel.made": partial(
+            type(in_space.model).made, **_members(in_space.model)
+        ),
         "heelstrike.Bundle.replaced": robot.model.replaced,
         "heelstrike.Run.plot": partial(run.plot, "torque"),
         "heelstrike.Run.animate": partial(run.animate, "film.gif"),

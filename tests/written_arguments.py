@@ -16,9 +16,13 @@ from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.compilation import Kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.robot.model import Model
+from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.contacts.straight_line import KERNELS
 
 NOWHERE: frozenset[tuple[str, ...]] = frozenset()
+
+ROBOTS = {Model, SpatialModel}
+"""The numbers of a robot, to which no kernel writes."""
 
 
 def kernels_of(package: ModuleType) -> Iterator[Kernel]:
@@ -284,7 +288,7 @@ def leaves_of(kind: type | None) -> int:
     """
     if kind is None:
         return 1
-    if kind is Model:
+    if kind in ROBOTS:
         return 0
     return sum(
         leaves_of(each if holds_others(each) else None) for each in members_of(kind).values()
@@ -302,7 +306,7 @@ def use_of(kernel: Kernel) -> int:
     touched = {
         path
         for path in touched_by(kernel)
-        if Model not in [kind_at(kinds, path[:k]) for k in range(1, len(path))]
+        if not ROBOTS & {kind_at(kinds, path[:k]) for k in range(1, len(path))}
     }
     whole = {path for path in touched if kind_at(kinds, path) is not None}
     inside = {path for path in touched if any(path[:k] in whole for k in range(1, len(path)))}

@@ -44,14 +44,14 @@ def peer_of(path: Path, text: str, forward: Floats, floating: bool) -> Peer:
         return MuJoCo(path, forward)
     if "<sdf" in text:
         return Drake(path, text, "sdf", forward, True)
-    mechanics = _mechanics(text)
+    text = mechanics(text)
     try:
-        return Pinocchio(mechanics, forward, floating)
+        return Pinocchio(text, forward, floating)
     except Refused:
-        return Drake(path, mechanics, "urdf", forward, floating)
+        return Drake(path, text, "urdf", forward, floating)
 
 
-def _mechanics(text: str) -> str:
+def mechanics(text: str) -> str:
     """A URDF without shapes and drives, whose oddities keep engines from the rest."""
     plain = re.sub(r"\sxmlns=[\"'][^\"']*[\"']", "", text[text.index("<robot") :].rstrip("\0 \n"))
     root = ElementTree.fromstring(plain)

@@ -58,9 +58,11 @@ if TYPE_CHECKING:
     from heelstrike.compiler.bundle import number as number
     from heelstrike.compiler.bundle import part as part
     from heelstrike.contact import ActiveContacts as ActiveContacts
+    from heelstrike.contact import Box as Box
     from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
     from heelstrike.contact import GroundShape as GroundShape
+    from heelstrike.contact import SpatialGround as SpatialGround
     from heelstrike.contact import contact_forward_dynamics as contact_forward_dynamics
     from heelstrike.contact import contact_inverse_dynamics as contact_inverse_dynamics
     from heelstrike.contact import contact_kinematics as contact_kinematics
@@ -90,6 +92,7 @@ if TYPE_CHECKING:
     from heelstrike.control import ZeroMomentPointRegulation as ZeroMomentPointRegulation
     from heelstrike.control import controller as controller
     from heelstrike.control import solve_quadratic_program as solve_quadratic_program
+    from heelstrike.control.spatial.hold_posture import HoldPosture as HoldPosture
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
     from heelstrike.errors import GaitError as GaitError
@@ -104,13 +107,17 @@ if TYPE_CHECKING:
     from heelstrike.experiments.campaigns import Campaign as Campaign
     from heelstrike.experiments.campaigns import CampaignResults as CampaignResults
     from heelstrike.experiments.comparison import compare as compare
+    from heelstrike.experiments.engine_comparison import compare_engines as compare_engines
     from heelstrike.experiments.people import mimic as mimic
+    from heelstrike.experiments.planners import PlannerComparison as PlannerComparison
+    from heelstrike.experiments.planners import compare_planners as compare_planners
     from heelstrike.experiments.spring_mass import SpringMass as SpringMass
     from heelstrike.gait import ContactPhase as ContactPhase
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import GaitFamily as GaitFamily
     from heelstrike.gait import Motion as Motion
     from heelstrike.gait import PhasedGait as PhasedGait
+    from heelstrike.gait import Planner as Planner
     from heelstrike.gait import Repeat as Repeat
     from heelstrike.gait import StepFamily as StepFamily
     from heelstrike.gait import gait_family as gait_family
@@ -120,9 +127,11 @@ if TYPE_CHECKING:
     from heelstrike.gait import make_invariant as make_invariant
     from heelstrike.gait import optimize_gait as optimize_gait
     from heelstrike.gait import optimize_motion as optimize_motion
+    from heelstrike.gait import plan_motion as plan_motion
     from heelstrike.robot import Robot as Robot
     from heelstrike.robot import RobotBuilder as RobotBuilder
     from heelstrike.robot import RobotWarning as RobotWarning
+    from heelstrike.robot import SpatialRobot as SpatialRobot
     from heelstrike.robot import State as State
     from heelstrike.robot import builtin_robots as builtin_robots
     from heelstrike.robot import inspect_robot as inspect_robot
@@ -170,6 +179,7 @@ _HOME = {
     "Actuated": "heelstrike.control",
     "Batch": "heelstrike.sim",
     "BatchResult": "heelstrike.sim",
+    "Box": "heelstrike.contact",
     "Bundle": "heelstrike.compiler.bundle",
     "Campaign": "heelstrike.experiments.campaigns",
     "CampaignResults": "heelstrike.experiments.campaigns",
@@ -201,6 +211,7 @@ _HOME = {
     "GroundShape": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
     "HeldTorque": "heelstrike.sim",
+    "HoldPosture": "heelstrike.control.spatial.hold_posture",
     "HuntCrossley": "heelstrike.sim",
     "ImpulseSet": "heelstrike.sim",
     "InertialUnit": "heelstrike.control",
@@ -215,6 +226,8 @@ _HOME = {
     "Motion": "heelstrike.gait",
     "MotionTracking": "heelstrike.control",
     "PhasedGait": "heelstrike.gait",
+    "Planner": "heelstrike.gait",
+    "PlannerComparison": "heelstrike.experiments.planners",
     "Policy": "heelstrike.control",
     "Push": "heelstrike.sim",
     "Repeat": "heelstrike.gait",
@@ -232,6 +245,8 @@ _HOME = {
     "SimulationError": "heelstrike.errors",
     "SimulationWarning": "heelstrike.sim",
     "Snapshot": "heelstrike.sim",
+    "SpatialGround": "heelstrike.contact",
+    "SpatialRobot": "heelstrike.robot",
     "SpringMass": "heelstrike.experiments.spring_mass",
     "StandingLQR": "heelstrike.control",
     "State": "heelstrike.robot",
@@ -250,6 +265,8 @@ _HOME = {
     "builtin_robots": "heelstrike.robot",
     "cell": "heelstrike.compiler.bundle",
     "compare": "heelstrike.experiments.comparison",
+    "compare_engines": "heelstrike.experiments.engine_comparison",
+    "compare_planners": "heelstrike.experiments.planners",
     "constrained": "heelstrike.sim",
     "contact_forward_dynamics": "heelstrike.contact",
     "contact_inverse_dynamics": "heelstrike.contact",
@@ -281,6 +298,7 @@ _HOME = {
     "optimize_gait": "heelstrike.gait",
     "optimize_motion": "heelstrike.gait",
     "part": "heelstrike.compiler.bundle",
+    "plan_motion": "heelstrike.gait",
     "report": "heelstrike.view.report",
     "run_derivatives": "heelstrike.sim.linearized.derivatives",
     "saltation_matrix": "heelstrike.contact",

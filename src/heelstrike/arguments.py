@@ -29,6 +29,7 @@ NUMBERS = "iuf"
 
 INSTEAD = {
     "Robot": "hs.load_robot(...) makes one",
+    "SpatialRobot": "hs.load_robot(file, dimension=3) makes one",
     "Gait": "hs.optimize_gait(robot, ...) or hs.load_gait(file, robot=robot) makes one",
     "PhasedGait": "hs.PhasedGait.from_gait(robot, gait) makes one",
     "StepFamily": "hs.StepFamily.around(phased_gait) makes one",

@@ -1,7 +1,7 @@
 """What holds for every stock controller: one suite for all of them.
 
 Each law is compiled and the same in Python, says what it does in a run when it is asked itself,
-begins anew with every run, lives through snapshots, pickles and batches, and does the same under
+starts again with every run, lives through snapshots, pickles and batches, and does the same under
 both methods.
 """
 

@@ -31,7 +31,11 @@ METHODS = [kind for kind in Method.__subclasses__() if kind.__module__.startswit
 OF_METHODS = {
     each for kind in METHODS for each in vars(kind.kernels).values() if isinstance(each, Kernel)
 }
-NOT_YET = ("heelstrike.sim.compliant.", "heelstrike.sim.controller.")
+NOT_YET = (
+    "heelstrike.sim.compliant.",
+    "heelstrike.sim.controller.",
+    "heelstrike.sim.spatial.controlled",
+)
 """Of compliant ground, where the controller's bundle comes first, and what laws call by name."""
 
 FIRST_OF_A_METHOD = ("scene", "model", "ground")

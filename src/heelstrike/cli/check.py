@@ -57,13 +57,16 @@ def check(
     with stage("loading"):
         from heelstrike.experiments.checking import check_motion
         from heelstrike.gait.recordings.motion import load_recorded_motion
-        from heelstrike.robot import builtin_robots, load_robot
+        from heelstrike.robot import builtin_robots
+        from heelstrike.robot.library import load_planar_robot
         from heelstrike.view.page.page import check_page, save_html
 
         if page is not None:
             check_page(page)
         built_in = robot in builtin_robots()
-        machine = load_robot(robot) if built_in else load_robot(robot, **how.keywords())
+        machine = (
+            load_planar_robot(robot) if built_in else load_planar_robot(robot, **how.keywords())
+        )
         motion = load_recorded_motion(trajectory, machine, rate=rate, unit=unit)
     with stage("checking") as doing:
         found = check_motion(

@@ -68,10 +68,23 @@ def look_at(
 ) -> None:
     """Print what was found of a robot, and draw it into a file."""
     from heelstrike.robot.inspection import facts
+    from heelstrike.robot.spatial.robot import SpatialRobot
     from heelstrike.view.drawing import robot_picture
     from heelstrike.view.terminal import terminal_drawing
 
     robot = inspection.robot
+    if isinstance(robot, SpatialRobot):
+        if picture is not None:
+            raise typer.BadParameter(
+                f"{robot.name} is a robot in space, and pictures are of the plane: leave it out, "
+                "or say --projected",
+                param_hint="--out",
+            )
+        if as_json:
+            typer.echo(json.dumps(facts(inspection), indent=2))
+        else:
+            output().print(Text(in_options(inspection.text())), soft_wrap=True)
+        return
     if robot is not None:
         for push in pushes:
             push.place(robot)

@@ -13,6 +13,7 @@ from heelstrike.cli.compare import compare
 from heelstrike.cli.inspect import inspect
 from heelstrike.cli.mimic import mimic
 from heelstrike.cli.paper import paper
+from heelstrike.cli.planners import planners
 from heelstrike.cli.report import report
 from heelstrike.cli.robots import robots
 from heelstrike.cli.train import train
@@ -41,6 +42,7 @@ for command in (
     mimic,
     paper,
     compare,
+    planners,
     robots,
     inspect,
 ):

@@ -61,11 +61,11 @@ def asked_for(
 ) -> Case:
     """Make of options what is walked, but for its gait, which may take long to find."""
     from heelstrike.experiments.walk import Case
-    from heelstrike.robot import load_robot
+    from heelstrike.robot.library import load_planar_robot
 
     ground = ground_called(walking.ground, friction=walking.friction, restitution=restitution)
     pushes = pushes_called(walking.push)
-    machine = load_robot(robot, **how.keywords())
+    machine = load_planar_robot(robot, **how.keywords())
     for each in pushes:
         each.place(machine)
     law = law_asked(walking.controller, machine)

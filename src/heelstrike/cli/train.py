@@ -59,7 +59,7 @@ def train(
         list[str] | None,
         typer.Option(
             metavar="NAME=LOW:HIGH",
-            help="What is drawn anew for each episode of a walker: friction, mass (factor), push "
+            help="What is drawn again for each episode of a walker: friction, mass (factor), push "
             "(N s), push_period (s), delay (s), slope (rad), roughness (m); repeat the option.",
         ),
     ] = None,
@@ -78,7 +78,7 @@ def train(
         bool, typer.Option("--film/--no-film", help="Write film and page of a run, too.")
     ] = True,
     afresh: Annotated[
-        bool, typer.Option("--afresh", help="Begin anew whatever is in --out.")
+        bool, typer.Option("--afresh", help="Discard what is in --out and start again.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip

@@ -23,9 +23,14 @@ from heelstrike.contact.queries.inverse_dynamics import (
     contact_inverse_dynamics,
 )
 from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
+from heelstrike.contact.spatial.certificate import SpatialCertificate
+from heelstrike.contact.spatial.ground import Box, SpatialGround
+from heelstrike.contact.spatial.modes import SpatialContactMode, SpatialSolver, SpatialStatus
+from heelstrike.contact.spatial.problem import SpatialContactSolution
 
 __all__ = [
     "ActiveContacts",
+    "Box",
     "Certificate",
     "ContactForwardDynamics",
     "ContactInverseDynamics",
@@ -39,6 +44,12 @@ __all__ = [
     "PhaseLinearization",
     "SolveStatus",
     "Solver",
+    "SpatialCertificate",
+    "SpatialContactMode",
+    "SpatialContactSolution",
+    "SpatialGround",
+    "SpatialSolver",
+    "SpatialStatus",
     "contact_forward_dynamics",
     "contact_inverse_dynamics",
     "contact_kinematics",

@@ -8,6 +8,7 @@ impulse with ``w = G lambda + b`` and, at every contact, ``0 <= w_n _|_ lambda_n
 from __future__ import annotations
 
 import threading
+from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +31,9 @@ from heelstrike.contact.workspace import (
 )
 from heelstrike.errors import ContactProblemError
 from heelstrike.field_texts import dataclass
+
+if TYPE_CHECKING:
+    from heelstrike.contact.spatial.problem import SpatialContactSolution
 
 
 @kernel
@@ -109,18 +113,35 @@ def solver_order(solver: str | Solver, *, fallback: bool = True) -> Integers:
     return np.array([choice.code for choice in (first, *others)], np.int64)
 
 
+@overload
+def solve_contact(
+    delassus: ArrayLike, free: ArrayLike, friction: ArrayLike, *,
+    dimension: Literal[2] = 2, solver: str | Solver = Solver.LEMKE, tolerance: float = 1e-9,
+    floor: float = 0.0, fallback: bool = True,
+) -> ContactSolution: ...  # fmt: skip
+
+
+@overload
+def solve_contact(
+    delassus: ArrayLike, free: ArrayLike, friction: ArrayLike, *,
+    dimension: Literal[3], solver: str | Solver = Solver.LEMKE, tolerance: float = 1e-9,
+    floor: float = 0.0, fallback: bool = True,
+) -> SpatialContactSolution: ...  # fmt: skip
+
+
 @takes(ContactProblemError)
 def solve_contact(
     delassus: ArrayLike,
     free: ArrayLike,
     friction: ArrayLike,
     *,
+    dimension: int = 2,
     solver: str | Solver = Solver.LEMKE,
     tolerance: float = 1e-9,
     floor: float = 0.0,
     fallback: bool = True,
-) -> ContactSolution:
-    """Solve a contact problem with Coulomb friction in the plane.
+) -> ContactSolution | SpatialContactSolution:
+    """Solve a contact problem with Coulomb friction, in the plane or in space.
 
     Find the impulse ``lambda`` with ``w = G lambda + b`` and, at every contact,
     ``0 <= w_n _|_ lambda_n >= 0`` and ``|lambda_t| <= mu lambda_n`` opposing ``w_t`` as far as
@@ -130,13 +151,17 @@ def solve_contact(
     ----------
     delassus : (nc * 2, nc * 2) array_like
         ``G = J M^-1 J^T``, symmetric and positive semidefinite, often singular; components
-        ordered n0 t0 n1 t1 ...; [1/kg] for points.
+        ordered n0 t0 n1 t1 ...; [1/kg] for points. In space (nc * 3, nc * 3), normal and two
+        tangents of each contact.
     free : (nc * 2,) or (nc, 2) array_like
-        Velocity without contact impulses [m/s], or acceleration [m/s^2].
+        Velocity without contact impulses [m/s], or acceleration [m/s^2]; three for each contact in
+        space.
     friction : (nc,) array_like or float
         Friction coefficient of each contact, zero for none.
+    dimension : {2, 3}
+        The plane, or space, where the cones of friction are round.
     solver : {"lemke", "fischer_burmeister", "gauss_seidel"}
-        The solver to try first.
+        The solver to try first, in the plane. In space the ways to solve have one order.
     tolerance : float
         Largest relative residual that is accepted, see :class:`Certificate`.
     floor : float
@@ -149,7 +174,7 @@ def solve_contact(
 
     Returns
     -------
-    ContactSolution
+    ContactSolution or SpatialContactSolution
         With a certificate that says whether, and how well, the problem is solved. A failed
         solve returns the candidate with the smallest residuals and a status other than
         ``SOLVED``; it does not raise.
@@ -158,7 +183,7 @@ def solve_contact(
     ------
     ContactProblemError
         If the data are malformed: shapes, NaN, negative friction, an asymmetric matrix, an
-        unknown solver.
+        unknown solver, a dimension that is neither 2 nor 3.
 
     Examples
     --------
@@ -170,10 +195,18 @@ def solve_contact(
     >>> solution.mode[0].name, solution.certificate.valid
     ('STICK', True)
     """
-    matrix, offset, coefficient = _checked(delassus, free, friction)
+    if dimension not in (2, 3):
+        raise ContactProblemError(f"dimension is 2 or 3, got {dimension}")
+    matrix, offset, coefficient = _checked(delassus, free, friction, dimension)
     count = coefficient.size
     check_accuracy(tolerance, floor)
     order = solver_order(solver, fallback=fallback)
+    if dimension == 3:
+        from heelstrike.contact.spatial.problem import solve_in_space
+
+        return solve_in_space(
+            matrix, offset, coefficient, tolerance=tolerance, floor=floor, fallback=fallback
+        )
     mode = np.full(count, OPEN, np.int64)
     impulse, velocity, certificate = run_solvers(
         matrix,
@@ -321,7 +354,7 @@ def _solver(solver: str | Solver) -> Solver:
 
 
 def _checked(
-    delassus: ArrayLike, free: ArrayLike, friction: ArrayLike
+    delassus: ArrayLike, free: ArrayLike, friction: ArrayLike, rows: int = 2
 ) -> tuple[Floats, Floats, Floats]:
     try:
         matrix = np.array(delassus, dtype=np.float64, order="C")
@@ -331,15 +364,17 @@ def _checked(
         raise ContactProblemError(
             f"delassus, free and friction must be arrays of real numbers: {error}"
         ) from error
-    if offset.size % 2:
+    if offset.size % rows:
+        needs = "two (normal, tangent)" if rows == 2 else "three (normal and two tangents)"
         raise ContactProblemError(
-            f"free has {offset.size} entries, but every contact needs two (normal, tangent)"
+            f"free has {offset.size} entries, but every contact needs {needs}"
         )
-    count = offset.size // 2
-    if matrix.shape != (2 * count, 2 * count) and not (count == 0 and matrix.size == 0):
+    count = offset.size // rows
+    size = rows * count
+    if matrix.shape != (size, size) and not (count == 0 and matrix.size == 0):
         raise ContactProblemError(
             f"delassus has shape {matrix.shape}, but free has {count} contacts, which needs "
-            f"({2 * count}, {2 * count})"
+            f"({size}, {size})"
         )
     if coefficient.ndim == 0:
         coefficient = np.full(count, float(coefficient))
@@ -370,4 +405,4 @@ def _checked(
             f"delassus is not symmetric: entry [{row}, {column}] is {matrix[row, column]}, but "
             f"[{column}, {row}] is {matrix[column, row]}"
         )
-    return matrix.reshape(2 * count, 2 * count), offset, coefficient
+    return matrix.reshape(size, size), offset, coefficient

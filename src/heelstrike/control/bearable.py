@@ -15,7 +15,7 @@ from heelstrike.control.quadratic.program import SOLVED, Program
 from heelstrike.control.virtual_constraints import demand, hold_foot
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.held import force_of_row
-from heelstrike.dynamics.spatial import Spatial
+from heelstrike.dynamics.planar import Spatial
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState

@@ -26,7 +26,7 @@ from heelstrike.control.arguments import (
     positive,
 )
 from heelstrike.dynamics.held import add_row, force_of_row, solve_rows
-from heelstrike.dynamics.spatial import Spatial
+from heelstrike.dynamics.planar import Spatial
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.robot.model import Floats

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
-from heelstrike.dynamics.spatial import plus, power, scaled, spatial, write
+from heelstrike.dynamics.planar import plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
 

@@ -17,7 +17,7 @@ from heelstrike.compiler.bundle import Bundle, array, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import forward_kinematics, point_position
 from heelstrike.dynamics.places import point_columns
-from heelstrike.dynamics.spatial import Spatial, power, solve_three, spatial, write
+from heelstrike.dynamics.planar import Spatial, power, solve_three, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot

@@ -22,7 +22,7 @@ from math import cos, sin
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.places import bias_at, place_of, velocity_at
-from heelstrike.dynamics.spatial import (
+from heelstrike.dynamics.planar import (
     linear_momentum_of,
     momentum_of,
     plus,

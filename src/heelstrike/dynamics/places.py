@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame
-from heelstrike.dynamics.spatial import write
+from heelstrike.dynamics.planar import write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 

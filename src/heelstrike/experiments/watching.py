@@ -25,8 +25,9 @@ from heelstrike.experiments.passive import USUAL_SLOPES, passive_walk
 from heelstrike.experiments.walk import beginning, design, typical_step
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, load_gait
-from heelstrike.robot import Robot, State, builtin_robots, load_robot
+from heelstrike.robot import Robot, State, builtin_robots
 from heelstrike.robot.files.options import LoadOptions
+from heelstrike.robot.library import load_planar_robot
 from heelstrike.sim import Simulation
 from heelstrike.sim.method import Method
 from heelstrike.view.live.stage import Control, Stage, friction_control
@@ -111,7 +112,7 @@ class WalkStage(Stage):
     ) -> None:
         self._first = First() if first is None else first
         self._robots = {
-            str(each): load_robot(each, **({} if str(each) in builtin_robots() else how))
+            str(each): load_planar_robot(each, **({} if str(each) in builtin_robots() else how))
             for each in _several(robot)
         }
         self._asked = tuple(self._robots)
@@ -202,7 +203,7 @@ class WalkStage(Stage):
 
     def _robot(self, name: str) -> Robot:
         if name not in self._robots:
-            self._robots[name] = load_robot(name)
+            self._robots[name] = load_planar_robot(name)
         return self._robots[name]
 
     def _open(self, path: str | os.PathLike[str]) -> None:

@@ -11,6 +11,7 @@ from heelstrike.robot.plausibility import Finding, FindingKind
 from heelstrike.robot.robot import Foot, LockedJoint, Robot
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
+from heelstrike.robot.spatial import JointKind, SpatialFoot, SpatialModel, SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.robot.warning import RobotWarning
 
@@ -20,6 +21,7 @@ __all__ = [
     "FindingKind",
     "Foot",
     "Inspection",
+    "JointKind",
     "JointProperties",
     "LoadOptions",
     "LockedJoint",
@@ -29,6 +31,9 @@ __all__ = [
     "Robot",
     "RobotBuilder",
     "RobotWarning",
+    "SpatialFoot",
+    "SpatialModel",
+    "SpatialRobot",
     "State",
     "builtin_robots",
     "human",

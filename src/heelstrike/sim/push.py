@@ -42,19 +42,19 @@ class Push:
 
     link: str | int
     """Name of the body, or index of the link."""
-    force: tuple[float, float] = field(kw_only=True)
-    """Force (x, z) on the robot in world axes, in N."""
+    force: tuple[float, ...] = field(kw_only=True)
+    """Force (x, z) on the robot in world axes, in N; (x, y, z) on a robot in space."""
     start: float = field(kw_only=True)
     duration: float = field(kw_only=True)
     """start, duration: When it begins and how long it lasts, in s."""
-    point: tuple[float, float] | None = field(default=None, kw_only=True)
+    point: tuple[float, ...] | None = field(default=None, kw_only=True)
     """Where it acts, in the axes of the link, in m; by default at the link's centre of mass."""
 
     def __post_init__(self) -> None:
         check_fields(self, SimulationError)
-        object.__setattr__(self, "force", _pair("force", self.force))
+        object.__setattr__(self, "force", _numbers("force", self.force))
         if self.point is not None:
-            object.__setattr__(self, "point", _pair("point", self.point))
+            object.__setattr__(self, "point", _numbers("point", self.point))
         for name, lowest in (("start", -np.inf), ("duration", 0.0)):
             value = getattr(self, name)
             number = isinstance(value, float | int | np.number) and np.isfinite(value)
@@ -103,8 +103,9 @@ class Push:
                     f"a push acts on link {index}, but robot {robot.name!r} has links 0 to "
                     f"{robot.nv - 1}"
                 )
+        _pair("force", self.force)
         if self.point is not None:
-            return index, self.point
+            return index, _pair("point", self.point)
         x, z = robot.model.center_of_mass[index]
         return index, (float(x), float(z))
 
@@ -124,16 +125,27 @@ class Push:
         return np.maximum(np.minimum(end, self.end) - np.maximum(begin, self.start), 0.0)
 
 
-def _pair(name: str, value: Sequence[float]) -> tuple[float, float]:
+def _numbers(name: str, value: Sequence[float]) -> tuple[float, ...]:
     try:
-        x, z = (float(number) for number in value)
+        numbers = tuple(float(number) for number in value)
     except (TypeError, ValueError):
+        numbers = ()
+    if len(numbers) not in (2, 3):
         raise SimulationError(
             f"the {name} of a push must be two numbers (x, z), got {value!r}"
         ) from None
-    if not (np.isfinite(x) and np.isfinite(z)):
+    if not np.all(np.isfinite(numbers)):
         raise SimulationError(f"the {name} of a push must be finite, got {value!r}")
-    return x, z
+    return numbers
+
+
+def _pair(name: str, value: tuple[float, ...]) -> tuple[float, float]:
+    """Return what a push has in the plane."""
+    if len(value) != 2:
+        raise SimulationError(
+            f"the {name} of a push on a robot in the plane is two numbers (x, z), got {value!r}"
+        )
+    return value[0], value[1]
 
 
 class Pushes(Bundle):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import operator
 import sys
 import time as clock_time
@@ -9,7 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from numbers import Real
 from pathlib import Path
-from typing import Any, NoReturn, Unpack
+from typing import TYPE_CHECKING, Any, NoReturn, Unpack, overload
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.robot.warning import warn
 from heelstrike.sim.clock import Clock
@@ -55,6 +57,9 @@ from heelstrike.sim.setting import (
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.time_stepping import SimulationWarning, TimeStepping
 
+if TYPE_CHECKING:
+    from heelstrike.sim.spatial.run import SpatialRun
+
 # Rows of one chunk of the record, and most steps between two looks at Ctrl-C and the progress bar.
 CHUNK = 4096
 # Steps before the first look, and seconds that should pass between two.
@@ -69,6 +74,8 @@ LAID = 1e-6
 _OUTCOMES = tuple(Outcome)
 _USUAL = TimeStepping()
 _CLOCK = Mold(Clock())
+
+AnyRobot = Robot | SpatialRobot
 
 CAN_GO_ON = (RunStatus.COMPLETED, RunStatus.INTERRUPTED)
 
@@ -148,6 +155,14 @@ class Simulation:
     >>> simulation.advance(0.01).value, simulation.time
     ('completed', 0.01)
     """
+
+    def __new__(cls, robot: Any = None, *others: Any, **setup: Any) -> Any:
+        """Make one of space, where the robot is one in space."""
+        if isinstance(robot, SpatialRobot):
+            from heelstrike.sim.spatial.simulation import SpatialSimulation
+
+            return SpatialSimulation(robot, *others, **setup)
+        return super().__new__(cls)
 
     @takes(SimulationError)
     def __init__(
@@ -328,7 +343,7 @@ class Simulation:
         self._has_warned = self._has_warned or has_warned(self.method, setting)
 
     def _reconsider(self) -> None:
-        """Decide this instant anew, even if it had been: what it hangs on has been changed."""
+        """Decide this instant again, even if it had been: what it depends on has been changed."""
         self._clock.moving = 0
         self.method.reconsider(self._work)
 
@@ -366,7 +381,7 @@ class Simulation:
 
     @property
     def controller(self) -> Controller | None:
-        """What decides the torques; one that is set begins anew."""
+        """What decides the torques; one that is set starts again."""
         return self._controller
 
     @controller.setter
@@ -784,7 +799,7 @@ class Simulation:
             memory.damping[driven] += model.stall_torque[driven] / model.no_load_speed[driven]
 
     def snapshot(self) -> Snapshot:
-        """Return everything that the further course hangs on.
+        """Return everything that the further course depends on.
 
         Raises
         ------
@@ -799,7 +814,7 @@ class Simulation:
         return Snapshot.pictured(beside, dict(self._identity), taken)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Be again as a simulation was; the record begins anew.
+        """Be again as a simulation was; the record starts again.
 
         Parameters
         ----------
@@ -826,7 +841,7 @@ class Simulation:
         self.error = None
 
     def forget(self) -> None:
-        """Forget what was: the record begins anew, and pushes that are over are gone from it.
+        """Forget what was: the record starts again, and pushes that are over are gone from it.
 
         How it goes on does not change. For simulations without an end, whose record is looked at
         piece by piece.
@@ -960,20 +975,43 @@ class Simulation:
         )
 
 
+def _of_init(function: Callable[..., Any]) -> inspect.Signature:
+    """Signature of a class by that of what begins one, not by what chooses between classes."""
+    whole = inspect.signature(function)
+    return whole.replace(parameters=list(whole.parameters.values())[1:])
+
+
+Simulation.__signature__ = _of_init(Simulation.__init__)  # type: ignore[attr-defined]
+
+
+@overload
+def simulate(
+    robot: Robot, controller: Controller | None = None, *, duration: float,
+    progress: Callable[[float], None] | None = None, **setup: Unpack[Setup],
+) -> Run: ...  # fmt: skip
+
+
+@overload
+def simulate(
+    robot: SpatialRobot, controller: Controller | None = None, *, duration: float,
+    progress: Callable[[float], None] | None = None, **setup: Any,
+) -> SpatialRun: ...  # fmt: skip
+
+
 @takes(SimulationError)
 def simulate(
-    robot: Robot,
+    robot: AnyRobot,
     controller: Controller | None = None,
     *,
     duration: float,
     progress: Callable[[float], None] | None = None,
-    **setup: Unpack[Setup],
-) -> Run:
+    **setup: Any,
+) -> Run | SpatialRun:
     """Simulate a robot on the ground under a controller.
 
     Parameters
     ----------
-    robot : Robot
+    robot : Robot or SpatialRobot
         The robot.
     controller : object with ``torque(t, state, contacts)``, or None
         Decides the joint torques; None applies none.
@@ -989,7 +1027,7 @@ def simulate(
 
     Returns
     -------
-    Run
+    Run or SpatialRun
         Everything that happened, also after a fall, a failure or Ctrl-C; see ``run.status``. A
         controller that raises anything but KeyboardInterrupt, even SystemExit, ends the run with
         status ``controller_failed``, as does one that writes beyond its arrays, changes the robot,
@@ -1007,6 +1045,10 @@ def simulate(
         With ``on_error="raise"``, what the controller raised.
     """
     check_duration(duration)
+    if isinstance(robot, SpatialRobot):
+        from heelstrike.sim.spatial.simulation import simulate_in_space
+
+        return simulate_in_space(robot, controller, duration=duration, progress=progress, **setup)
     simulation = Simulation(robot, controller, **setup)
     going = simulation.advance(simulation._recorded_until + duration, progress=progress)
     final = simulation._final()

@@ -408,7 +408,7 @@ def _draw_pushes(
     for push in pushes:
         link, place = push.place(robot)
         x, z = in_world(poses.origin[link], poses.angle[link], np.array(place)).tolist()
-        strength = float(np.hypot(*push.force))
+        strength = float(np.linalg.norm(push.force))
         along = (np.array(push.force) / (strength or 1.0)).tolist()
         arrow = {"arrowstyle": "-|>", "color": FORCE_COLOR, "lw": 2.0}
         axes.annotate(

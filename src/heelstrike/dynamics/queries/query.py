@@ -1,13 +1,15 @@
 """Queries: what can be asked of a robot in a state, each written once for numbers and symbols.
 
 A query is a function of an :class:`~heelstrike.dynamics.queries.evaluation.Evaluation`. The
-decorators here make the function of (robot, q, …) of it that people call, with its documentation;
-its ``at`` is the query itself, which :mod:`heelstrike.dynamics.queries.symbolic` and
+decorators here make the function of (robot, q, …) of it that people call, with its documentation,
+which hands a robot in space on to the query of that name in :mod:`heelstrike.dynamics.spatial`; its
+``at`` is the query itself, which :mod:`heelstrike.dynamics.queries.symbolic` and
 :mod:`heelstrike.dynamics.queries.casadi_functions` ask over symbols.
 """
 
 from __future__ import annotations
 
+import importlib
 import inspect
 from collections.abc import Callable, Iterable
 from functools import update_wrapper
@@ -16,7 +18,9 @@ from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 from numpy.typing import ArrayLike
 
 from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.errors import RobotError
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 
 P = ParamSpec("P")
 Result = TypeVar("Result", covariant=True)
@@ -26,8 +30,11 @@ VECTORS = {
 }  # fmt: skip
 """Arguments that are vectors, and how long they are."""
 
-_ARGUMENTS = {
-    "robot": ("Robot", "The robot."),
+Arguments = dict[str, tuple[str, str]]
+"""Of every argument its type and what it is."""
+
+_ARGUMENTS: Arguments = {
+    "robot": ("Robot or SpatialRobot", "The robot."),
     "q": ("(nq,) array", "Position, in m and rad, in the order of ``robot.joint_names``."),
     "v": ("(nv,) array", "Velocity, in m/s and rad/s."),
     "time": ("float", "How long, in s."),
@@ -36,7 +43,7 @@ _ARGUMENTS = {
     "force": ("(nv,) array", "Generalised force, in N and N m."),
     "torque": ("(nu,) array", "Torques or forces of the motors, as ``robot.actuator_names``."),
     "link": ("int or str", "Link, by its index or the name of its body."),
-    "local": ("(2,) array", "Place (x, z) of the point in the axes of its link, in m."),
+    "local": ("(2,) array", "Place (x, z), in space (x, y, z), of the point on its link, in m."),
     "contacts": ("iterable of int or str, optional", "Contact points, all k = nc by default."),
 }
 _RAISES = "If the robot has no such link or contact point, or a vector has the wrong length."
@@ -57,7 +64,9 @@ class Query(Protocol[P, Result]):
 class OfPosition(Query[P, Result], Protocol[P, Result]):
     """A query of a position."""
 
-    def __call__(self, robot: Robot, q: ArrayLike, *others: P.args, **named: P.kwargs) -> Result:
+    def __call__(
+        self, robot: Robot | SpatialRobot, q: ArrayLike, *others: P.args, **named: P.kwargs
+    ) -> Result:
         """Answer it."""
 
 
@@ -65,7 +74,12 @@ class OfState(Query[P, Result], Protocol[P, Result]):
     """A query of a position and a velocity."""
 
     def __call__(
-        self, robot: Robot, q: ArrayLike, v: ArrayLike, *others: P.args, **named: P.kwargs
+        self,
+        robot: Robot | SpatialRobot,
+        q: ArrayLike,
+        v: ArrayLike,
+        *others: P.args,
+        **named: P.kwargs,
     ) -> Result:
         """Answer it."""
 
@@ -76,10 +90,14 @@ def of_position(
     """Make a query of a position (and more); `returns` says in what shape, unit and frame."""
 
     def query(body: Callable[Concatenate[Evaluation, P], Result]) -> OfPosition[P, Result]:
-        def answer(robot: Robot, q: ArrayLike, *others: P.args, **named: P.kwargs) -> Result:
+        def answer(
+            robot: Robot | SpatialRobot, q: ArrayLike, *others: P.args, **named: P.kwargs
+        ) -> Result:
+            if isinstance(robot, SpatialRobot):
+                return in_space(body.__name__, robot)(robot, q, *others, **named)
             return body(Evaluation(robot, q), *others, **named)
 
-        return _described(answer, body, returns)
+        return described_answer(answer, body, returns)
 
     return query
 
@@ -91,16 +109,42 @@ def of_state(
 
     def query(body: Callable[Concatenate[Evaluation, P], Result]) -> OfState[P, Result]:
         def answer(
-            robot: Robot, q: ArrayLike, v: ArrayLike, *others: P.args, **named: P.kwargs
+            robot: Robot | SpatialRobot,
+            q: ArrayLike,
+            v: ArrayLike,
+            *others: P.args,
+            **named: P.kwargs,
         ) -> Result:
+            if isinstance(robot, SpatialRobot):
+                return in_space(body.__name__, robot)(robot, q, v, *others, **named)
             return body(Evaluation(robot, q, v), *others, **named)
 
-        return _described(answer, body, returns)
+        return described_answer(answer, body, returns)
 
     return query
 
 
-def _described(answer: Any, body: Callable[..., Any], returns: str) -> Any:
+def in_space(name: str, robot: SpatialRobot) -> Callable[..., Any]:
+    """Return the query of that name about robots in space, which are not imported before.
+
+    Raises
+    ------
+    RobotError
+        If it is one of the plane alone.
+    """
+    questions = importlib.import_module("heelstrike.dynamics.spatial")
+    if not hasattr(questions, name):
+        raise RobotError(
+            f"{name} is asked of robots of the plane; {robot.name!r} is one of space, of which "
+            "heelstrike does not know it yet."
+        )
+    question: Callable[..., Any] = getattr(questions, name)
+    return question
+
+
+def described_answer(
+    answer: Any, body: Callable[..., Any], returns: str, arguments: Arguments = _ARGUMENTS
+) -> Any:
     """Give an answer the name, signature and documentation of its question."""
     first, own = inspect.signature(answer), inspect.signature(body)
     names = [one for one in first.parameters.values() if one.kind == one.POSITIONAL_OR_KEYWORD]
@@ -108,15 +152,22 @@ def _described(answer: Any, body: Callable[..., Any], returns: str) -> Any:
     update_wrapper(answer, body)
     answer.__signature__, answer.at, answer.returns = signature, body, returns
     shape, _, meaning = returns.partition(": ")
-    answer.__doc__ = docstring(inspect.getdoc(body) or "", signature.parameters, shape, meaning)
+    summary = inspect.getdoc(body) or ""
+    answer.__doc__ = docstring(summary, signature.parameters, shape, meaning, arguments)
     return answer
 
 
-def docstring(summary: str, names: Iterable[str], returned: str, meaning: str) -> str:
+def docstring(
+    summary: str,
+    names: Iterable[str],
+    returned: str,
+    meaning: str,
+    arguments: Arguments = _ARGUMENTS,
+) -> str:
     """Return the documentation of a function that takes arguments of queries."""
     text = [summary, "", "Parameters", "----------"] if names else [summary]
     for name in names:
-        kind, words = _ARGUMENTS[name]
+        kind, words = arguments[name]
         text += [f"{name} : {kind}", f"    {words}"]
     text += ["", "Returns", "-------", returned, f"    {meaning}"]
     if names:

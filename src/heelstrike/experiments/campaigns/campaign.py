@@ -211,7 +211,7 @@ class Campaign:
         progress : callable, optional
             Called often with how far it is.
         afresh : bool
-            Begin anew whatever is in the folder.
+            Discard what is in the folder and start again.
 
         Returns
         -------

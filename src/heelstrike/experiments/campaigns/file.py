@@ -18,7 +18,8 @@ from heelstrike.experiments.campaigns.store import about_in, reading, refuse_ano
 from heelstrike.experiments.campaigns.targets import GROUPS
 from heelstrike.experiments.laws import check_law, gait_for, law_called
 from heelstrike.gait import Gait, load_gait
-from heelstrike.robot import Robot, builtin_robots, load_robot
+from heelstrike.robot import Robot, builtin_robots
+from heelstrike.robot.library import load_planar_robot
 from heelstrike.sim.method import Method
 from heelstrike.wording import meant
 
@@ -134,7 +135,7 @@ def _trial(
     _check_names(given, set(WALK), where)
     asked = {name: _kind(given, name, usual, where) for name, usual in WALK.items()}
     name = asked["robot"]
-    robot = load_robot(name if name in builtin_robots() else home / name)
+    robot = load_planar_robot(name if name in builtin_robots() else home / name)
     law = law_called(asked["controller"])
     check_law(law, robot)
     gait = None if law.stands else _gait(robot, asked["gait"], home, folder)

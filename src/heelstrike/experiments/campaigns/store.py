@@ -199,7 +199,7 @@ def refuse_another(connection: sqlite3.Connection, about: Mapping[str, str], fol
         raise SimulationError(
             f"{folder} has another campaign: its {' and '.join(differing)} "
             f"{'was' if len(differing) == 1 else 'were'} other. Ask for the same to go on with it, "
-            "for another folder, or to begin anew (afresh=True)"
+            "for another folder, or to start again (afresh=True)"
         )
 
 

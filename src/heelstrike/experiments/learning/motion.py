@@ -15,7 +15,7 @@ from heelstrike.dynamics import mass_matrix
 from heelstrike.errors import GaitError, SimulationError
 from heelstrike.experiments.walk import FRICTION_RESERVE, typical_step
 from heelstrike.gait import Gait, gait_family, load_gait
-from heelstrike.robot import load_robot
+from heelstrike.robot.library import load_planar_robot
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim import Run, RunStatus, TimeStepping, simulate
@@ -66,7 +66,7 @@ def motion_of(
     SimulationError, GaitError, RobotError
         If there is no such robot or gait, or the robot cannot walk so.
     """
-    robot = load_robot(file)
+    robot = load_planar_robot(file)
     if not robot.floating or not robot.nu:
         raise SimulationError(
             f"robot {robot.name!r} cannot learn to walk: its trunk does not move freely, or it has "

@@ -18,7 +18,7 @@ import numpy as np
 
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
-from heelstrike.robot import load_robot
+from heelstrike.robot.library import load_planar_robot
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import RobotWarning
@@ -113,7 +113,7 @@ class RunningTask:
         """
         name = self.file.removeprefix(OF_GYMNASIUM)
         if name == self.file:
-            return load_robot(name)
+            return load_planar_robot(name)
         found = find_spec("gymnasium")
         if found is None or found.origin is None:
             raise SimulationError(
@@ -125,7 +125,7 @@ class RunningTask:
             raise SimulationError(f"this Gymnasium has no robot file {path.name}: {path}")
         with warnings.catch_warnings():  # of what is out of date in a file that nobody here wrote
             warnings.simplefilter("ignore", RobotWarning)
-            return load_robot(path)
+            return load_planar_robot(path)
 
 
 RUNNING = {
@@ -172,7 +172,7 @@ def task_of(robot: str) -> RunningTask:
     for name, task in RUNNING.items():
         if plain == name.lower():
             return task
-    loaded = load_robot(robot)
+    loaded = load_planar_robot(robot)
     if not loaded.floating or not loaded.nu:
         raise SimulationError(
             f"robot {loaded.name!r} cannot learn to run: its trunk does not move freely, or it has "

@@ -12,7 +12,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.experiments.learning.motion import motion_of
 from heelstrike.experiments.learning.ranges import Ranges
 from heelstrike.field_texts import dataclass
-from heelstrike.robot import load_robot
+from heelstrike.robot.library import load_planar_robot
 from heelstrike.robot.robot import Robot
 
 WALK = "walk"
@@ -85,7 +85,7 @@ class WalkTask:
     max_episode_steps: int = 500
     """Decisions after which an episode is truncated."""
     randomise: Ranges = Ranges()
-    """What is drawn anew for each episode."""
+    """What is drawn again for each episode."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "randomise", Ranges.of(self.randomise))
@@ -154,7 +154,7 @@ class WalkTask:
         RobotError
             If there is none.
         """
-        return load_robot(self.file)
+        return load_planar_robot(self.file)
 
     def motion(self) -> Reference:
         """Return the motion that is followed.

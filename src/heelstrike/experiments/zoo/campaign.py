@@ -26,8 +26,9 @@ from heelstrike.experiments.zoo.results import (
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, load_gait
 from heelstrike.gait.gait import fingerprint
-from heelstrike.robot import Robot, builtin_robots, load_robot
+from heelstrike.robot import Robot, builtin_robots
 from heelstrike.robot.files.options import LoadOptions
+from heelstrike.robot.library import load_planar_robot
 from heelstrike.sim.method import Method
 from heelstrike.sim.time_stepping.method import TimeStepping
 from heelstrike.wording import meant
@@ -82,7 +83,7 @@ def zoo(
         Where ``zoo.json`` is kept, with every cell that is finished, and gaits. What is there
         already is not done again; cells that are not asked for stay in the file.
     afresh : bool
-        Begin anew whatever is there.
+        Start again whatever is there.
     workers : int, optional
         Threads; by default one a processor.
     progress : callable, optional
@@ -160,7 +161,7 @@ def loaded(words: str, how: LoadOptions) -> dict[str, Robot]:
             raise RobotError(
                 f"two robots are called {name!r}: name each once, and files differently"
             )
-        robots[name] = load_robot(word) if built_in else load_robot(word, **how)
+        robots[name] = load_planar_robot(word) if built_in else load_planar_robot(word, **how)
     return robots
 
 
@@ -220,7 +221,7 @@ def _begun(folder: Path | None, settings: Settings, *, afresh: bool) -> Results:
     if differing:
         raise SimulationError(
             f"{path} was made with {'; '.join(differing)}. Ask for the same to go on with it, for "
-            "another folder, or to begin anew (--afresh)."
+            "another folder, or to start again (--afresh)."
         )
     return results
 

@@ -150,7 +150,7 @@ class Motion(ShownInNotebooks):
         Parameters
         ----------
         t : array_like
-            Times (s) since the beginning, of any shape. One that repeats goes on for ever, and back
+            Times (s) since the beginning, of any shape. One that repeats goes on forever, and back
             in time; one that does not rests before and after.
 
         Returns

@@ -150,7 +150,7 @@ def optimize_motion(
     >>> [phase.contacts for phase in motion.phases]
     [('right_tibia_0',), ()]
     """
-    request = _checked(
+    request = checked_request(
         robot, phases, repeat=repeat, distance=distance, duration=duration, speed=speed,
         start=start, end=end, friction=friction, clearance=clearance, slope=slope, cost=cost,
         force_margin=force_margin, landing_speed=landing_speed, guess=guess,
@@ -172,10 +172,10 @@ def optimize_motion(
         report(0.9)
         program, unknowns, optimal = _held_between(program, unknowns, optimal)
     report(1.0)
-    return _motion(program, program.exact(unknowns), optimal)
+    return motion_of(program, program.polished(unknowns), optimal)
 
 
-def _checked(
+def checked_request(
     robot: Robot, phases: Sequence[ContactPhase], *, repeat: Any, distance: Any, duration: Any,
     speed: Any, cost: Any, **others: Any,
 ) -> MotionRequest:  # fmt: skip
@@ -491,7 +491,8 @@ ALLOWED = 1e-5
 """Scaled violation that a limit may have between the instants at which it is looked at."""
 
 
-def _motion(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
+def motion_of(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
+    """Return the motion with the given unknowns, its cost and its margins."""
     request, robot = program.request, program.request.robot
     _, _, distance = program.parts(casadi.DM(unknowns))
     effort, spent = 0.0, float(program.value(unknowns)[0])

@@ -18,7 +18,7 @@ from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.gait.motion.rows import Kind, Row
 from heelstrike.gait.polynomials import Instants as Grid
 from heelstrike.gait.polynomials import coefficients, gauss
-from heelstrike.gait.program import NEAR, SETTINGS, Ipopt
+from heelstrike.gait.program import NEAR, SETTINGS, Ipopt, satisfied
 from heelstrike.robot.model import Floats
 
 STAGES = 4
@@ -38,10 +38,6 @@ barrier parameter than from IPOPT's own 0.1."""
 FROM_STOPS = 1e-3
 """Distance (rad, m) that joints keep from their stops: a robot that follows a motion nearly is not
 to hit them."""
-MOST_CORRECTIONS = 4
-"""Newton steps by which equations are satisfied to rounding."""
-REDUNDANT = 1e-12
-"""Weight that keeps equations that depend on each other solvable, in their unit."""
 PARTS = 6
 """Kinds of unknowns of a phase."""
 FROM_LIMITS = 1e-6
@@ -443,27 +439,16 @@ class MotionProgram:
         missing -= np.maximum(values - self._upper, 0.0)
         return missing
 
-    def exact(self, unknowns: Floats) -> Floats:
-        """Return unknowns that satisfy all equations to rounding, changed by the least.
-
-        IPOPT ends where they hold to a tolerance. Each step is Newton's, of least norm.
-        """
-        from scipy.sparse import csr_matrix, eye
-        from scipy.sparse.linalg import splu
-
-        equal = np.flatnonzero(self._lower == self._upper)
-        best, least = unknowns, np.inf
-        for _ in range(MOST_CORRECTIONS):
-            missing = self.violations(unknowns)[equal]
-            rows = csr_matrix(self.slopes(unknowns).sparse())[equal]
-            # Of equations that say the same, as those of points that stand, the sum is shared.
-            normal = (rows @ rows.T + REDUNDANT * eye(len(equal))).tocsc()
-            unknowns = unknowns + rows.T @ splu(normal).solve(missing)
-            left = float(np.abs(self.violations(unknowns)[equal]).max(initial=0.0))
-            if not left < least:
-                break
-            best, least = unknowns, left
-        return best
+    def polished(self, unknowns: Floats) -> Floats:
+        """Satisfy the equations to rounding, by the least change of all that is not given."""
+        free = np.full(self.size, True)
+        for p, phase in enumerate(self.request.phases):
+            free[self._ends[PARTS * (p + 1) - 1]] = phase.duration[0] < phase.duration[1]
+        free[-1] = self.request.distance[0] < self.request.distance[1]
+        return satisfied(
+            unknowns, lambda x: np.array(self.value(x)[1]).ravel(), self.slopes,
+            (self._lower, self._upper), free,
+        )  # fmt: skip
 
     def packed(
         self, positions: list[Floats], velocities: list[Floats], accelerations: list[Floats],

@@ -56,8 +56,8 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
     of_meshes: set[ContactPoint] = set()
     skipped: list[str] = []
     model, pose = file.model, file.pose
-    scales = _scales(file)
-    for geom in _geoms_that_touch(file, links):
+    scales = contact_scales(file)
+    for geom in geoms_that_touch(file, links.of_body):
         link = int(links.of_body[model.geom_bodyid[geom]])
         turn = pose.geom_xmat[geom].reshape(3, 3)
         if model.geom_type[geom] == MESH:
@@ -93,7 +93,7 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
     return points
 
 
-def _scales(file: MujocoFile) -> dict[str, dict[str, float]]:
+def contact_scales(file: MujocoFile) -> dict[str, dict[str, float]]:
     """Return scales by the names of geoms: custom data called ``friction_scale:GEOM``.
 
     Raises
@@ -127,8 +127,10 @@ def _without_idle(points: list[ContactPoint], some: set[ContactPoint]) -> list[C
     return kept
 
 
-def _geoms_that_touch(file: MujocoFile, links: Links) -> list[int]:
+def geoms_that_touch(file: MujocoFile, of_body: Integers) -> list[int]:
     """Geoms of moving links that the file lets collide with the ground.
+
+    `of_body` (nbody,) is the link of every body, -1 of those that do not move.
 
     A file with a ground of its own says which geoms touch it (contype, conaffinity, explicit
     pairs, excluded bodies); without one, every geom that can collide at all counts.
@@ -137,7 +139,7 @@ def _geoms_that_touch(file: MujocoFile, links: Links) -> list[int]:
     if file.disabled("contact"):
         warn(f"{file.source}: contact is switched off by the file, so there are no contact points.")
         return []
-    moving = links.of_body[model.geom_bodyid] >= 0
+    moving = of_body[model.geom_bodyid] >= 0
     pairs = {
         frozenset((int(a), int(b))) for a, b in zip(model.pair_geom1, model.pair_geom2, strict=True)
     }

@@ -1,9 +1,9 @@
-"""Inertias that no body in space can have, and that are good enough for the plane.
+"""Inertias that no body in space can have, and that are good enough for us.
 
 Of a planar robot only the moment about the plane's normal acts. Files of planar robots often give
 no other, or round them until no body could have them, and parsers refuse such bodies or replace
 their moments. Here such a tensor is taken out of the file before it is compiled, and its moment
-about the normal put into the compiled robot.
+about the normal put into the compiled robot; of a robot in space, all of it.
 """
 
 from __future__ import annotations
@@ -103,8 +103,9 @@ def put_back(
                 f"{label}: body {name!r} has the moment of inertia {moment:.6g} kg m² about the "
                 "normal of the plane in which the robot moves. It must not be negative."
             )
-        # What the parser made of the stand-in: a file may ask for another mass of the whole.
-        share = float(model.body_inertia[place, 0]) / _size(tensor)
+        # What the parser made of the stand-in: a file may ask for another mass of the whole, and
+        # what is less than the least was lifted to it.
+        share = float(model.body_inertia[place, 0]) / max(_size(tensor), least)
         model.body_inertia[place] = max(moment, least) * share
         if not is_possible(tensor) and not _is_planar(tensor, normal, moment):
             impossible.append(name)
@@ -113,6 +114,60 @@ def put_back(
             f"{label}: no body has the inertia that the file gives {', '.join(impossible)}: "
             "moments are not negative, and none is more than the sum of the other two. Only the "
             "moments about the normal of the plane act here; they are taken as they are."
+        )
+
+
+def put_back_whole(model: Any, taken: list[tuple[Any, Floats]], least: float, label: str) -> None:
+    """Give bodies of a robot in space the tensors that their file states, possible or not.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+        The compiled file, which is changed.
+    taken : list
+        What `take_out` returned.
+    least : float
+        The least moment that the file lets a body have.
+    label : str
+        What to call the file in messages.
+
+    Raises
+    ------
+    RobotError
+        If a principal moment is negative.
+
+    Warns
+    -----
+    RobotWarning
+        Of tensors that no body can have.
+    """
+    import mujoco
+
+    impossible = []
+    for body, tensor in taken:
+        name, place = body.name or f"body {body.id}", body.id
+        moments, axes = np.linalg.eigh(tensor)
+        if moments[0] < -MOMENT_MARGIN * _size(tensor) - MASSLESS:
+            raise RobotError(
+                f"{label}: body {name!r} has the principal moment of inertia {moments[0]:.6g} "
+                "kg m². It must not be negative."
+            )
+        if np.linalg.det(axes) < 0.0:
+            axes[:, 0] = -axes[:, 0]
+        own, turned = np.zeros(4), np.zeros(4)
+        mujoco.mju_mat2Quat(own, np.ascontiguousarray(axes).ravel())
+        mujoco.mju_mulQuat(turned, np.array(model.body_iquat[place]), own)
+        share = float(model.body_inertia[place, 0]) / max(_size(tensor), least)
+        model.body_iquat[place] = turned
+        model.body_sameframe[place] = 0  # else its axes count as those of the body
+        model.body_inertia[place] = np.maximum(moments, least) * share
+        if not is_possible(tensor):
+            impossible.append(name)
+    if impossible:
+        warn(
+            f"{label}: no body has the inertia that the file gives {', '.join(impossible)}: "
+            "moments are not negative, and none is more than the sum of the other two. They are "
+            "taken as they are."
         )
 
 

@@ -68,7 +68,7 @@ def _custom(file: MujocoFile, name: str) -> Floats:
     known = {file.given_name("joint", joint) for joint in range(file.model.njnt)}
     number = PROPERTIES[name]
     values = np.full(len(names), number.default, dtype=np.float64)
-    for joint, value in _written(file, name):
+    for joint, value in written_numbers(file, name):
         if joint not in index:
             if not file.is_urdf and joint not in known:  # fixed joints may have limits too
                 warn(f"{file.source}: {name}:{joint}: there is no joint of that name.")
@@ -84,7 +84,8 @@ def _custom(file: MujocoFile, name: str) -> Floats:
     return values
 
 
-def _written(file: MujocoFile, name: str) -> Iterator[tuple[str, float]]:
+def written_numbers(file: MujocoFile, name: str) -> Iterator[tuple[str, float]]:
+    """Yield the joints of which a file says a number by custom data, and that number."""
     if file.is_urdf and name == "speed_limit":
         for joint in file.xml.iterfind("joint"):
             for limit in joint.iterfind("limit"):

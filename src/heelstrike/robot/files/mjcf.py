@@ -47,7 +47,7 @@ def planar_robot(
     """
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused in the end
         file = parse(source, options, text)
-        return _robot(file, name or _model_name(file, source), options)
+        return _robot(file, name or model_name(file, source), options)
 
 
 def _robot(file: MujocoFile, name: str, options: Options) -> Robot:
@@ -118,7 +118,7 @@ def _gravity(file: MujocoFile) -> Floats:
     return gravity[::2]
 
 
-def _model_name(file: MujocoFile, source: Path | str) -> str:
+def model_name(file: MujocoFile, source: Path | str) -> str:
     """Return the model name of the file; MuJoCo's default name says nothing, the file's does."""
     name = bytes(file.model.names).split(b"\0", 1)[0].decode(errors="replace")
     if name in ("", "MuJoCo Model"):

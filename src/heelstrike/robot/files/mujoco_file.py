@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -17,8 +17,15 @@ import numpy as np
 from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.flattening import Coordinate, flatten
-from heelstrike.robot.files.inertias import put_back, refuse_missing, stated_tensor, take_out
-from heelstrike.robot.files.options import Options
+from heelstrike.robot.files.inertias import (
+    put_back,
+    put_back_whole,
+    refuse_missing,
+    stated_tensor,
+    take_out,
+)
+from heelstrike.robot.files.options import FORWARD, Options
+from heelstrike.robot.files.posture import positions, turn
 from heelstrike.robot.files.screening.screening import Screened, screen
 from heelstrike.robot.files.screening.urdf_check import (
     check_urdf,
@@ -52,14 +59,15 @@ _SIZES = {2: 1, 3: 2, 4: 3, 5: 2, 6: 3}
 
 @dataclass(frozen=True)
 class MujocoFile:
-    """A parsed MJCF or URDF file, seen in the plane."""
+    """A parsed MJCF or URDF file, seen in the plane, or left in space."""
 
     model: Any
     """``mujoco.MjModel``: the compiled file."""
     pose: Any
     """``mujoco.MjData``: world poses of joints, bodies and geoms in the reference configuration."""
     coordinates: tuple[Coordinate, ...]
-    """What moves in the plane, in the order of the robot's coordinates."""
+    """What moves in the plane, in the order of the robot's coordinates; nothing of a file that is
+    left in space."""
     locked: tuple[LockedJoint, ...]
     """Joints of the file that do not."""
     xml: Element
@@ -134,31 +142,14 @@ def parse(
     label = str(source) if isinstance(source, Path) else "XML string"
     file = _screened(source, text, options, label)
     xml = file.xml
-    import mujoco
-
     remarks: list[str] = []
-    try:
-        with _warnings_into(remarks):
-            urdf = xml.tag == "robot"
-            if urdf:
-                refuse_macros(xml, label)
-                translate_dialects(xml)
-            if urdf and not options.lenient:
-                check_urdf(xml, label)
-            missing = missing_moments(xml)
-            spec = _parsed(source, file, label, options.packages)
-            if options.lenient:
-                let_massless_links_pass(spec)
-            taken = take_out(spec)
-            model = compiled(spec, remarks)
-            held = not urdf or any(link.get("name") == WORLD for link in xml.iterfind("link"))
-            plane = flatten(model, options, label, hanging=not held)
-            refuse_missing(plane.model, plane.pose, missing, label)
-            put_back(plane.model, plane.pose, taken, spec.compiler.boundinertia, label)
-    except RobotError:
-        raise
-    except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        raise _unreadable(label, error) from error
+    with _refusing(label), _warnings_into(remarks):
+        spec, missing = _understood(source, file, options, label)
+        taken = take_out(spec)
+        model = compiled(spec, remarks)
+        plane = flatten(model, options, label, hanging=not _is_held(xml))
+        refuse_missing(plane.model, plane.pose, missing, label)
+        put_back(plane.model, plane.pose, taken, spec.compiler.boundinertia, label)
     for remark in (*remarks, *plane.remarks):
         warn(f"{label}: {remark}")
     if not options.lenient:
@@ -166,6 +157,93 @@ def parse(
     return MujocoFile(
         plane.model, plane.pose, plane.coordinates, plane.locked, xml, label, file.flexible
     )
+
+
+def parse_whole(
+    source: Path | str, options: Options, text: str | None, free: Callable[[Any, bool], list[str]]
+) -> MujocoFile:
+    """Parse a file like :func:`parse`, and leave it in three dimensions.
+
+    Parameters
+    ----------
+    source : Path or str
+        Path of a file, or the XML text itself.
+    options : Options
+        How the file is read.
+    text : str, optional
+        What stands for the text of the file.
+    free : callable
+        ``free(spec, held)`` lets the trunk of a parsed file move freely that is meant to, before it
+        is compiled, and returns what the user should know. `held` is whether the file says that its
+        trunk is fixed.
+
+    Returns
+    -------
+    MujocoFile
+        The file, without coordinates of the plane, posed in its reference configuration.
+
+    Raises
+    ------
+    RobotError
+        If the file cannot be read, or MuJoCo's parser refuses it.
+    """
+    import mujoco
+
+    label = str(source) if isinstance(source, Path) else "XML string"
+    file = _screened(source, text, options, label)
+    remarks: list[str] = []
+    with _refusing(label), _warnings_into(remarks):
+        spec, missing = _understood(source, file, options, label)
+        for link, moments in missing.items():
+            raise RobotError(f"{label}: <inertia> of link {link!r} lacks {moments[0]!r}. Give it.")
+        told = free(spec, _is_held(file.xml))
+        taken = take_out(spec)
+        model = compiled(spec, remarks)
+        put_back_whole(model, taken, spec.compiler.boundinertia, label)
+        pose = mujoco.MjData(model)
+        pose.qpos[:] = positions(model, options, label)
+        turn(model, pose, FORWARD[options.forward or "x"])
+        mujoco.mj_kinematics(model, pose)
+    for remark in (*remarks, *told):
+        warn(f"{label}: {remark}")
+    if not options.lenient:
+        _warn_of_mended_inertias(source, file, label)
+    return MujocoFile(model, pose, (), (), file.xml, label, file.flexible)
+
+
+def _is_held(xml: Element) -> bool:
+    """Whether a file says that a trunk without joints is fixed: all but URDF without a world."""
+    return xml.tag != "robot" or any(link.get("name") == WORLD for link in xml.iterfind("link"))
+
+
+def _understood(
+    source: Path | str, file: Screened, options: Options, label: str
+) -> tuple[Any, dict[str, list[str]]]:
+    """Return a file as MuJoCo understands it, and the moments of inertia that a URDF leaves out."""
+    xml = file.xml
+    if xml.tag == "robot":
+        refuse_macros(xml, label)
+        translate_dialects(xml)
+        if not options.lenient:
+            check_urdf(xml, label)
+    missing = missing_moments(xml)
+    spec = _parsed(source, file, label, options.packages)
+    if options.lenient:
+        let_massless_links_pass(spec)
+    return spec, missing
+
+
+@contextmanager
+def _refusing(label: str) -> Iterator[None]:
+    """Say what MuJoCo's parser says as errors of ours."""
+    import mujoco
+
+    try:
+        yield
+    except RobotError:
+        raise
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
+        raise _unreadable(label, error) from error
 
 
 def _screened(source: Path | str, text: str | None, options: Options, label: str) -> Screened:

@@ -28,6 +28,7 @@ from heelstrike.robot.files.packages import FOLDERS
 from heelstrike.robot.files.robot_json import robot_entries, robot_of_entries
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.warning import RobotWarning, warn
 from heelstrike.whole_file import write_whole
 
@@ -48,6 +49,7 @@ class _Order:
     options: dict[str, Any]
     name: str | None
     bodies: bool
+    dimension: int | None
     folder: str
     environment: dict[str, str]
 
@@ -98,12 +100,41 @@ def read_mjcf(
     RobotWarning
         If the file says something that is not simulated, or left and right differ.
     """
-    return _told(_answer(_order(source, Options(**how, lenient=lenient), name)))
+    robot = _told(_answer(_order(source, Options(**how, lenient=lenient), name)))
+    assert isinstance(robot, Robot)  # which is what the order says
+    return robot
 
 
-def read_own(path: Path, **how: Unpack[LoadOptions]) -> Robot:
+def read_robot(
+    source: Path | str, *, dimension: int | None, **how: Unpack[LoadOptions]
+) -> Robot | SpatialRobot:
+    """Read a robot of two or three dimensions from a file or string; see :func:`read_mjcf`.
+
+    Parameters
+    ----------
+    source : Path or str
+        Path of the file, or the XML text itself.
+    dimension : int or None
+        2 or 3; None for a robot of two, if it moves in the plane only, and else of three.
+    **how : LoadOptions
+        How the file is read.
+
+    Returns
+    -------
+    Robot or SpatialRobot
+        The robot.
+
+    Raises
+    ------
+    RobotError
+        If the file cannot be read.
+    """
+    return _told(_answer(_order(source, Options(**how), None, dimension=dimension)))
+
+
+def read_own(path: Path, dimension: int = 2, **how: Unpack[LoadOptions]) -> Robot | SpatialRobot:
     """Read a file of this package, which bears the name of its robot."""
-    order = _order(path, Options(**how), path.stem)
+    order = _order(path, Options(**how), path.stem, dimension=dimension)
     kept = _Kept(order)
     return _told(kept.load() or kept.save(_found(order)))
 
@@ -135,7 +166,6 @@ def answer(order: bytes) -> bytes:
 
 def _found(asked: _Order) -> dict[str, Any]:
     """What is found in a file, as JSON holds it."""
-    from heelstrike.robot.files.mjcf import planar_robot
     from heelstrike.robot.files.mujoco_file import stated_bodies
 
     options = Options(**asked.options)
@@ -149,7 +179,7 @@ def _found(asked: _Order) -> dict[str, Any]:
                 bodies = stated_bodies(source, options, asked.text)
                 found["bodies"] = [(name, mass, tensor.tolist()) for name, mass, tensor in bodies]
             else:
-                robot = planar_robot(source, options, asked.name, asked.text)
+                robot = _read(source, options, asked, caught)
                 found["robot"] = robot_entries(robot)
         except RobotError as error:
             found["error"] = str(error)
@@ -158,8 +188,36 @@ def _found(asked: _Order) -> dict[str, Any]:
     return found
 
 
+def _read(
+    source: Path | str, options: Options, asked: _Order, caught: list[warnings.WarningMessage]
+) -> Robot | SpatialRobot:
+    """Read a robot of the dimension that is asked for."""
+    from heelstrike.robot.files.mjcf import planar_robot
+    from heelstrike.robot.files.spatial import LeavesPlaneError
+    from heelstrike.robot.spatial.reading import spatial_robot
+
+    leaves: LeavesPlaneError | None = None
+    if asked.dimension != 3:
+        try:
+            return planar_robot(source, options, asked.name, asked.text)
+        except LeavesPlaneError as error:
+            if asked.dimension is not None:
+                raise
+            leaves = error
+            caught.clear()  # what was said of a robot that is not the one
+    robot = spatial_robot(source, options, asked.name, asked.text)
+    if leaves is not None and not robot.floating:
+        warn(f"{leaves} Until then it is one of three dimensions, which dimension=3 asks for.")
+    return robot
+
+
 def _order(
-    source: Path | str, options: Options, name: str | None, *, bodies: bool = False
+    source: Path | str,
+    options: Options,
+    name: str | None,
+    *,
+    bodies: bool = False,
+    dimension: int | None = 2,
 ) -> _Order:
     path = source if isinstance(source, Path) else None
     text = None if isinstance(source, Path) else source
@@ -173,6 +231,7 @@ def _order(
         options=options.plain(),
         name=name,
         bodies=bodies,
+        dimension=dimension,
         folder="" if path is not None and path.is_absolute() else _here(),
         environment={each: os.environ.get(each, "") for each in FOLDERS},
     )
@@ -201,7 +260,7 @@ def _answer(order: _Order) -> dict[str, Any]:
         ) from error
 
 
-def _told(found: dict[str, Any]) -> Robot:
+def _told(found: dict[str, Any]) -> Robot | SpatialRobot:
     """Say what an answer says, and return its robot."""
     for remark in found["remarks"]:
         warn(remark)

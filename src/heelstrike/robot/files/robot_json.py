@@ -12,15 +12,28 @@ from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Foot, LockedJoint, Robot
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
+from heelstrike.robot.spatial.model import SpatialModel
+from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot
 
 _PLAIN = (
     *("name", "joint_names", "link_names", "actuator_names", "contact_names"),
     *("floating", "contact_friction", "source"),
 )
 
+_IN_SPACE = tuple(name for name in _PLAIN if name != "floating")
 
-def robot_entries(robot: Robot) -> dict[str, Any]:
+
+def robot_entries(robot: Robot | SpatialRobot) -> dict[str, Any]:
     """Return a robot as what JSON holds."""
+    if isinstance(robot, SpatialRobot):
+        return _json(
+            {name: getattr(robot, name) for name in _IN_SPACE}
+            | {
+                "dimension": 3,
+                "model": robot.model.members(),
+                "feet": [asdict(foot) for foot in robot.feet],
+            }
+        )
     parts = {
         "model": robot.model.members(),
         "mirror": robot.mirror and asdict(robot.mirror),
@@ -28,13 +41,22 @@ def robot_entries(robot: Robot) -> dict[str, Any]:
         "locked": [asdict(joint) for joint in robot.locked],
         "outlines": [asdict(outline) for outline in robot.outlines],
     }
-    whole = {name: getattr(robot, name) for name in _PLAIN} | parts
+    return _json({name: getattr(robot, name) for name in _PLAIN} | parts)
+
+
+def _json(whole: dict[str, Any]) -> dict[str, Any]:
     entries: dict[str, Any] = json.loads(json.dumps(whole, default=_entry))
     return entries
 
 
-def robot_of_entries(entries: dict[str, Any]) -> Robot:
+def robot_of_entries(entries: dict[str, Any]) -> Robot | SpatialRobot:
     """Return the robot that :func:`robot_entries` told."""
+    if entries.get("dimension") == 3:
+        return SpatialRobot(
+            **{name: _tuples(entries[name]) for name in _IN_SPACE},
+            model=SpatialModel(**_arrays(entries["model"])),
+            feet=tuple(SpatialFoot(**_each_tuple(foot)) for foot in entries["feet"]),
+        )
     plain = {name: _tuples(entries[name]) for name in _PLAIN}
     return Robot(
         **plain,

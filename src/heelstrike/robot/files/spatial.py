@@ -23,10 +23,14 @@ MOST_ASIDE = 5e-2
 """Share of its size up to which the centre of mass of a projected robot may lie to one side."""
 
 
+class LeavesPlaneError(RobotError):
+    """A robot cannot be seen in the plane, for joints of it leave it."""
+
+
 def refuse_spatial_joints(
     model: Any, pose: Any, spatial: list[int], stays: bool, label: str
 ) -> None:
-    """Raise an error that names the joints which leave the plane, if there are any.
+    """Raise a `LeavesPlaneError` that names the joints which leave the plane, if there are any.
 
     `stays` is whether any joint of the file moves in it.
     """
@@ -48,7 +52,7 @@ def refuse_spatial_joints(
         body = model.body(model.jnt_bodyid[joint]).name or f"body {model.jnt_bodyid[joint]}"
         direction = "({:.3g}, {:.3g}, {:.3g})".format(*(axes[joint] + 0.0))
         if kind == FREE:
-            raise RobotError(
+            raise LeavesPlaneError(
                 f"{label}: {name!r} of body {body!r} is a free joint, which moves in three "
                 "dimensions. For a robot in the x–z plane give the body three joints instead: "
                 f"slide along x, slide along z, hinge about y, in this order; {mend}"
@@ -68,7 +72,7 @@ def refuse_spatial_joints(
         if stays or BALL in model.jnt_type
         else nothing_to_keep(model, pose)
     )
-    raise RobotError(
+    raise LeavesPlaneError(
         f"{label}: this robot leaves the x–z plane; heelstrike simulates planar robots, whose "
         "hinges turn about y and whose slides stay in x–z. In its reference configuration, "
         f"{shown}. {mend}"

@@ -19,9 +19,15 @@ TENDON_FORCES = (
 
 def warn_of_unmodelled(file: MujocoFile) -> None:
     """Warn of every part of the file that would act in MuJoCo and does not act here."""
+    held = {"equality constraints other than connect and joint": _holds(file)}
+    tell_of_left_out(file, held | acting_parts(file))
+    _warn_of_fixed_root(file)
+
+
+def acting_parts(file: MujocoFile) -> dict[str, bool]:
+    """Parts of a file that are not simulated, equality constraints apart, and whether each acts."""
     model = file.model
-    acting = {
-        "equality constraints other than connect and joint": _holds(file),
+    return {
         "tendons": any(np.any(file.field(name)) for name in TENDON_FORCES),
         "nonlinear springs or dampers": _any(file, "jnt_stiffnesspoly")
         or _any(file, "dof_dampingpoly")
@@ -35,10 +41,13 @@ def warn_of_unmodelled(file: MujocoFile) -> None:
         "moving platforms (mocap bodies)": model.nmocap > 0,
         "plugins": model.nplugin > 0,
     }
+
+
+def tell_of_left_out(file: MujocoFile, acting: dict[str, bool]) -> None:
+    """Warn of the parts of a file that act."""
     found = [what for what, acts in acting.items() if acts]
     if found:
         warn(f"{file.source}: not simulated and left out: {', '.join(found)}.")
-    _warn_of_fixed_root(file)
 
 
 def _warn_of_fixed_root(file: MujocoFile) -> None:

@@ -20,7 +20,7 @@ from heelstrike.dynamics.kernels import (
     solve_lower,
 )
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
-from heelstrike.dynamics.spatial import plus, power, scaled, spatial, write
+from heelstrike.dynamics.planar import plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.rows import Rows

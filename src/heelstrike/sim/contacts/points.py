@@ -10,7 +10,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.dynamics.kernels import solve_factorized, solve_upper
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
-from heelstrike.dynamics.spatial import plus, power, scaled, spatial, write
+from heelstrike.dynamics.planar import plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.controller.interface import Contacts

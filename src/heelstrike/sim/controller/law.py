@@ -28,6 +28,7 @@ from heelstrike.compiler.words import VALUE, keep_value, kept_value
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import ARGUMENTS, Contacts, Controller
@@ -171,12 +172,45 @@ def _keep() -> Any:
     return compiled_for(types.void(CONTROLLER_TYPE, types.int64[::1]), keep_controller)
 
 
-def _called_by_address(law: ControllerFunction, function: Any) -> Callable[..., None]:
+def machine_code_of(law: ControllerFunction, seen: Mapping[str, Any]) -> Integers:
+    """Compile a law that is shown other bundles; return the words that loops find it by.
+
+    Parameters
+    ----------
+    law : ControllerFunction
+        The law.
+    seen : mapping of str to type
+        Classes of `state`, `contacts` and `robot`.
+
+    Raises
+    ------
+    ControllerError
+        If it cannot be compiled.
+    """
+    function = kernel(law.function) if law.is_ours else within_bounds(law.function)
+    separate = SeparateKernel(
+        _called_by_address(law, function, seen), lambda: CONTROLLER_SIGNATURE,
+        boundscheck=not law.is_ours,
+    )  # fmt: skip
+    try:
+        compiled = separate.finish()
+    except CompileError as error:
+        raise ControllerError(f"controller {law.name!r} cannot be compiled. {error}") from error
+    words = np.zeros(VALUE, dtype=np.int64)
+    _keep()(compiled, words)
+    return words
+
+
+_SEEN: Mapping[str, Any] = {"state": ControlState, "contacts": Contacts, "robot": ControlledRobot}
+"""What laws are shown in the plane."""
+
+
+def _called_by_address(
+    law: ControllerFunction, function: Any, seen: Mapping[str, Any] = _SEEN
+) -> Callable[..., None]:
     """Return what loops call: it finds the bundles at their addresses and calls the function."""
     kinds: dict[str, Any] = {
-        "state": ControlState,
-        "contacts": Contacts,
-        "robot": ControlledRobot,
+        **seen,
         "parameters": law.parameters.settable(),
         "memory": law.memory.settable(),
         "log": law.log.settable(),
@@ -271,7 +305,7 @@ def controller(
     return make if function is None else make(function)
 
 
-def per_actuator(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
+def per_actuator(name: str, value: ArrayLike, robot: Robot | SpatialRobot) -> NDArray[np.float64]:
     """Return one number for each actuator, (nu,), of one for all or for each."""
     try:
         gains = np.asarray(value)
@@ -436,11 +470,11 @@ class Law:
             ) from error
 
     def reset(self) -> None:
-        """Forget what :meth:`torque` has been asked; runs begin anew by themselves."""
+        """Forget what :meth:`torque` has been asked; runs start again by themselves."""
         self._asked = None
 
     def torque(self, t: float, state: State, contacts: Contacts | None) -> NDArray[np.float64]:
-        """Return the joint torques; at t = 0 it begins anew.
+        """Return the joint torques; at t = 0 it starts again.
 
         Parameters
         ----------

@@ -38,12 +38,13 @@ from heelstrike.dynamics.kernels import (
 )
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
-from heelstrike.dynamics.spatial import momentum_of, power, spatial
+from heelstrike.dynamics.planar import momentum_of, power, spatial
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import sole
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.controller import following, stance
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.raised import EndOfRun
@@ -353,8 +354,10 @@ class ControlledRobot(Bundle):
     point_foot_torque = stance.point_foot_torque
 
 
-def extents_of(robot: Robot) -> dict[str, int]:
+def extents_of(robot: Robot | SpatialRobot) -> dict[str, int]:
     """Sizes of a robot by the names under which arrays of controllers are declared."""
+    if isinstance(robot, SpatialRobot):
+        return {**robot.model.extents, "components": 3}
     # Rows of all that ground and loops can hold; a flat foot and one of a law's own at the least.
     held = max(2 * robot.nc, 4) + count_rows(robot.model)
     return {**robot.model.extents, "components": 2, "held": held}

@@ -1,0 +1,13 @@
+"""What a run in space says: where its mass goes, what carries it, and where the ground pushes."""
+
+from heelstrike.analysis.spatial.motion import CentroidalMotion, centroidal_motion
+from heelstrike.analysis.spatial.support import SupportPolygon, support_polygon
+from heelstrike.analysis.spatial.zero_moment_point import SpatialZeroMomentPoint
+
+__all__ = [
+    "CentroidalMotion",
+    "SpatialZeroMomentPoint",
+    "SupportPolygon",
+    "centroidal_motion",
+    "support_polygon",
+]

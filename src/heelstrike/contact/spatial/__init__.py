@@ -1,0 +1,1 @@
+"""The contact problem in space: blocks of one to three rows, their solvers and certificates."""

@@ -1,0 +1,200 @@
+"""The one entry to contact in space for kernels: ways to solve in turn, each answer certified."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from numba import types
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.separate_kernel import call_at, separate_kernel
+from heelstrike.contact.spatial.certificate import certify_blocks
+from heelstrike.contact.spatial.gauss_seidel import sweep
+from heelstrike.contact.spatial.iterates import look, return_to_best
+from heelstrike.contact.spatial.modes import (
+    GAUSS_SEIDEL,
+    LAST_MODES,
+    NEWTON,
+    NOT_FOUND,
+    PROXIMAL,
+    REGULARISED,
+    RESTARTS,
+    SLIP,
+    SOLVED,
+)
+from heelstrike.contact.spatial.newton import RIDGE, iterate_newton
+from heelstrike.contact.spatial.proximal import approach
+from heelstrike.contact.spatial.restarts import try_other_starts
+from heelstrike.contact.spatial.scaling import give_impulses, scale_blocks, take_impulses
+from heelstrike.contact.spatial.sticking import try_sticking
+from heelstrike.contact.spatial.workspace import (
+    BlockAnswer,
+    BlockProblem,
+    BlockWorkspace,
+)
+
+WAYS = 6
+"""How many ways there are."""
+
+FIRST_STEPS, NEXT_STEPS = 12, 40
+"""Steps of Newton's method from the last impulses, and later."""
+
+FIRST_SWEEPS, NEXT_SWEEPS = 6, 30
+"""Sweeps before Newton's method, at first and later."""
+
+FIRST_RIDGE, NEXT_RIDGE, LAST_RIDGE = 1e-7, 1e-5, 1e-3
+"""What is added to the diagonal where Newton's method goes astray."""
+
+FIRST_TIE, STRONGER, TURNS_OF_TIES = 1e-1, 10.0, 4
+"""What the proximal-point method adds to the diagonal; how many times more at the next turn; and
+how many turns there are."""
+
+FIRST_TIES = 80
+"""How many problems the first turn has at most; each has twice as many as the one before."""
+
+
+def _signature() -> Any:
+    return types.int64(
+        BlockProblem.compiled_type(), BlockWorkspace.compiled_type(), BlockAnswer.compiled_type()
+    )
+
+
+@kernel
+def has_slip(problem: BlockProblem, answer: BlockAnswer) -> bool:
+    """Whether any block slips by the modes of the answer."""
+    slipping = 0
+    for block in range(problem.count):
+        slipping += answer.mode[block] == SLIP
+    return slipping > 0
+
+
+@kernel
+def try_way(way: int, slips: bool, problem: BlockProblem, work: BlockWorkspace) -> None:
+    """Try one way to solve the scaled problem; the iterate keeps the best impulses."""
+    scaled, settings, tally = work.scaled, work.settings, work.tally
+    iterate, newton = work.iterate, work.newton
+    if way == LAST_MODES:
+        if slips:
+            iterate_newton(
+                problem, scaled, settings, FIRST_STEPS, RIDGE, True, tally, iterate, newton
+            )  # fmt: skip
+        else:
+            tally.iterations += 1
+            try_sticking(problem, scaled, iterate, newton)
+    elif way == NEWTON:
+        return_to_best(problem, scaled, iterate)
+        iterate_newton(
+            problem, scaled, settings, NEXT_STEPS, RIDGE, False, tally, iterate, newton
+        )  # fmt: skip
+    elif way == GAUSS_SEIDEL:
+        return_to_best(problem, scaled, iterate)
+        sweep(problem, scaled, FIRST_SWEEPS, tally, iterate)
+        iterate_newton(
+            problem, scaled, settings, NEXT_STEPS, RIDGE, False, tally, iterate, newton
+        )  # fmt: skip
+    elif way == REGULARISED:
+        for turn in range(3):
+            ridge = FIRST_RIDGE if turn == 0 else (NEXT_RIDGE if turn == 1 else LAST_RIDGE)
+            sweep(problem, scaled, NEXT_SWEEPS, tally, iterate)
+            iterate_newton(
+                problem, scaled, settings, NEXT_STEPS, ridge, False, tally, iterate, newton
+            )  # fmt: skip
+            if iterate.least <= settings.tolerance:
+                break
+    elif way == PROXIMAL:
+        return_to_best(problem, scaled, iterate)
+        strength, ties = FIRST_TIE, FIRST_TIES
+        for _ in range(TURNS_OF_TIES):
+            if approach(
+                problem, settings, strength, ties, scaled, tally, iterate, newton, work.anchor
+            ):  # fmt: skip
+                break
+            strength *= STRONGER
+            ties *= 2
+    elif way == RESTARTS:
+        try_other_starts(problem, settings, scaled, tally, iterate, newton)
+
+
+@separate_kernel(_signature)
+def try_ways(problem: BlockProblem, work: BlockWorkspace, answer: BlockAnswer) -> int:
+    """Solve a problem; see :func:`solve_block_problem`, whose arguments these are."""
+    scaled, settings, tally, iterate = work.scaled, work.settings, work.tally, work.iterate
+    tally.solves += 1
+    tally.iterations = 0
+    tally.last_fallbacks = 0
+    tally.solver = LAST_MODES
+    scale_blocks(problem, settings, scaled)
+    take_impulses(problem, scaled, answer.impulse, iterate)
+    for block in range(problem.count):
+        iterate.mode[block] = answer.mode[block]
+    iterate.least = math.inf
+    slips = has_slip(problem, answer)
+    status = NOT_FOUND
+    for way in range(settings.ways):
+        if way > 0:
+            tally.fallbacks += way > NEWTON
+            tally.last_fallbacks += 1
+        before = iterate.least
+        try_way(way, slips, problem, work)
+        if iterate.least < before:
+            tally.solver = way
+        if not iterate.least < math.inf:
+            for row in range(problem.first[problem.count]):
+                iterate.x[row] = 0.0
+            look(problem, scaled, iterate)
+        if iterate.least > settings.tolerance:
+            continue
+        give_impulses(problem, scaled, iterate.best, answer)
+        if certify_blocks(problem, settings, scaled, answer) <= settings.tolerance:
+            status = SOLVED
+            tally.shortcuts += way == LAST_MODES
+            break
+    if status != SOLVED:
+        tally.failures += 1
+        give_impulses(problem, scaled, iterate.best, answer)
+        certify_blocks(problem, settings, scaled, answer)
+    return status
+
+
+@kernel
+def solve_block_problem(problem: BlockProblem, work: BlockWorkspace, answer: BlockAnswer) -> int:
+    """Solve one contact problem in space inside compiled code; return how it ended.
+
+    Parameters
+    ----------
+    problem : BlockProblem
+        The problem.
+    work : BlockWorkspace
+        Buffers; the tally is updated, the settings are read.
+    answer : BlockAnswer
+        In: guessed modes, and impulses to begin with. Out: the solution, or after a failure the
+        impulses of the smallest residual; modes are named by the velocity.
+
+    Returns
+    -------
+    int
+        ``SOLVED`` or ``NOT_FOUND`` (:class:`~heelstrike.contact.spatial.modes.SpatialStatus`).
+    """
+    return int(call_at(work.solver[0], (problem, work, answer)))
+
+
+def block_workspace(blocks: int, rows: int, *, ready: bool = True) -> BlockWorkspace:
+    """Allocate the memory to solve problems of up to so many blocks and rows.
+
+    Parameters
+    ----------
+    blocks, rows : int
+        Most blocks and rows of a problem.
+    ready : bool
+        Whether to see to it that the solver is compiled. Those who say no call
+        ``try_ways.finish()`` before they solve.
+    """
+    if ready:
+        try_ways.finish()
+    extents = {"blocks": max(blocks, 1), "rows": max(rows, 1), "components": 3}
+    work = BlockWorkspace.allocate(extents, solver=try_ways.address)
+    work.settings.tolerance = 1e-9
+    work.settings.effort = 20000
+    work.settings.ways = WAYS
+    return work

@@ -1,0 +1,276 @@
+"""Ground in space: a plane of any slope, and boxes on it that stand still.
+
+Contact points meet the nearest face of all of them. Only points of the robot are looked at: edges
+of a box do not meet edges of the robot.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from heelstrike.arguments import check_fields, takes
+from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.ground import Ground
+from heelstrike.contact.spatial.cones import Triple
+from heelstrike.contact.spatial.workspace import Floats
+from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
+
+ON_THE_FACE = 1e-12
+"""Distance (m) from a box below which the direction to it says nothing about its face."""
+
+
+class SpatialGroundModel(Bundle):
+    """The ground in space as the kernels see it; boxes come after the plane."""
+
+    normal: Floats = array(3)
+    """Upward unit normal of the plane."""
+    height: float = number(float)
+    """Distance of the plane from the origin, along its normal (m)."""
+    center: Floats = array("boxes", 3)
+    """Middle of each box (m)."""
+    rotation: Floats = array("boxes", 9)
+    """Its axes in the world, row by row."""
+    half: Floats = array("boxes", 3)
+    """Half its lengths along them (m)."""
+    friction: Floats = array("boxes + 1")
+    restitution: Floats = array("boxes + 1")
+    """friction, restitution: Of the plane, then of each box."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box that stands still on the ground.
+
+    Raises
+    ------
+    SimulationError
+        If a number cannot be.
+    """
+
+    center: ArrayLike
+    """(3,) Its middle, in m."""
+    size: ArrayLike
+    """(3,) Its lengths along its own axes, in m."""
+    yaw: float = 0.0
+    """How far it is turned about the vertical, in rad."""
+    pitch: float = 0.0
+    """How far it is then turned about its own y axis, in rad: a ramp."""
+    friction: float | None = None
+    restitution: float | None = None
+    """friction, restitution: Its own; those of the ground by default."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
+        for name, least in (("center", -np.inf), ("size", 0.0)):
+            values = np.array(getattr(self, name), dtype=np.float64)
+            if values.shape != (3,) or not np.all(np.isfinite(values) & (values > least)):
+                raise SimulationError(f"{name} of a box must be three numbers, got {values}")
+            object.__setattr__(self, name, tuple(values.tolist()))
+
+
+@dataclass(frozen=True, eq=False)
+class SpatialGround:
+    """Rigid ground for robots in space.
+
+    Raises
+    ------
+    SimulationError
+        If a coefficient is out of range, or the normal does not point up.
+
+    Examples
+    --------
+    >>> SpatialGround(friction=0.6, normal=(0.1, 0.0, 1.0)).friction
+    0.6
+    """
+
+    friction: float = 0.75
+    """Coulomb's coefficient μ ≥ 0."""
+    restitution: float = 0.0
+    """Newton's coefficient of restitution, 0 to 1."""
+    normal: ArrayLike = (0.0, 0.0, 1.0)
+    """(3,) What is perpendicular to the plane, of any length; it points up."""
+    height: float = 0.0
+    """Where the plane meets the z axis, in m."""
+    boxes: tuple[Box, ...] = ()
+    """What stands on it."""
+    _model: SpatialGroundModel = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
+        normal = np.array(self.normal, dtype=np.float64)
+        if normal.shape != (3,) or not np.all(np.isfinite(normal)) or not normal[2] > 0.0:
+            raise SimulationError(
+                f"normal must be three numbers, the last positive, got {self.normal!r}"
+            )
+        normal /= np.linalg.norm(normal)
+        boxes = tuple(self.boxes)
+        for each in boxes:
+            if not isinstance(each, Box):
+                raise SimulationError(f"boxes must be Box(center=..., size=...), got {each!r}")
+        friction, restitution = [self.friction], [self.restitution]
+        for each in boxes:
+            friction.append(self.friction if each.friction is None else each.friction)
+            bounces = self.restitution if each.restitution is None else each.restitution
+            restitution.append(bounces)
+        for name, values, most in (
+            ("friction", friction, np.inf), ("restitution", restitution, 1.0)
+        ):  # fmt: skip
+            for value in values:
+                if not 0.0 <= value <= most or not np.isfinite(value):
+                    raise SimulationError(f"{name} of the ground cannot be {value}")
+        model = SpatialGroundModel(
+            normal=normal,
+            height=float(normal[2] * self.height),
+            center=np.array([each.center for each in boxes], dtype=float).reshape(-1, 3),
+            rotation=np.array([_axes(each) for each in boxes], dtype=float).reshape(-1, 9),
+            half=0.5 * np.array([each.size for each in boxes], dtype=float).reshape(-1, 3),
+            friction=np.array(friction, dtype=float),
+            restitution=np.array(restitution, dtype=float),
+        )
+        object.__setattr__(self, "boxes", boxes)
+        object.__setattr__(self, "normal", tuple(normal.tolist()))
+        object.__setattr__(self, "_model", model)
+
+    @classmethod
+    @takes(SimulationError)
+    def stairs(
+        cls, *, rise: float, tread: float, count: int, width: float = 2.0, start: float = 0.0,
+        friction: float = 0.75, restitution: float = 0.0,
+    ) -> SpatialGround:  # fmt: skip
+        """Flat ground with stairs that lead up along x.
+
+        Parameters
+        ----------
+        rise, tread : float
+            Height and depth of a step (m).
+        count : int
+            Number of steps.
+        width : float
+            How wide they are (m), half of it to each side of y = 0.
+        start : float
+            Where the first one rises (m).
+        friction, restitution : float
+            As for the class.
+
+        Returns
+        -------
+        SpatialGround
+            The stairs.
+
+        Raises
+        ------
+        SimulationError
+            If a number is impossible.
+        """
+        if count < 1 or not (rise > 0.0 and tread > 0.0 and width > 0.0):
+            raise SimulationError(
+                f"stairs need count ≥ 1 and positive lengths; got count={count}, rise={rise}, "
+                f"tread={tread}, width={width}"
+            )
+        boxes = tuple(
+            Box(
+                center=(start + 0.5 * (step + count) * tread, 0.0, (step + 0.5) * rise),
+                size=((count - step) * tread, width, rise),
+            )
+            for step in range(count)
+        )
+        return cls(friction=friction, restitution=restitution, boxes=boxes)
+
+    @classmethod
+    def of_plane(cls, ground: Ground) -> SpatialGround:
+        """Return the ground of the plane, the same for all y.
+
+        Parameters
+        ----------
+        ground : Ground
+            Level or sloping ground without a profile.
+
+        Returns
+        -------
+        SpatialGround
+            A plane with the same slope along x.
+
+        Raises
+        ------
+        SimulationError
+            If it is no plane.
+        """
+        if ground.profile is not None or ground.shape is not None:
+            raise SimulationError(
+                "ground with a profile or a shape is for robots in the plane; for robots in space "
+                "SpatialGround has planes and boxes"
+            )
+        model = ground.model()
+        return cls(
+            friction=float(model.friction[0]),
+            restitution=float(model.restitution[0]),
+            normal=(-math.sin(ground.slope), 0.0, math.cos(ground.slope)),
+        )
+
+    def model(self) -> SpatialGroundModel:
+        """Return the arrays that the kernels use."""
+        return self._model
+
+
+def _axes(box: Box) -> Floats:
+    """Axes of a box in the world, one a row."""
+    c, s = math.cos(box.yaw), math.sin(box.yaw)
+    a, b = math.cos(box.pitch), math.sin(box.pitch)
+    return np.array([c * a, s * a, -b, -s, c, 0.0, c * b, s * b, a])
+
+
+@kernel
+def distance_to_box(ground: SpatialGroundModel, box: int, point: Triple) -> tuple[float, Triple]:
+    """Signed distance of a point to a box, and the direction away from it."""
+    x = point[0] - ground.center[box, 0]
+    y = point[1] - ground.center[box, 1]
+    z = point[2] - ground.center[box, 2]
+    r = ground.rotation
+    deepest, face, side = -math.inf, 0, 1.0
+    square = 0.0
+    away = (0.0, 0.0, 0.0)
+    for k in range(3):
+        own = r[box, 3 * k] * x + r[box, 3 * k + 1] * y + r[box, 3 * k + 2] * z
+        beyond = abs(own) - ground.half[box, k]
+        if beyond > deepest:
+            deepest, face, side = beyond, k, (1.0 if own >= 0.0 else -1.0)
+        if beyond > 0.0:
+            square += beyond * beyond
+            signed = beyond if own >= 0.0 else -beyond
+            away = (
+                away[0] + signed * r[box, 3 * k],
+                away[1] + signed * r[box, 3 * k + 1],
+                away[2] + signed * r[box, 3 * k + 2],
+            )
+    distance = math.sqrt(square)
+    if distance > ON_THE_FACE:
+        return distance, (away[0] / distance, away[1] / distance, away[2] / distance)
+    normal = (side * r[box, 3 * face], side * r[box, 3 * face + 1], side * r[box, 3 * face + 2])
+    return deepest, normal
+
+
+@kernel
+def distance_to_face(ground: SpatialGroundModel, face: int, point: Triple) -> tuple[float, Triple]:
+    """Signed distance to the plane, which is face 0, or to a box; and the direction away."""
+    if face > 0:
+        return distance_to_box(ground, face - 1, point)
+    n = ground.normal[0], ground.normal[1], ground.normal[2]
+    return n[0] * point[0] + n[1] * point[1] + n[2] * point[2] - ground.height, n
+
+
+@kernel
+def nearest_face(ground: SpatialGroundModel, point: Triple) -> tuple[int, float, Triple]:
+    """Return the face that is nearest to a point, its signed distance and the direction away."""
+    best = 0
+    distance, normal = distance_to_face(ground, 0, point)
+    for box in range(ground.half.shape[0]):
+        other, away = distance_to_box(ground, box, point)
+        if other < distance:
+            best, distance, normal = box + 1, other, away
+    return best, distance, normal

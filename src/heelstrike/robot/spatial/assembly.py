@@ -1,0 +1,155 @@
+"""From arrays and names to a `SpatialRobot`: its feet, and what no robot may be."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heelstrike.errors import RobotError
+from heelstrike.robot.assembly import LARGEST_NUMBER
+from heelstrike.robot.model import Floats
+from heelstrike.robot.spatial.model import BALL, FREE, HINGE, SPATIAL_NUMBERS, SpatialModel
+from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot
+
+LEAST = 1e-30
+"""Resistance (kg, kg m²) of a joint that is none: places that differ by rounding make less."""
+
+
+def assembled_in_space(
+    name: str,
+    model: SpatialModel,
+    *,
+    joint_names: tuple[str, ...],
+    link_names: tuple[str, ...],
+    actuator_names: tuple[str, ...],
+    friction: tuple[float, ...],
+    source: str,
+    origin: Floats,
+    axes: Floats,
+) -> SpatialRobot:
+    """Make a robot in space of its numbers and names.
+
+    Parameters
+    ----------
+    name : str
+        Name of the robot.
+    model : SpatialModel
+        Its numbers.
+    joint_names, link_names, actuator_names : tuple of str
+        Its names.
+    friction : tuple of float
+        Friction of its contact points, as its file has it.
+    source : str
+        What to call the robot in messages.
+    origin, axes : (nl, 3) and (nl, 3, 3) float
+        World poses of its links in the reference configuration.
+
+    Raises
+    ------
+    RobotError
+        If a number is NaN or absurdly large, or a joint moves no mass.
+    """
+    _refuse_impossible_numbers(model, source)
+    _refuse_joints_without_inertia(model, joint_names, origin, axes, source)
+    return SpatialRobot(
+        name=name,
+        model=model,
+        joint_names=joint_names,
+        link_names=link_names,
+        actuator_names=actuator_names,
+        contact_names=_name_contacts(model, link_names),
+        feet=_find_feet(model, link_names, origin, axes),
+        contact_friction=friction,
+        source=source,
+    )
+
+
+def _name_contacts(model: SpatialModel, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Number the points of every link."""
+    found: list[str] = []
+    for link in np.unique(model.contact_link).tolist():
+        found += [f"{names[link]}_{k}" for k in range(np.count_nonzero(model.contact_link == link))]
+    return tuple(found)
+
+
+def _find_feet(
+    model: SpatialModel, names: tuple[str, ...], origin: Floats, axes: Floats
+) -> tuple[SpatialFoot, ...]:
+    """Find the links that end a leg: leaves of the tree with contact points, low on the robot.
+
+    Low means that, in the reference configuration, the lowest contact point of the link is below
+    the middle between the lowest one of the robot and the robot's centre of mass.
+    """
+    if not model.nc:
+        return ()
+    center = origin + np.einsum("lij,lj->li", axes, model.center_of_mass)
+    height = float(model.mass @ center[:, 2] / model.mass.sum())
+    place = np.einsum("cij,cj->ci", axes[model.contact_link], model.contact_position)
+    along = np.einsum("cij,cj->ci", axes[model.contact_link], model.contact_axis)[:, 2]
+    drop = model.contact_radius + model.contact_rim * np.sqrt(np.maximum(0.0, 1.0 - along**2))
+    bottom = origin[model.contact_link, 2] + place[:, 2] - drop
+    low = bottom.min() + 0.5 * max(0.0, height - float(bottom.min()))
+    leaves = np.setdiff1d(model.contact_link, model.parent).tolist()
+    contacts = {link: np.flatnonzero(model.contact_link == link) for link in leaves}
+    return tuple(
+        SpatialFoot(names[link], link, tuple(contacts[link].tolist()))
+        for link in leaves
+        if bottom[contacts[link]].min() <= low
+    )
+
+
+def _refuse_impossible_numbers(model: SpatialModel, source: str) -> None:
+    """Refuse NaN, and what is infinite or huge where only a limit may be."""
+    for name, values in model.members().items():
+        number = SPATIAL_NUMBERS[name]
+        bad = np.isnan(values) if number.infinite else ~(np.abs(values) <= LARGEST_NUMBER)
+        if np.any(bad):
+            words = number.label or name.replace("_", " ")
+            raise RobotError(
+                f"{source}: the {words} of the robot is not a number below {LARGEST_NUMBER:g}. "
+                "Look for NaN or a misplaced exponent in the file."
+            )
+
+
+def _refuse_joints_without_inertia(
+    model: SpatialModel, joint_names: tuple[str, ...], origin: Floats, axes: Floats, source: str
+) -> None:
+    """Refuse joints whose acceleration no mass resists: their equations of motion say 0 = 0."""
+    idle = idle_joints(model, origin, axes)
+    if idle:
+        raise RobotError(
+            f"{source}: joint {joint_names[idle[0]]!r} moves no mass and has no armature, so that "
+            "nothing resists it. Give the link that it moves a mass and moments of inertia, or "
+            "make it a fixed joint."
+        )
+
+
+def idle_joints(model: SpatialModel, origin: Floats, axes: Floats) -> list[int]:
+    """Joints that nothing resists, with their links in given world poses."""
+    resistance = model.armature.copy()
+    center = origin + np.einsum("lij,lj->li", axes, model.center_of_mass)
+    for link in range(model.nl):
+        xx, yy, zz, xy, xz, yz = model.inertia[link]
+        local = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        tensor = axes[link] @ local @ axes[link].T
+        above = link
+        while above >= 0:
+            for k, (turns, along) in enumerate(_motions(model, above, axes)):
+                moved = along + np.cross(turns, center[link] - origin[above])
+                resistance[model.first_velocity[above] + k] += (
+                    model.mass[link] * moved @ moved + turns @ tensor @ turns
+                )
+            above = int(model.parent[above])
+    return [int(joint) for joint in np.unique(model.velocity_joint[~(resistance > LEAST)])]
+
+
+def _motions(model: SpatialModel, link: int, axes: Floats) -> list[tuple[Floats, Floats]]:
+    """Angular velocity and velocity of the origin of a link, per unit of its joint's velocities."""
+    still = np.zeros(3)
+    kind = int(model.joint_kind[link])
+    axis = axes[link] @ model.axis[link]
+    turns = [(axes[link][:, k], still) for k in range(3)]
+    if kind == FREE:
+        return [*((still, np.eye(3)[k]) for k in range(3)), *turns]
+    if kind == BALL:
+        return turns
+    return [(axis, still)] if kind == HINGE else [(still, axis)]

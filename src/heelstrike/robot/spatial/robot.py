@@ -1,0 +1,327 @@
+"""What a robot in space is: the kernels' arrays with the names and feet a person needs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+
+import numpy as np
+
+from heelstrike.arguments import refusal, takes
+from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
+from heelstrike.robot.spatial.model import BALL, FREE, JointKind, SpatialModel
+from heelstrike.robot.state import State
+from heelstrike.wording import meant
+
+UNIT = 1e-6
+"""How far the length of a quaternion that a user gives may be from one: files give six digits."""
+
+PLACE, QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
+LINEAR, ANGULAR = ("vx", "vy", "vz"), ("wx", "wy", "wz")
+
+
+@dataclass(frozen=True)
+class SpatialFoot:
+    """A link in space that ends a leg and carries contact points."""
+
+    name: str
+    """Name of the foot's body in the robot file."""
+    link: int
+    """Index of the foot's link."""
+    contacts: tuple[int, ...]
+    """Indices of its contact points."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpatialRobot:
+    """A robot in three dimensions.
+
+    Positions and velocities are those of MuJoCo for the same file: of a free joint the place of its
+    body and a unit quaternion, real part first; the linear velocity in world axes, the angular one
+    in body axes. A ball joint has a quaternion and an angular velocity in the axes of its body.
+    """
+
+    name: str
+    """Name of the robot."""
+    model: SpatialModel
+    """The arrays that the kernels use."""
+    joint_names: tuple[str, ...]
+    link_names: tuple[str, ...]
+    """joint_names, link_names: Names of the nj joints and of the links they move. A body with
+    several joints gives several links that share its name."""
+    actuator_names: tuple[str, ...]
+    """Names of the nu actuators."""
+    contact_names: tuple[str, ...]
+    """Names of the nc contact points."""
+    feet: tuple[SpatialFoot, ...]
+    """Links that end a leg and carry contact points, in file order."""
+    contact_friction: tuple[float, ...] = ()
+    """Friction of the nc contact points according to the robot's file. A simulation takes friction
+    from its `Ground`."""
+    source: str = field(default="", repr=False)
+    """File the robot came from, for error messages."""
+
+    @property
+    def nl(self) -> int:
+        """Number of links."""
+        return self.model.nl
+
+    @property
+    def nj(self) -> int:
+        """Number of joints, one a link."""
+        return self.model.nj
+
+    @property
+    def nq(self) -> int:
+        """Number of positions."""
+        return self.model.nq
+
+    @property
+    def nv(self) -> int:
+        """Number of velocities."""
+        return self.model.nv
+
+    @property
+    def nu(self) -> int:
+        """Number of joint torques."""
+        return self.model.nu
+
+    @property
+    def nc(self) -> int:
+        """Number of contact points."""
+        return self.model.nc
+
+    @property
+    def floating(self) -> bool:
+        """Whether the first joint is free."""
+        return int(self.model.joint_kind[0]) == FREE
+
+    @property
+    def position_names(self) -> tuple[str, ...]:
+        """Names of the nq positions: those of joints, or of what a joint has several of."""
+        return self._names((*PLACE, *QUATERNION), QUATERNION)
+
+    @property
+    def velocity_names(self) -> tuple[str, ...]:
+        """Names of the nv velocities: those of joints, or of what a joint has several of."""
+        return self._names((*LINEAR, *ANGULAR), ANGULAR)
+
+    def _names(self, free: tuple[str, ...], ball: tuple[str, ...]) -> tuple[str, ...]:
+        endings = {FREE: free, BALL: ball}
+        return tuple(
+            f"{name}_{ending}" if ending else name
+            for name, kind in zip(self.joint_names, self.model.joint_kind.tolist(), strict=True)
+            for ending in endings.get(kind, ("",))
+        )
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of the whole robot in kg."""
+        return float(np.sum(self.model.mass))
+
+    @property
+    def weight(self) -> float:
+        """Total mass times gravity, in N."""
+        return self.total_mass * float(np.linalg.norm(self.model.gravity))
+
+    def reference_state(self) -> State:
+        """State at rest in the reference configuration of the robot's file."""
+        return State(self.model.reference.copy(), np.zeros(self.nv))
+
+    def joint_index(self, joint: str | int) -> int:
+        """Index of a joint, given by its name (or by an index, which is checked).
+
+        Parameters
+        ----------
+        joint : str or int
+            Name of the joint, or an index.
+
+        Returns
+        -------
+        int
+            Its place among the joints; ``model.first_position`` and ``model.first_velocity`` tell
+            those in q and v.
+
+        Raises
+        ------
+        RobotError
+            If there is no such joint; the message lists those there are.
+        """
+        return index_in(self, "joint", self.joint_names, joint)
+
+    def actuator_index(self, actuator: str | int) -> int:
+        """Index of an actuator, given by its name or index; see `joint_index`.
+
+        Parameters
+        ----------
+        actuator : str or int
+            Name of the actuator, or an index.
+
+        Returns
+        -------
+        int
+            Its place among the torques.
+        """
+        return index_in(self, "actuator", self.actuator_names, actuator)
+
+    @takes(RobotError)
+    def state(
+        self,
+        position: Mapping[str, float] | None = None,
+        velocity: Mapping[str, float] | None = None,
+        *,
+        start: State | None = None,
+    ) -> State:
+        """Make a state with some positions and velocities set by their names.
+
+        Parameters
+        ----------
+        position : mapping, optional
+            Positions (rad, m, entries of quaternions) by `position_names`: a hinge or slide by the
+            name of its joint. Quaternions are made unit again.
+        velocity : mapping, optional
+            Velocities (rad/s, m/s) by `velocity_names`.
+        start : State, optional
+            Where all others are, by default at rest in the reference configuration.
+
+        Returns
+        -------
+        State
+            The state.
+
+        Raises
+        ------
+        RobotError
+            If a name is unknown, or a number is not finite.
+        """
+        before = start or self.reference_state()
+        q, v = before.q.copy(), before.v.copy()
+        for vector, names, values, what in (
+            (q, self.position_names, position or {}, "position"),
+            (v, self.velocity_names, velocity or {}, "velocity"),
+        ):
+            for name, value in values.items():
+                vector[index_in(self, what, names, name)] = float(value)
+        for first in quaternion_places(self.model):
+            q[first : first + 4] /= np.linalg.norm(q[first : first + 4])
+        return checked_state(self, State(q, v))
+
+    def positions(self, state: State) -> dict[str, float]:
+        """Positions of a state by `position_names`, in rad and m.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        dict
+            Position by name.
+        """
+        return dict(zip(self.position_names, checked_state(self, state).q.tolist(), strict=True))
+
+    def velocities(self, state: State) -> dict[str, float]:
+        """Velocities of a state by `velocity_names`, in rad/s and m/s.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        dict
+            Velocity by name.
+        """
+        return dict(zip(self.velocity_names, checked_state(self, state).v.tolist(), strict=True))
+
+    def __repr__(self) -> str:
+        kinds = [JointKind(kind) for kind in self.model.joint_kind.tolist()]
+        several = {kind.name.lower(): kinds.count(kind) for kind in JointKind if kind in kinds}
+        joints = ", ".join(f"{count} {name}" for name, count in several.items())
+        return (
+            f"SpatialRobot({self.name!r}: {self.nv} velocities ({joints}), {self.nu} actuators, "
+            f"{self.nc} contact points, {self.total_mass:g} kg)"
+        )
+
+
+def index_in(robot: SpatialRobot, what: str, names: tuple[str, ...], given: str | int) -> int:
+    """Return the index of something of a robot, given by its name or index.
+
+    Raises
+    ------
+    RobotError
+        If the robot has nothing of that name or index; the message lists what it has.
+    """
+    if isinstance(given, str):
+        if given in names:
+            return names.index(given)
+    elif (
+        isinstance(given, int | np.integer)
+        and not isinstance(given, bool)
+        and -len(names) <= given < len(names)
+    ):
+        return int(given) % len(names)
+    known = ", ".join(dict.fromkeys(names)) or "none"
+    raise RobotError(
+        f"robot {robot.name!r} has no {what} {given!r}.{meant(str(given), names)} It has {known}"
+        + (f" (0 to {len(names) - 1})." if names else ".")
+    )
+
+
+def quaternion_places(model: SpatialModel) -> list[int]:
+    """Where in q the quaternions begin."""
+    first, kinds = model.first_position.tolist(), model.joint_kind.tolist()
+    inside = {FREE: 3, BALL: 0}
+    return [
+        place + inside[kind] for place, kind in zip(first, kinds, strict=True) if kind in inside
+    ]
+
+
+def checked_position(robot: SpatialRobot, q: Floats) -> Floats:
+    """Return a position whose quaternions are of length one, to rounding.
+
+    Raises
+    ------
+    RobotError
+        If it has not nq finite numbers, or a quaternion is far from length one.
+    """
+    if q.shape != (robot.nq,) or not np.all(np.isfinite(q)):
+        raise RobotError(
+            f"q of robot {robot.name!r} must be {robot.nq} finite numbers "
+            f"({', '.join(robot.position_names)}), got {q!r}."
+        )
+    unit = q.copy()
+    for first in quaternion_places(robot.model):
+        length = float(np.linalg.norm(q[first : first + 4]))
+        if abs(length - 1.0) > UNIT:
+            joint = int(np.searchsorted(robot.model.first_position, first, side="right")) - 1
+            raise RobotError(
+                f"the quaternion of joint {robot.joint_names[joint]!r} of robot {robot.name!r} "
+                f"(q[{first}] to q[{first + 3}], real part first) has length {length:.6g}; it must "
+                "be one."
+            )
+        unit[first : first + 4] /= length
+    return unit
+
+
+def checked_state(robot: SpatialRobot, state: State) -> State:
+    """Return a copy of a state that fits a robot.
+
+    Raises
+    ------
+    RobotError
+        If it is none, has not nq positions and nv velocities, all finite, or a quaternion is far
+        from length one.
+    """
+    if not isinstance(state, State):
+        raise RobotError(refusal("state", state, ["State"]))
+    if state.v.shape != (robot.nv,) or not np.all(np.isfinite(state.v)):
+        raise RobotError(
+            f"v of a state of robot {robot.name!r} must be {robot.nv} finite numbers "
+            f"({', '.join(robot.velocity_names)}), got {state.v!r}."
+        )
+    return State(checked_position(robot, state.q), state.v)

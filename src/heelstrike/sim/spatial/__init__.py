@@ -1,0 +1,23 @@
+"""Time stepping of robots in space, and the run it leaves behind."""
+
+from heelstrike.sim.spatial.controlled import SpatialControlledRobot, SpatialControlState
+from heelstrike.sim.spatial.record import SpatialEventKind
+from heelstrike.sim.spatial.run import (
+    SpatialCertificates,
+    SpatialEvent,
+    SpatialRun,
+    SpatialSolverCount,
+)
+from heelstrike.sim.spatial.simulation import SpatialSimulation, SpatialSnapshot
+
+__all__ = [
+    "SpatialCertificates",
+    "SpatialControlState",
+    "SpatialControlledRobot",
+    "SpatialEvent",
+    "SpatialEventKind",
+    "SpatialRun",
+    "SpatialSimulation",
+    "SpatialSnapshot",
+    "SpatialSolverCount",
+]

@@ -1,0 +1,242 @@
+"""What takes part in a step: points, stops and dry friction that could act within it, as rows.
+
+The rows of a point are those of the body at its projection onto the ground, not at the point: of
+one flat foot with unequal gaps the rows then lie in one plane, and sticking contradicts itself
+nowhere.
+"""
+
+from __future__ import annotations
+
+import math
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.spatial.ground import (
+    SpatialGroundModel,
+    distance_to_face,
+    nearest_face,
+)
+from heelstrike.dynamics.spatial.algebra import dot, spatial, velocity_at
+from heelstrike.dynamics.spatial.configurations import turn_between
+from heelstrike.dynamics.spatial.kinematics import place_of
+from heelstrike.dynamics.spatial.rotations import matrix, quaternion_at
+from heelstrike.dynamics.spatial.rows import (
+    along_rows,
+    contact_center,
+    contact_frame,
+    contact_point,
+    whiten_rows,
+    write_delassus,
+    write_point_rows,
+    write_velocity_row,
+)
+from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
+from heelstrike.robot.model import Floats
+from heelstrike.robot.spatial.model import SpatialModel
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.spatial.memory import (
+    SpatialAssembly,
+    SpatialEquations,
+    SpatialFeet,
+)
+from heelstrike.sim.spatial.table import BALL_STOP, DRY_JOINT, POINT, STOP, BlockTable
+
+CLOSING = 5.0
+"""Speed (m/s) at which what closes within a step takes part; or at twice its free speed."""
+
+FAR = 20.0
+"""Steps at that speed beyond which nothing is looked at."""
+
+CLOSING_TURN = 20.0
+"""The same of joints at their stops (rad/s, m/s)."""
+
+NO_ANGLE = 1e-12
+"""Turn (rad) of a ball joint that has no axis."""
+
+
+@kernel
+def locate_points(
+    model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, table: BlockTable,
+    contacts: Contacts, feet: SpatialFeet,
+) -> None:  # fmt: skip
+    """Find where the contact points are, and the ground that is nearest to each."""
+    for contact in range(model.nc):
+        center = contact_center(model, tree, contact)
+        face, _, normal = nearest_face(ground, center)
+        point = contact_point(model, tree, contact, normal)
+        gap, normal = distance_to_face(ground, face, point)
+        frame = contact_frame(normal)
+        for k in range(3):
+            contacts.position[contact, k] = point[k]
+            contacts.normal[contact, k] = normal[k]
+            feet.foot[contact, k] = point[k] - gap * normal[k]
+        for k in range(9):
+            feet.frame[contact, k] = frame[k]
+        contacts.gap[contact] = gap
+        table.gap[contact] = gap
+        table.friction[contact] = model.friction_scale[contact] * ground.friction[face]
+        bounces = model.restitution_scale[contact] * ground.restitution[face]
+        table.restitution[contact] = min(bounces, 1.0)
+
+
+@kernel
+def locate_ends(model: SpatialModel, q: Floats, table: BlockTable) -> None:
+    """Find how far joints are from the ends of their ranges."""
+    for entry in range(table.kind.shape[0]):
+        joint = table.owner[entry]
+        if table.kind[entry] == STOP:
+            limit = model.lower[joint] if table.side[entry] > 0.0 else model.upper[joint]
+            table.gap[entry] = table.side[entry] * (q[model.first_position[joint]] - limit)
+        elif table.kind[entry] == BALL_STOP:
+            x, y, z = turn_of_ball(model, joint, q)
+            table.gap[entry] = model.upper[joint] - math.sqrt(x * x + y * y + z * z)
+
+
+@kernel
+def turn_of_ball(model: SpatialModel, joint: int, q: Floats) -> tuple[float, float, float]:
+    """Rotation vector of a ball joint from where it has not turned, in body axes."""
+    own = quaternion_at(q, model.first_position[joint])
+    return turn_between((1.0, 0.0, 0.0, 0.0), own)
+
+
+@kernel
+def normal_speed(
+    model: SpatialModel, tree: SpatialWorkspace, contact: int, feet: SpatialFeet, v: Floats
+) -> float:
+    """Normal velocity of a contact point at some velocities."""
+    foot = feet.foot[contact, 0], feet.foot[contact, 1], feet.foot[contact, 2]
+    normal = feet.frame[contact, 0], feet.frame[contact, 1], feet.frame[contact, 2]
+    place = place_of(tree, foot)
+    last = model.last_velocity[model.contact_link[contact]]
+    speed = 0.0
+    for a in range(model.depth[last] + 1):
+        k = model.chain[last, a]
+        speed += dot(normal, velocity_at(spatial(tree.motion, k), place)) * v[k]
+    return speed
+
+
+@kernel
+def ball_speed(model: SpatialModel, joint: int, q: Floats, v: Floats) -> float:
+    """How fast a ball joint comes away from its stop."""
+    x, y, z = turn_of_ball(model, joint, q)
+    length = math.sqrt(x * x + y * y + z * z)
+    if length < NO_ANGLE:
+        return 0.0
+    k = model.first_velocity[joint]
+    return -(x * v[k] + y * v[k + 1] + z * v[k + 2]) / length
+
+
+@kernel
+def entry_speed(
+    model: SpatialModel, tree: SpatialWorkspace, entry: int, table: BlockTable, feet: SpatialFeet,
+    q: Floats, v: Floats,
+) -> float:  # fmt: skip
+    """How fast the gap of an entry opens at some velocities."""
+    owner = table.owner[entry]
+    if table.kind[entry] == POINT:
+        return normal_speed(model, tree, owner, feet, v)
+    if table.kind[entry] == STOP:
+        return table.side[entry] * v[model.first_velocity[owner]]
+    return ball_speed(model, owner, q, v)
+
+
+@kernel
+def is_far(step: float, entry: int, table: BlockTable) -> bool:
+    """Whether something is too far away to be looked at: 100 m/s would not bring it there."""
+    closing = CLOSING if table.kind[entry] == POINT else CLOSING_TURN
+    return table.gap[entry] > FAR * closing * step
+
+
+@kernel
+def could_act(
+    model: SpatialModel, step: float, tree: SpatialWorkspace, entry: int, table: BlockTable,
+    feet: SpatialFeet, q: Floats, v: Floats,
+) -> bool:  # fmt: skip
+    """Whether something could act within a step."""
+    if table.kind[entry] == DRY_JOINT or table.called[entry] == 1:
+        return True
+    gap = table.gap[entry]
+    if gap <= step * (CLOSING if table.kind[entry] == POINT else CLOSING_TURN):
+        return True
+    if is_far(step, entry, table):
+        return False
+    return gap + 2.0 * step * entry_speed(model, tree, entry, table, feet, q, v) < 0.0
+
+
+@kernel
+def list_candidates(
+    model: SpatialModel, step: float, tree: SpatialWorkspace, table: BlockTable,
+    feet: SpatialFeet, q: Floats, v: Floats, assembly: SpatialAssembly,
+) -> None:  # fmt: skip
+    """List what could act within a step at the free velocity v, with where its rows begin."""
+    count = rows = 0
+    problem = assembly.problem
+    for entry in range(table.kind.shape[0]):
+        if not could_act(model, step, tree, entry, table, feet, q, v):
+            continue
+        assembly.candidate[count] = entry
+        assembly.last[count] = table.last[entry]
+        problem.first[count] = rows
+        problem.set[count] = table.set[entry]
+        problem.friction[count] = table.friction[entry]
+        problem.bound[count] = 0.0
+        if table.kind[entry] == DRY_JOINT:
+            problem.bound[count] = step * model.dry_friction[table.owner[entry]]
+        assembly.answer.mode[count] = table.mode[entry]
+        for i in range(table.size[entry]):
+            assembly.answer.impulse[rows + i] = table.impulse[entry, i]
+        rows += table.size[entry]
+        count += 1
+    problem.first[count] = rows
+    problem.count = count
+    assembly.count = count
+
+
+@kernel
+def write_rows_of(
+    model: SpatialModel, tree: SpatialWorkspace, entry: int, first: int, table: BlockTable,
+    feet: SpatialFeet, q: Floats, rows: Floats,
+) -> None:  # fmt: skip
+    """Write the rows of an entry along its chain."""
+    owner = table.owner[entry]
+    if table.kind[entry] == POINT:
+        foot = feet.foot[owner, 0], feet.foot[owner, 1], feet.foot[owner, 2]
+        frame = matrix(feet.frame, owner)
+        write_point_rows(model, tree, model.contact_link[owner], foot, frame, first, rows)
+    elif table.kind[entry] == STOP:
+        write_velocity_row(model, model.first_velocity[owner], table.side[entry], first, rows)
+    elif table.kind[entry] == DRY_JOINT:
+        write_velocity_row(model, owner, 1.0, first, rows)
+    else:
+        x, y, z = turn_of_ball(model, owner, q)
+        length = max(math.sqrt(x * x + y * y + z * z), NO_ANGLE)
+        last = table.last[entry]
+        write_velocity_row(model, last, -z / length, first, rows)
+        depth = model.depth[last]
+        rows[first, depth - 1] = -y / length
+        rows[first, depth - 2] = -x / length
+
+
+@kernel
+def assemble(
+    model: SpatialModel, step: float, table: BlockTable, feet: SpatialFeet, q: Floats, v: Floats,
+    next_v: Floats, equations: SpatialEquations, assembly: SpatialAssembly,
+) -> None:  # fmt: skip
+    """Write the contact problem of the candidates, gaps linearised over the step.
+
+    v is the velocity as the step begins, next_v the free one at its end.
+    """
+    problem, rows = assembly.problem, assembly.rows
+    for place in range(assembly.count):
+        entry = assembly.candidate[place]
+        first, last = problem.first[place], assembly.last[place]
+        size = problem.first[place + 1] - first
+        write_rows_of(model, equations.tree, entry, first, table, feet, q, rows)
+        along_rows(model, last, first, 1, rows, v, problem.free)
+        assembly.before[place] = problem.free[first]
+        along_rows(model, last, first, size, rows, next_v, problem.free)
+        if table.kind[entry] != DRY_JOINT:
+            problem.free[first] += table.gap[entry] / step
+        whiten_rows(model, equations.factor, last, first, size, rows)
+    write_delassus(
+        model, assembly.count, problem.first, assembly.last, rows, problem.delassus
+    )  # fmt: skip

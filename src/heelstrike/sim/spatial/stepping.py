@@ -1,0 +1,406 @@
+"""One step of a robot in space: its velocity at the end, by contact impulses.
+
+The scheme is that of the plane (:mod:`heelstrike.sim.time_stepping.method`): gaps linearised over
+the step, impacts whole within it. A step whose contact problem is not certified is halved, three
+times at most; if that does not help it goes on with a residual of up to 1e-6, marked, and above
+that the run ends.
+"""
+
+from __future__ import annotations
+
+import math
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.spatial.certified_solve import solve_block_problem
+from heelstrike.contact.spatial.ground import SpatialGroundModel
+from heelstrike.contact.spatial.modes import SOLVED
+from heelstrike.contact.spatial.workspace import BlockWorkspace
+from heelstrike.dynamics.spatial.algebra import dot, spatial, velocity_at
+from heelstrike.dynamics.spatial.configurations import integrate
+from heelstrike.dynamics.spatial.equations import (
+    passive_force,
+    solve_factorized,
+    state_equations,
+)
+from heelstrike.dynamics.spatial.kinematics import (
+    link_velocities,
+    place_of,
+    point_position,
+    point_velocity,
+)
+from heelstrike.dynamics.spatial.rows import velocity_change
+from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
+from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.spatial.model import SpatialModel
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.spatial.candidates import (
+    NO_ANGLE,
+    assemble,
+    entry_speed,
+    is_far,
+    list_candidates,
+    locate_ends,
+    locate_points,
+    turn_of_ball,
+)
+from heelstrike.sim.spatial.impact import closes, solve_impact_of, touches_at_end
+from heelstrike.sim.spatial.memory import (
+    SpatialAssembly,
+    SpatialEquations,
+    SpatialFeet,
+    SpatialImpact,
+    SpatialMemory,
+    SpatialPushes,
+)
+from heelstrike.sim.spatial.table import (
+    BALL_STOP,
+    DRY_JOINT,
+    POINT,
+    STOP,
+    BlockTable,
+)
+from heelstrike.tolerances import CLOSED_GAP
+
+HALVINGS_OF_A_STEP = 3
+"""How often an uncertified step is halved."""
+
+BEARABLE = 1e-6
+"""Residual up to which an uncertified step goes on, marked."""
+
+CALLS = 6
+"""How often a step is solved again for what it would throw through the ground."""
+
+LEFT_IN_THE_GROUND = 1e-4
+"""What is no deeper in the ground than this (m) may be left there where there is no way out."""
+
+
+@kernel
+def find_state(
+    model: SpatialModel, ground: SpatialGroundModel, q: Floats, v: Floats,
+    equations: SpatialEquations, table: BlockTable, contacts: Contacts, feet: SpatialFeet,
+) -> None:  # fmt: skip
+    """Equations of motion and contact points of the state now."""
+    state_equations(model, q, v, equations.tree, equations.factor, equations.bias)
+    locate_points(model, ground, equations.tree, table, contacts, feet)
+    locate_ends(model, q, table)
+
+
+@kernel
+def add_spatial_pushes(
+    model: SpatialModel, time: float, step: float, equations: SpatialEquations,
+    pushes: SpatialPushes, force: Floats,
+) -> None:  # fmt: skip
+    """Add the mean force of the pushes over a step."""
+    tree = equations.tree
+    for i in range(pushes.link.shape[0]):
+        acting = min(time + step, pushes.end[i]) - max(time, pushes.start[i])
+        if acting <= 0.0:
+            continue
+        share = acting / step
+        f = share * pushes.force[i, 0], share * pushes.force[i, 1], share * pushes.force[i, 2]
+        at = pushes.point[i, 0], pushes.point[i, 1], pushes.point[i, 2]
+        place = place_of(tree, point_position(tree, pushes.link[i], at))
+        last = model.last_velocity[pushes.link[i]]
+        for a in range(model.depth[last] + 1):
+            k = model.chain[last, a]
+            force[k] += dot(f, velocity_at(spatial(tree.motion, k), place))
+
+
+@kernel
+def find_free_velocity(
+    model: SpatialModel, time: float, step: float, q: Floats, v: Floats, torque: Floats,
+    pushes: SpatialPushes, equations: SpatialEquations, next_v: Floats,
+) -> None:  # fmt: skip
+    """Velocity at the end of the step if nothing held the robot."""
+    force, rate = equations.force, equations.rate
+    passive_force(model, q, v, force)
+    for i in range(model.nu):
+        force[model.actuator_velocity[i]] += torque[i]
+    add_spatial_pushes(model, time, step, equations, pushes, force)
+    for k in range(model.nv):
+        rate[k] = step * (force[k] - equations.bias[k])
+    solve_factorized(model, equations.factor, rate)
+    for k in range(model.nv):
+        next_v[k] = v[k] + rate[k]
+
+
+@kernel
+def add_impulses(
+    model: SpatialModel, impulse: Floats, equations: SpatialEquations, assembly: SpatialAssembly,
+    v: Floats,
+) -> None:  # fmt: skip
+    """Add what impulses of the candidates do to a velocity."""
+    velocity_change(
+        model, equations.factor, assembly.count, assembly.problem.first, assembly.last,
+        assembly.rows, impulse, assembly.change,
+    )  # fmt: skip
+    for k in range(model.nv):
+        v[k] += assembly.change[k]
+
+
+@kernel
+def call_what_is_missed(
+    model: SpatialModel, step: float, tree: SpatialWorkspace, feet: SpatialFeet, q: Floats,
+    v: Floats, count: int, candidate: Integers, table: BlockTable,
+) -> bool:  # fmt: skip
+    """Call what the velocity that was found takes through the ground or a stop; return if any."""
+    called = False
+    for entry in range(table.kind.shape[0]):
+        if table.kind[entry] == DRY_JOINT:
+            continue
+        taking_part = table.called[entry] == 1
+        for place in range(count):
+            taking_part = taking_part or candidate[place] == entry
+        if taking_part or is_far(step, entry, table):
+            continue
+        speed = entry_speed(model, tree, entry, table, feet, q, v)
+        if table.gap[entry] + step * speed < -CLOSED_GAP:
+            table.called[entry] = 1
+            called = True
+    return called
+
+
+@kernel
+def forgive_depth(step: float, table: BlockTable, assembly: SpatialAssembly) -> bool:
+    """Ask nothing to come out of the ground; return if that changes anything bearable."""
+    changed = False
+    for place in range(assembly.count):
+        gap = table.gap[assembly.candidate[place]]
+        if gap < -LEFT_IN_THE_GROUND:
+            return False
+        changed = changed or gap < 0.0
+    for place in range(assembly.count if changed else 0):
+        gap = table.gap[assembly.candidate[place]]
+        if gap < 0.0:
+            assembly.problem.free[assembly.problem.first[place]] -= gap / step
+    return changed
+
+
+@kernel
+def goes_on_wedged(steps: int, impact: SpatialImpact) -> bool:
+    """Whether the step before had no way out, and is not asked again: at 1, 2, 4, 8, ... steps."""
+    age = steps - impact.since
+    return impact.wedged == steps - 1 and age & (age - 1) != 0
+
+
+@kernel
+def note_relaxed(steps: int, impact: SpatialImpact) -> None:
+    """Keep that a step is not asked to come out of the ground."""
+    impact.relaxed = 1
+    if impact.wedged < steps - 1:
+        impact.since = steps
+    impact.wedged = steps
+
+
+@kernel
+def solve_positions(
+    step: float, steps: int, table: BlockTable, solver: BlockWorkspace,
+    assembly: SpatialAssembly, impact: SpatialImpact,
+) -> int:  # fmt: skip
+    """Solve the problem of the positions; where there is no way out, without asking for one.
+
+    Limbs that lie on several points, at the ends of their ranges, find none where each of their
+    points is in the ground by another billionth: each would have to slide its own way. They are
+    left there, and asked again when that is twice as long ago.
+    """
+    impact.relaxed = 0
+    at_once = goes_on_wedged(steps, impact) and forgive_depth(step, table, assembly)
+    if at_once:
+        note_relaxed(steps, impact)
+    status = solve_block_problem(assembly.problem, solver, assembly.answer)
+    if status != SOLVED and not at_once and forgive_depth(step, table, assembly):
+        note_relaxed(steps, impact)
+        status = solve_block_problem(assembly.problem, solver, assembly.answer)
+    return status
+
+
+@kernel
+def solve_step_of(
+    model: SpatialModel, time: float, step: float, resolves: bool, memory: SpatialMemory
+) -> float:
+    """Find the velocity at the end of a step; return the largest residual, zero if certified.
+
+    ``memory.next_v`` receives the velocity, ``memory.impact.arriving`` that with which positions
+    move, ``memory.impact.impulse`` the impulses of the candidates.
+    """
+    equations, assembly, impact = memory.equations, memory.assembly, memory.impact
+    table, v, next_v = memory.blocks, memory.v, memory.next_v
+    worst = 0.0
+    for entry in range(table.called.shape[0]):
+        table.called[entry] = 0
+    before = memory.tally.steps - 1
+    for _ in range(CALLS):
+        worst = 0.0
+        find_free_velocity(
+            model, time, step, memory.q, v, memory.torque, memory.pushes, equations, next_v
+        )  # fmt: skip
+        list_candidates(
+            model, step, equations.tree, table, memory.feet, memory.q, next_v, assembly
+        )  # fmt: skip
+        impact.happens = impact.relaxed = 0
+        impact.gain = 0.0
+        for k in range(model.nv):
+            impact.arriving[k] = next_v[k]
+        if assembly.count > 0:
+            assemble(
+                model, step, table, memory.feet, memory.q, v, next_v, equations, assembly
+            )  # fmt: skip
+            steps = memory.tally.steps
+            if solve_positions(step, steps, table, memory.solver, assembly, impact) != SOLVED:
+                worst = assembly.answer.residual
+            add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
+            for row in range(assembly.problem.first[assembly.count]):
+                impact.impulse[row] = assembly.answer.impulse[row]
+            if resolves and worst == 0.0 and closes(step, before, table, assembly):
+                impact.happens = 1
+                status = solve_impact_of(step, before, table, memory.solver, assembly, impact)
+                if status != SOLVED:
+                    worst = impact.answer.residual
+                add_impulses(model, impact.impulse, equations, assembly, next_v)
+            else:
+                for k in range(model.nv):
+                    next_v[k] = impact.arriving[k]
+        if not call_what_is_missed(
+            model, step, equations.tree, memory.feet, memory.q, impact.arriving, assembly.count,
+            assembly.candidate, table,
+        ):  # fmt: skip
+            break
+    return worst
+
+
+@kernel
+def note_answer_of(
+    step: float, length: float, steps: int, impulse: Floats, assembly: SpatialAssembly,
+    table: BlockTable,
+) -> None:  # fmt: skip
+    """Keep modes and impulses for the next step, and add up forces over the whole step."""
+    first = assembly.problem.first
+    place = 0
+    for entry in range(table.kind.shape[0]):
+        takes_part = place < assembly.count and assembly.candidate[place] == entry
+        for i in range(table.size[entry]):
+            table.impulse[entry, i] = 0.0
+        if not takes_part:
+            table.mode[entry] = 0 if table.kind[entry] != DRY_JOINT else table.mode[entry]
+            continue
+        table.mode[entry] = assembly.answer.mode[place]
+        if table.kind[entry] != DRY_JOINT and touches_at_end(step, place, assembly):
+            table.touching[entry] = steps
+        for i in range(table.size[entry]):
+            table.impulse[entry, i] = assembly.answer.impulse[first[place] + i]
+            table.force[entry, i] += impulse[first[place] + i] / length
+        place += 1
+
+
+@kernel
+def share_forces(
+    model: SpatialModel, q: Floats, table: BlockTable, contact_force: Floats, stop_torque: Floats,
+    friction_torque: Floats,
+) -> None:  # fmt: skip
+    """Write the mean forces of the step where records and controllers look for them."""
+    for k in range(model.nv):
+        stop_torque[k] = 0.0
+        friction_torque[k] = 0.0
+    for entry in range(table.kind.shape[0]):
+        owner, kind = table.owner[entry], table.kind[entry]
+        if kind == POINT:
+            for i in range(3):
+                contact_force[owner, i] = table.force[entry, i]
+        elif kind == STOP:
+            k = model.first_velocity[owner]
+            stop_torque[k] += table.side[entry] * table.force[entry, 0]
+        elif kind == BALL_STOP:
+            x, y, z = turn_of_ball(model, owner, q)
+            share = table.force[entry, 0] / max(math.sqrt(x * x + y * y + z * z), NO_ANGLE)
+            k = model.first_velocity[owner]
+            stop_torque[k] -= share * x
+            stop_torque[k + 1] -= share * y
+            stop_torque[k + 2] -= share * z
+        else:
+            friction_torque[owner] += table.force[entry, 0]
+
+
+@kernel
+def find_slip(
+    model: SpatialModel, v: Floats, feet: SpatialFeet, tree: SpatialWorkspace, slip: Floats
+) -> None:
+    """Write the tangential velocity of every contact point at the end of the step.
+
+    The links of the tree have the velocities of then, afterwards.
+    """
+    link_velocities(model, v, tree)
+    for contact in range(model.nc):
+        foot = feet.foot[contact, 0], feet.foot[contact, 1], feet.foot[contact, 2]
+        speed = point_velocity(tree, model.contact_link[contact], foot)
+        one = feet.frame[contact, 3], feet.frame[contact, 4], feet.frame[contact, 5]
+        two = feet.frame[contact, 6], feet.frame[contact, 7], feet.frame[contact, 8]
+        slip[contact, 0] = dot(one, speed)
+        slip[contact, 1] = dot(two, speed)
+
+
+@kernel
+def begin_step(table: BlockTable) -> None:
+    """Forget the forces of the step before."""
+    for entry in range(table.kind.shape[0]):
+        for i in range(3):
+            table.force[entry, i] = 0.0
+
+
+@kernel
+def take_step(
+    model: SpatialModel, ground: SpatialGroundModel, time: float, length: float, resolves: bool,
+    memory: SpatialMemory,
+) -> tuple[bool, bool]:  # fmt: skip
+    """Move on by a step, or by the parts of a halved one; the state has been found already.
+
+    Returns whether it could be done, and whether all of it is certified.
+    """
+    begin_step(memory.blocks)
+    halvings, done = 0, 0
+    parts = 1
+    certified = True
+    gain = 0.0
+    while done < parts:
+        step = length / parts
+        if done > 0:
+            find_state(
+                model, ground, memory.q, memory.v, memory.equations, memory.blocks,
+                memory.contacts, memory.feet,
+            )  # fmt: skip
+        worst = solve_step_of(model, time + done * step, step, resolves, memory)
+        if worst > 0.0 and halvings < HALVINGS_OF_A_STEP:
+            if halvings == 0:
+                memory.tally.halved += 1
+            halvings += 1
+            parts *= 2
+            done *= 2
+            continue
+        if not worst <= BEARABLE:
+            return False, False
+        if worst > 0.0:
+            certified = False
+        note_answer_of(
+            step, length, memory.tally.steps, memory.impact.impulse, memory.assembly, memory.blocks
+        )  # fmt: skip
+        gain += memory.impact.gain
+        if memory.assembly.count > 0:
+            memory.tally.residual = max(memory.tally.residual, memory.assembly.answer.residual)
+        if memory.impact.happens == 1:
+            memory.tally.residual = max(memory.tally.residual, memory.impact.answer.residual)
+        memory.tally.relaxed += memory.impact.relaxed
+        if done + 1 == parts:
+            find_slip(
+                model, memory.next_v, memory.feet, memory.equations.tree, memory.feet.slip
+            )  # fmt: skip
+        integrate(model, memory.q, memory.impact.arriving, step, memory.q)
+        for k in range(model.nv):
+            memory.v[k] = memory.next_v[k]
+        memory.tally.steps += 1
+        done += 1
+    memory.tally.energy_gain += gain
+    memory.tally.uncertified += not certified
+    share_forces(
+        model, memory.q, memory.blocks, memory.contacts.force, memory.stop_torque,
+        memory.friction_torque,
+    )  # fmt: skip
+    return True, certified

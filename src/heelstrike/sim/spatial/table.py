@@ -1,0 +1,91 @@
+"""What may hold a robot in space: one table of contact points, joint stops and dry friction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from heelstrike.compiler.bundle import Bundle, array
+from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL
+from heelstrike.contact.spatial.modes import OPEN, STICK
+from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.spatial.model import BALL, HINGE, SLIDE
+from heelstrike.robot.spatial.robot import SpatialRobot
+
+POINT, STOP, BALL_STOP, DRY_JOINT = range(4)
+
+NEVER_TOUCHED = -2
+"""The step at whose end what has not touched did so."""
+
+
+class BlockTable(Bundle):
+    """All that may hold a robot: first its contact points, then stops, then dry friction."""
+
+    kind: Integers = array("entries", of=int)
+    """What each entry is."""
+    owner: Integers = array("entries", of=int)
+    """Its contact point; its joint; or its velocity, of dry friction."""
+    side: Floats = array("entries")
+    """Of a stop 1 for the lower end of the range, −1 for the upper."""
+    last: Integers = array("entries", of=int)
+    """Last velocity of the chain that it acts on."""
+    set: Integers = array("entries", of=int)
+    """Where its impulses may lie."""
+    size: Integers = array("entries", of=int)
+    """How many rows it has."""
+    friction: Floats = array("entries")
+    restitution: Floats = array("entries")
+    """friction, restitution: Of points those of the ground below them now."""
+    gap: Floats = array("entries")
+    """Distance (m, rad) to the ground or the end of the range; infinite of dry friction."""
+    mode: Integers = array("entries", of=int)
+    impulse: Floats = array("entries", 3)
+    """mode, impulse: Of the last solve, where the next one begins."""
+    force: Floats = array("entries", 3)
+    """Mean force over the last step."""
+    touching: Integers = array("entries", of=int)
+    """The last step at whose end each entry touched."""
+    called: Integers = array("entries", of=int)
+    """What takes part although it seemed too far away."""
+
+
+def lay_out_table(robot: SpatialRobot) -> BlockTable:
+    """Return the table of a robot."""
+    model = robot.model
+    entries: list[tuple[int, int, float, int, int, int]] = [
+        (POINT, contact, 0.0, int(model.last_velocity[link]), CONE, 3)
+        for contact, link in enumerate(model.contact_link.tolist())
+    ]
+    for joint, kind in enumerate(model.joint_kind.tolist()):
+        last = int(model.last_velocity[joint])
+        if kind in (HINGE, SLIDE):
+            for side, limit in ((1.0, model.lower[joint]), (-1.0, model.upper[joint])):
+                if np.isfinite(limit):
+                    entries.append((STOP, joint, side, last, HALF_LINE, 1))
+        elif kind == BALL and np.isfinite(model.upper[joint]):
+            entries.append((BALL_STOP, joint, -1.0, last, HALF_LINE, 1))
+    for k in np.flatnonzero(model.dry_friction > 0.0).tolist():
+        entries.append((DRY_JOINT, k, 0.0, k, INTERVAL, 1))
+
+    def column(place: int, dtype: type) -> Any:
+        return np.array([entry[place] for entry in entries], dtype=dtype)
+
+    kind = column(0, np.int64)
+    return BlockTable.allocate(
+        entries=len(entries),
+        kind=kind,
+        owner=column(1, np.int64),
+        side=column(2, np.float64),
+        last=column(3, np.int64),
+        set=column(4, np.int64),
+        size=column(5, np.int64),
+        gap=np.full(len(entries), np.inf),
+        mode=np.where(kind == DRY_JOINT, STICK, OPEN).astype(np.int64),
+        touching=np.full(len(entries), NEVER_TOUCHED),
+    )
+
+
+def most_rows_of(table: BlockTable) -> int:
+    """How many rows all entries together have."""
+    return int(np.sum(table.size))
