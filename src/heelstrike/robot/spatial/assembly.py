@@ -9,6 +9,7 @@ from heelstrike.robot.assembly import LARGEST_NUMBER
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import BALL, FREE, HINGE, SPATIAL_NUMBERS, SpatialModel
 from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot
+from heelstrike.robot.spatial.solids import Solid
 
 
 def assembled_in_space(
@@ -22,6 +23,7 @@ def assembled_in_space(
     source: str,
     origin: Floats,
     axes: Floats,
+    solids: tuple[Solid, ...] = (),
 ) -> SpatialRobot:
     """Make a robot in space of its numbers and names.
 
@@ -39,6 +41,8 @@ def assembled_in_space(
         What to call the robot in messages.
     origin, axes : (nl, 3) and (nl, 3, 3) float
         World poses of its links in the reference configuration.
+    solids : tuple of Solid
+        What its links look like.
 
     Raises
     ------
@@ -57,6 +61,7 @@ def assembled_in_space(
         feet=_find_feet(model, link_names, origin, axes),
         contact_friction=friction,
         source=source,
+        solids=solids,
     )
 
 

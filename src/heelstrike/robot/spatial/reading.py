@@ -20,6 +20,7 @@ from heelstrike.robot.spatial.links import read_spatial_links
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.spatial.trunk import free_trunk
+from heelstrike.robot.spatial.visible_shapes import read_solids
 
 
 def spatial_robot(
@@ -85,6 +86,7 @@ def _robot(file: MujocoFile, name: str) -> SpatialRobot:
         source=file.source,
         origin=links.origin,
         axes=links.axes,
+        solids=read_solids(file, links),
     )
 
 

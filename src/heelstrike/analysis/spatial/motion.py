@@ -1,0 +1,55 @@
+"""Where the links of a robot in space and its centre of mass are, row by row."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heelstrike.dynamics import spatial
+from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats, Integers
+from heelstrike.sim.spatial.run import SpatialRun
+
+
+@dataclass(frozen=True, eq=False)
+class SpatialMotion:
+    """Motion of a robot in space, in world axes, in some rows of a run."""
+
+    origin: Floats
+    """(n, nl, 3) Position of every link frame, in m."""
+    rotation: Floats
+    """(n, nl, 3, 3) Rotation of every link: its axes, in the world's, are the columns."""
+    center_of_mass: Floats
+    """(n, 3) Position of the robot's centre of mass, in m."""
+    center_of_mass_velocity: Floats
+    """(n, 3) Its velocity, in m/s."""
+
+
+def motion_in_space(run: SpatialRun, rows: Integers | None = None) -> SpatialMotion:
+    """Follow the robot of a run through some of its rows.
+
+    Parameters
+    ----------
+    run : SpatialRun
+        The run.
+    rows : (n,) int, optional
+        Which rows; all by default.
+
+    Returns
+    -------
+    SpatialMotion
+        Where links and centre of mass are in each.
+    """
+    robot = run.robot
+    mass = robot.model.mass
+    total = max(robot.total_mass, 1e-300)
+    chosen = range(len(run.time)) if rows is None else rows.tolist()
+    origin = np.zeros((len(chosen), robot.nl, 3))
+    rotation = np.zeros((len(chosen), robot.nl, 3, 3))
+    center = np.zeros((len(chosen), 3))
+    velocity = np.zeros((len(chosen), 3))
+    for i, row in enumerate(chosen):
+        poses = spatial.link_poses(robot, run.position[row])
+        origin[i], rotation[i] = poses.origin, poses.rotation
+        center[i] = mass @ poses.center_of_mass / total
+        velocity[i] = spatial.center_of_mass_velocity(robot, run.position[row], run.velocity[row])
+    return SpatialMotion(origin, rotation, center, velocity)
