@@ -76,8 +76,11 @@ def animate(
     if kind == ".gif":
         fps = 100.0 / max(2, round(100.0 / fps))  # the format counts hundredths of a second
     with styled(), view_errors():
-        kind_of_film = SpatialFilm if isinstance(run, SpatialRun) else Film
-        film: Film | SpatialFilm = kind_of_film(run, (width, height), fps, speed)
+        film: Film | SpatialFilm
+        if isinstance(run, SpatialRun):
+            film = SpatialFilm(run, (width, height), fps, speed)
+        else:
+            film = Film(run, (width, height), fps, speed)
         with whole_file(target) as beside:
             if kind == ".mp4":
                 write_mp4(map(film.draw, range(len(film))), film.size, fps, beside)

@@ -187,7 +187,7 @@ class Stage:
         order = np.argsort(-away)
         colors = _lit(np.tile(to_rgb(STONE), (len(sides), 1)), across)
         self._stones.set_verts(list(camera.seen(sides[order])[0]))
-        self._stones.set_facecolor(colors[order])
+        self._stones.set_facecolor(_as_colors(colors[order]))
 
     def _show_faces(self, corners: Floats, camera: Camera) -> None:
         """Draw the triangles that face the camera, far ones first, and the shadows of all."""
@@ -203,8 +203,13 @@ class Stage:
         order = np.argsort(-away)
         colors = _lit(self._colors[seen], across[seen])[order]
         self._faces.set_verts(list(camera.seen(triangles[seen][order])[0]))
-        self._faces.set_facecolor(colors)
-        self._faces.set_edgecolor(colors)
+        self._faces.set_facecolor(_as_colors(colors))
+        self._faces.set_edgecolor(_as_colors(colors))
+
+
+def _as_colors(colors: Floats) -> Any:
+    """Colours as matplotlib takes them, whose types know no arrays."""
+    return colors
 
 
 def _lit(colors: Floats, across: Floats) -> Floats:
