@@ -14,6 +14,7 @@ from heelstrike.cli.inspect import inspect
 from heelstrike.cli.paper import paper
 from heelstrike.cli.report import report
 from heelstrike.cli.robots import robots
+from heelstrike.cli.simulate import simulate
 from heelstrike.cli.train import train
 from heelstrike.cli.transfer import transfer
 from heelstrike.cli.walk import walk
@@ -30,6 +31,7 @@ app = typer.Typer(
 )
 for command in (
     walk,
+    simulate,
     watch,
     report,
     train,

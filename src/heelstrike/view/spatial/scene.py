@@ -75,7 +75,7 @@ def scene_in_space(robot: SpatialRobot, ground: SpatialGround) -> dict[str, Any]
         "ground": {
             "normal": (normal / np.linalg.norm(normal)).tolist(),
             "height": float(ground.height),
-            "boxes": np.round(places.reshape(len(places), -1), DIGITS).tolist(),
+            "boxes": np.round(places.reshape(-1, 24), DIGITS).tolist(),
         },
     }
 
