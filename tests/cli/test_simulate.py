@@ -32,8 +32,8 @@ def test_a_robot_holds_its_posture(tmp_path: Path) -> None:
 
 
 def test_a_limp_robot_falls(tmp_path: Path) -> None:
-    asked = ["simulate", *BRAVO, "--drop", "--above", "0.05", "--duration", "3"]
-    asked += ["--push", "trunk:0,80,0:0:0.3", "--out", str(tmp_path), "--animation", "none"]
+    asked = ["simulate", *BRAVO, "--drop", "--above", "0.05", "--duration", "2"]
+    asked += ["--push", "trunk:0,400,0:0:0.3", "--out", str(tmp_path), "--animation", "none"]
     result = CliRunner().invoke(app, asked)
     assert result.exit_code == 1
     assert "fell" in result.stdout
@@ -62,7 +62,7 @@ def test_looking_at_a_robot_in_space(tmp_path: Path) -> None:
     for word in (*robot.joint_names, *robot.link_names, "right_foot (8 points)", "± 300"):
         assert word in result.stdout
     assert picture.read_bytes().startswith(b"\x89PNG")
-    told = json.loads(CliRunner().invoke(app, [*asked[:4], "--json"]).stdout)
+    told = json.loads(CliRunner().invoke(app, [*asked[:5], "--json"]).stdout)
     assert told["velocities"] == list(robot.velocity_names)
     assert told["mass_kg"] == pytest.approx(robot.total_mass)
 

@@ -120,7 +120,8 @@ def test_the_work_of_motors(tmp_path: Path) -> None:
     path = tmp_path / "wheel.xml"
     path.write_text(
         """<mujoco model="wheel"><option gravity="0 0 -9.81"/><worldbody><body name="cart">
-        <joint name="x" type="slide" axis="1 0 0"/><geom type="sphere" size="0.1" mass="1"/>
+        <joint name="x" type="slide" axis="1 0 0"/><inertial pos="0 0 0" mass="1"
+        diaginertia="1 1 1"/>
         <body name="wheel"><joint name="w" axis="0 0 1"/><inertial pos="0 0 0" mass="1"
         diaginertia="0.5 0.5 0.5"/></body></body></worldbody>
         <actuator><motor name="m" joint="w"/></actuator></mujoco>"""

@@ -1,4 +1,4 @@
-"""The page of a run in space in a browser: dragging turns it, time moves on, nothing is asked for."""
+"""The page of a run in space in a browser: dragging turns it, time moves on."""
 
 from __future__ import annotations
 

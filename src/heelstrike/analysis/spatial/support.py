@@ -133,6 +133,11 @@ def capture_point_in_space(run: SpatialRun, center: Floats, velocity: Floats) ->
         The run, for gravity and ground.
     center, velocity : (n, 3) float
         Of the centre of mass (m, m/s).
+
+    Returns
+    -------
+    (n, 3) float
+        Places on the plane of the ground, in m.
     """
     normal = np.asarray(run.ground.normal, dtype=np.float64)
     normal = normal / np.linalg.norm(normal)
