@@ -57,7 +57,7 @@ test-blas-%: $(VENV)/installed-dev
 test-perturbed: $(VENV)/installed-dev
 	$(PYTEST) --perturb-gaits 1e-12
 
-# What hangs on rounding most, in a few minutes.
+# What depends on rounding most, in a few minutes.
 test-sample: export HEELSTRIKE_PLAIN_CODE = 1
 test-sample: $(VENV)/installed-dev
 	$(PYTEST) --perturb-gaits 1e-12 $(SAMPLE)

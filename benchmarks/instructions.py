@@ -153,7 +153,7 @@ def held(robot: hs.Robot, beyond: float) -> JointFeedback:
 def stamping(still: Scenario) -> JointFeedback:
     """Return a law under which knees jump ± 0.02 rad every 5 ms: contacts change in most steps.
 
-    What it does must not hang on rounding: a change of 1e-12 stays one.
+    What it does must not depend on rounding: a change of 1e-12 stays one.
     """
     law, robot = still.feedback, still.robot
     assert law is not None

@@ -2,7 +2,7 @@
 
 ``python benchmarks/learning.py speed`` moves Walker2d with random actions, resets included: the
 native vector and a single environment in a Python loop, the physics alone (the same lanes, which
-begin anew in the same states, without observations, rewards and noise), Gymnasium's own
+start again in the same states, without observations, rewards and noise), Gymnasium's own
 environments one by one (sync) and in processes (async), and MuJoCo's ``rollout``. ``... identical``
 compares lanes with single simulations, bit by bit. ``... endure`` makes many steps and prints how
 memory grows, why episodes ended, and the worst certificates. ``... walk --policy FILE`` commands
@@ -95,7 +95,7 @@ def speed(task: str, lanes: int, decisions: int, repetitions: int, *, peers: boo
         batch = course.batch
         for action, (over, q, v) in zip(actions, kept, strict=True):
             np.multiply(action, course.gear, out=batch.command)
-            if over.size:  # these begin anew, and do not move
+            if over.size:  # these start again, and do not move
                 batch._begin_anew(over, q, v)
                 moves = np.ones(lanes, dtype=bool)
                 moves[over] = False
@@ -293,7 +293,7 @@ def walk(policy: Path, count: int, impulse: float, seed: int) -> None:
 
 
 def defects(policy: Path, count: int) -> None:
-    """Print what hangs on the time step, and on the friction of the floor."""
+    """Print what depends on the time step, and on the friction of the floor."""
     network = load_network(policy)
     task = told_task(network.about)
     assert isinstance(task, RunningTask)

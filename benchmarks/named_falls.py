@@ -2,7 +2,7 @@
 
 Of each kind there are as many as one asks for. bravo7 walks its reference gait under computed
 torque (legs that give way: it stands on bent ones); what is done to it, how much and when is drawn
-from ``default_rng([seed, kind])``. One that does not fall says nothing and is drawn anew; how many
+from ``default_rng([seed, kind])``. One that does not fall says nothing and is drawn again; how many
 those were is told. The twin, to which nothing is done, must walk on.
 
     python benchmarks/named_falls.py --each 20

@@ -8,13 +8,15 @@ unitreerobotics/unitree_rl_gym.
 
     pip install torch==2.13.0
     python benchmarks/published_policies.py CLONE [--robots g1 h1 h1_2] [--commands forwards ...]
-        [--steps 0.002] [--duration 60] [--friction 1.0] [--json FILE]
+        [--steps 0.002] [--duration 60] [--friction 1.0] [--pushes] [--json FILE]
 
-Both engines get the same robot: the file's, without its meshes, so that its feet meet the ground as
-the file has them; its spheres and nothing else. A row tells how long the robot stayed up, its mean
+Both engines get the same robot: the file's, without the meshes of links that have something else to
+stand on, or nothing to do with the ground. A row tells how long the robot stayed up, its mean
 velocity along its own heading and yaw rate, the largest mean of the ground's force over 10 ms and
 over a step, the slip of feet that carry, how deep they are, and the time of a step (the policy's
-own apart). Mean values leave out the first two seconds.
+own apart). Mean values leave out the first two seconds. `--pushes` seeks, to 10 N, the least force
+of 0.1 s on the pelvis from which the robot falls within four seconds, by side and by phase of the
+cycle; a walk that one force fells and a larger one does not is not looked for.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ import math
 import os
 import time
 import warnings
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -58,6 +61,11 @@ SETTLED = 2.0  # s
 WINDOW = 0.01  # s
 FALLEN = 0.5  # of the first height of the trunk
 CARRIES = 1.0  # N, from which a point counts as carrying
+
+SIDES = {"forwards": (1, 0), "backwards": (-1, 0), "left": (0, 1), "right": (0, -1)}
+PHASES = (0.0, 0.25, 0.5, 0.75)
+PUSHED, LASTS, WATCHED = 4.0, 0.1, 4.0  # s: when, for how long, and how long the walk goes on
+LARGEST, FINE = 1280.0, 10.0  # N
 
 
 class Springs(hs.Bundle):
@@ -95,7 +103,7 @@ class Policy:
 
     def targets(self, t: float, q: Floats, v: Floats) -> Floats:
         """Return where the springs pull from now on."""
-        begin = time.perf_counter()
+        begin = time.process_time()
         w, x, y, z = q[3:7]
         down = [2 * (w * y - z * x), -2 * (z * y + w * x), 1 - 2 * (w * w + z * z)]
         phase = 2.0 * np.pi * (t % CYCLE) / CYCLE
@@ -111,7 +119,7 @@ class Policy:
         given = self.torch.from_numpy(sensed.astype(np.float32)).unsqueeze(0)
         with self.torch.no_grad():
             self.action = self.network(given).numpy().squeeze().astype(np.float64)
-        self.seconds += time.perf_counter() - begin
+        self.seconds += time.process_time() - begin
         return self.action * self.config["action_scale"] + self.still
 
 
@@ -145,13 +153,27 @@ class Walk:
 
 
 def bare_file(clone: Path, robot: str, folder: Path) -> Path:
-    """Write a robot's file without its meshes; both engines read that."""
-    source = clone / "resources/robots" / FILES[robot]
+    """Write a robot's file with no meshes but those of leaves that have nothing else to stand on.
+
+    Both engines read that: what its feet are made of, and no hulls that meet each other.
+    """
+    source = (clone / "resources/robots" / FILES[robot]).resolve()
     root = ElementTree.parse(source).getroot()
-    for element in root.iter():
-        for child in list(element):
-            if child.tag == "mesh" or "mesh" in (child.get("type"), *child.attrib):
-                element.remove(child)
+    kept: set[str] = set()
+    for body in root.iter("body"):
+        shapes = [each for each in body.findall("geom") if each.get("contype") != "0"]
+        hulls = [each for each in shapes if "mesh" in each.attrib]
+        needed = body.find("body") is None and len(hulls) == len(shapes)
+        for geom in body.findall("geom"):
+            if "mesh" in geom.attrib and not (needed and geom in hulls):
+                body.remove(geom)
+        kept |= {geom.get("mesh", "") for geom in hulls if needed}
+    for asset in root.findall("asset"):
+        for mesh in asset.findall("mesh"):
+            if (mesh.get("name") or Path(mesh.get("file", "")).stem) not in kept:
+                asset.remove(mesh)
+    for compiler in root.findall("compiler"):
+        compiler.set("meshdir", str(source.parent / compiler.get("meshdir", "")))
     path = folder / f"{robot}.xml"
     path.write_text(ElementTree.tostring(root, encoding="unicode"), encoding="utf-8")
     return path
@@ -182,11 +204,35 @@ def measured(
     }
 
 
-def hard(path: Path, policy: Policy, name: str, command: str, given: Any, step: float) -> Walk:
+def pelvis_center(path: Path) -> tuple[float, ...]:
+    """Centre of mass of the pelvis alone, where MuJoCo pushes: here what is welded to it is one."""
+    inertial = ElementTree.parse(path).getroot().find(".//body[@name='pelvis']/inertial")
+    given = "0 0 0" if inertial is None else inertial.get("pos", "0 0 0")
+    return tuple(map(float, given.split()))
+
+
+@dataclass(frozen=True)
+class Shove:
+    """A force (x, y) in N on the pelvis from an instant on."""
+
+    start: float
+    force: tuple[float, float]
+
+
+def hard(
+    path: Path, policy: Policy, name: str, command: str, given: Any, step: float,
+    shove: Shove | None = None,
+) -> Walk:  # fmt: skip
     """Walk on hard contact."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", hs.RobotWarning)
         robot = hs.load_robot(path, dimension=3)
+    pushes = [] if shove is None else [
+        hs.Push(
+            "pelvis", force=(*shove.force, 0.0), start=shove.start, duration=LASTS,
+            point=pelvis_center(path),
+        )
+    ]  # fmt: skip
     law = Springs(
         target=policy.still.copy(),
         stiffness=np.array(policy.config["kps"], dtype=np.float64),
@@ -194,10 +240,10 @@ def hard(path: Path, policy: Policy, name: str, command: str, given: Any, step: 
     )
     simulation = hs.Simulation(
         robot, pull(law), state=robot.reference_state(), method=hs.TimeStepping(step=step),
-        ground=hs.Ground(friction=given.friction), stop_when_fallen=True,
+        ground=hs.Ground(friction=given.friction), stop_when_fallen=True, pushes=pushes,
     )  # fmt: skip
     simulation.step()  # compiled before the clock starts
-    begin, policy.seconds = time.perf_counter(), 0.0
+    begin, policy.seconds = time.process_time(), 0.0
     first = float(simulation.state.q[2])
     instants = np.arange(1, round(given.duration / policy.period) + 1) * policy.period
     for instant in instants:
@@ -206,7 +252,7 @@ def hard(path: Path, policy: Policy, name: str, command: str, given: Any, step: 
         if status is not hs.RunStatus.COMPLETED or state.q[2] < FALLEN * first:
             break
         law.target[:] = policy.targets(float(instant), state.q, state.v)
-    seconds = time.perf_counter() - begin - policy.seconds
+    seconds = time.process_time() - begin - policy.seconds
     run: Any = simulation.record
     carries = run.contact_force[..., 0] > CARRIES
     slides = np.linalg.norm(run.slip, axis=-1) * carries
@@ -224,9 +270,10 @@ def hard(path: Path, policy: Policy, name: str, command: str, given: Any, step: 
 
 
 def mujoco_own(
-    path: Path, policy: Policy, name: str, command: str, given: Any, step: float
-) -> Walk:
-    """Walk in MuJoCo's own loop, as published: springs at every step, Euler, its default contact."""
+    path: Path, policy: Policy, name: str, command: str, given: Any, step: float,
+    shove: Shove | None = None,
+) -> Walk:  # fmt: skip
+    """Walk in MuJoCo's own loop, as published: springs at every step, its default contact."""
     import mujoco
 
     text = path.read_text(encoding="utf-8")
@@ -247,9 +294,12 @@ def mujoco_own(
     for k in range(count):
         rows[0][k], rows[1][k] = data.qpos, data.qvel
         data.ctrl[:] = (target - data.qpos[7:]) * gains[0] - data.qvel[6:] * gains[1]
-        begin = time.perf_counter()
+        if shove is not None:
+            on = shove.start <= k * step < shove.start + LASTS
+            data.body("pelvis").xfrc_applied[:2] = shove.force if on else 0.0
+        begin = time.process_time()
         mujoco.mj_step(model, data)
-        seconds += time.perf_counter() - begin
+        seconds += time.process_time() - begin
         sliding = []
         for one in range(data.ncon):
             mujoco.mj_contactForce(model, data, one, wrench)
@@ -279,6 +329,42 @@ def mujoco_own(
     )  # fmt: skip
 
 
+ENGINES: dict[str, Callable[..., Walk]] = {"hard": hard, "mujoco": mujoco_own}
+
+
+def least_felling(path: Path, name: str, engine: str, side: str, phase: float, given: Any) -> float:
+    """Least force (N) that fells a robot which walks forwards, to `FINE`; infinite if none does."""
+    start = CYCLE * (round(PUSHED / CYCLE) + phase)
+    setting = argparse.Namespace(**{**vars(given), "duration": start + WATCHED})
+
+    def stands(size: float) -> bool:
+        policy = Policy(given.clone, name, COMMANDS["forwards"])
+        x, y = SIDES[side]
+        shove = Shove(start, (size * x, size * y))
+        step = given.steps[0]
+        walk = ENGINES[engine](path, policy, name, "forwards", setting, step, shove)
+        return walk.upright > setting.duration - 0.1
+
+    low, high = 0.0, LARGEST
+    if stands(high):
+        return math.inf
+    while high - low > FINE:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stands(middle) else (low, middle)
+    return high
+
+
+def tell_pushes(path: Path, name: str, given: Any) -> None:
+    """Print what fells a robot, side by side."""
+    for side in SIDES:
+        for phase in PHASES:
+            found = [least_felling(path, name, each, side, phase, given) for each in given.engines]
+            words = ", ".join(
+                f"{each} {force:.0f} N" for each, force in zip(given.engines, found, strict=True)
+            )
+            print(f"{name:5} pushed {side:9} at {phase:4.2f} of the cycle: {words}", flush=True)
+
+
 def main() -> None:
     """Walk, and print a row for every walk."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -290,17 +376,20 @@ def main() -> None:
     parser.add_argument("--friction", type=float, default=1.0)
     parser.add_argument("--engines", nargs="+", default=["hard", "mujoco"])
     parser.add_argument("--scratch", type=Path, default=Path())
+    parser.add_argument("--pushes", action="store_true")
     parser.add_argument("--json", type=Path)
     given = parser.parse_args()
     walks = []
     for name in given.robots:
         path = bare_file(given.clone, name, given.scratch)
+        if given.pushes:
+            tell_pushes(path, name, given)
+            continue
         for command in given.commands:
             for step in given.steps:
                 for engine in given.engines:
                     policy = Policy(given.clone, name, COMMANDS[command])
-                    walk = hard if engine == "hard" else mujoco_own
-                    one = walk(path, policy, name, command, given, step)
+                    one = ENGINES[engine](path, policy, name, command, given, step)
                     walks.append(one)
                     print(
                         f"{name:5} {command:10} {1e3 * step:4.1f} ms {one.engine:6} "

@@ -14,7 +14,9 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
 import sys
+import tempfile
 import time
 from collections import Counter
 from pathlib import Path
@@ -145,6 +147,48 @@ def collection(folder: Path, contacts: int) -> list[dict[str, Any]]:
     return found
 
 
+def beside(python: str, number: int, seed: int) -> dict[str, Any]:
+    """Send random problems through Siconos, in a Python that has it; judge its answers and ours."""
+    problems = [random_spatial_problem(np.random.default_rng([seed, k])) for k in range(number)]
+    script = Path(__file__).with_name("spatial_contact_siconos.py")
+    with tempfile.TemporaryDirectory() as folder:
+        given, answers = Path(folder) / "problems.npz", Path(folder) / "answers.npz"
+        np.savez(
+            given,
+            count=np.array([p.count for p in problems]),
+            delassus=np.concatenate([p.delassus.ravel() for p in problems]),
+            free=np.concatenate([p.free for p in problems]),
+            friction=np.concatenate([p.friction for p in problems]),
+        )
+        subprocess.run([python, str(script), str(given), str(answers)], check=True)
+        found = dict(np.load(answers))
+    ours, spent = [], []
+    for p in problems:
+        begin = time.perf_counter()
+        ours.append(solve_contact(p.delassus, p.free, p.friction, dimension=3).impulse.ravel())
+        spent.append(time.perf_counter() - begin)
+    found["heelstrike impulse"] = np.concatenate(ours)
+    found["heelstrike seconds"] = np.array(spent)
+    result = {}
+    for name in ("heelstrike", "NSN_AC", "NSGS"):
+        ends = np.cumsum([3 * p.count for p in problems])
+        parts = np.split(found[f"{name} impulse"], ends[:-1])
+        judged = np.array(
+            [
+                natural_map(p.delassus, p.free, p.friction, impulse)
+                for p, impulse in zip(problems, parts, strict=True)
+            ]
+        )
+        seconds = found[f"{name} seconds"]
+        result[name] = {
+            f"share at {limit:g}": float(np.mean(judged <= limit)) for limit in (1e-10, 1e-9, 1e-6)
+        } | {
+            "median us": round(1e6 * float(np.median(seconds))),
+            "mean us": round(1e6 * float(seconds.mean())),
+        }
+    return result
+
+
 def main() -> None:
     """Print what came out."""
     parser = argparse.ArgumentParser(
@@ -154,6 +198,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--siconos", type=Path)
     parser.add_argument("--contacts", type=int, default=110)
+    parser.add_argument("--peers", help="a Python with the package of Siconos")
+    parser.add_argument("--peer-number", type=int, default=500)
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     result: dict[str, Any] = {}
@@ -161,6 +207,8 @@ def main() -> None:
         result["random"] = campaign(options.number, options.seed)
     if options.siconos:
         result["siconos"] = collection(options.siconos, options.contacts)
+    if options.peers:
+        result["beside Siconos"] = beside(options.peers, options.peer_number, options.seed)
     if options.json:
         print(json.dumps(result, indent=1))
         return
@@ -168,6 +216,8 @@ def main() -> None:
         print(f"{name}: {value}")
     for each in result.get("siconos", []):
         print(each)
+    for name, value in result.get("beside Siconos", {}).items():
+        print(f"{name}: {value}")
 
 
 if __name__ == "__main__":

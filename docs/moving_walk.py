@@ -1,4 +1,4 @@
-"""The walk on the front page: computed anew by every build, so that it is of this version."""
+"""The walk on the front page: computed again by every build, so that it is of this version."""
 
 from __future__ import annotations
 

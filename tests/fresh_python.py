@@ -1,6 +1,6 @@
 """A fresh Python at a fraction of its cost: a fork of a process that has imported Numba only.
 
-Most of what a test waits for that starts Python anew is Numba: its import, and its first function.
+Most of what a test waits for that starts Python again is Numba: its import, and its first function.
 A process that has done both forks for each program. Nothing of heelstrike is in it yet, and
 settings are read from the environment that the test gives. Where the system does not fork, a
 process is started.

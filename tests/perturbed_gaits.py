@@ -1,7 +1,7 @@
 """Gaits as another processor, or another version of the optimiser, might have found them.
 
-No test and no figure may hang on the last digits of a gait; ``pytest --perturb-gaits 1e-12`` shows
-that they do not.
+No test and no figure may depend on the last digits of a gait; ``pytest --perturb-gaits 1e-12``
+shows that they do not.
 """
 
 from __future__ import annotations

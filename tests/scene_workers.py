@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 ENDLESS, ASLEEP, GONE = 1, 2, 3
-"""Seeds that work for ever, wait for ever, and end their process."""
+"""Seeds that work forever, wait forever, and end their process."""
 
 
 def nothing(method: str) -> None:

@@ -71,6 +71,7 @@ def usual() -> dict[str, dict[str, Any]]:
         "Batch": walked,
         "HeldTorque": {"robot": robot},
         "compare": {**walked, "methods": [hs.TimeStepping()], "duration": 0.1},
+        "compare_engines": {**on_a_gait, "controller": law, "engines": ["mujoco"], "steps": 0},
         "constrained": {"robot": robot},
         "contact_forward_dynamics": {**there, "torque": np.zeros(robot.nu)},
         "contact_inverse_dynamics": {**there, "acceleration": np.zeros(robot.nv)},
@@ -100,8 +101,11 @@ def usual() -> dict[str, dict[str, Any]]:
         "load_run": {"path": "run.nc"},
         "load_snapshot": {"path": "kept.npz"},
         "make_invariant": {"gait": PhasedGait()},
+        "mimic": {"path": "walk.csv"},
         "monodromy": walked,
+        "compare_planners": {"robot": robot},
         "optimize_gait": {"robot": robot},
+        "plan_motion": {"robot": robot, "step_length": 0.3, "step_duration": 0.7},
         "report": {"runs": [], "path": "report.html"},
         "run_derivatives": {"simulation": hs.Simulation(**walked), "until": 0.001},
         "saltation_matrix": {"reset": ONE, "gradient": FLAT, "before": FLAT, "after": FLAT},
@@ -116,8 +120,8 @@ def usual() -> dict[str, dict[str, Any]]:
 
 RESULTS = """ActiveContacts BatchResult CampaignResults DisturbanceResponse Floquet Gait GaitFamily
 Gradient Largest
-LimitCycle ModeChange Monodromy Motion PhasedGait Robot Run RunDerivatives Snapshot SpatialRobot
-StepDerivatives StepFamily ZeroDynamics"""
+LimitCycle ModeChange Monodromy Motion PhasedGait PlannerComparison Robot Run RunDerivatives
+Snapshot SpatialRobot StepDerivatives StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
 TOLD_APART = """Bundle Constraint ContactPhase EndOfRun GaitLQR GroundShape MotionTracking
 SteppingConstraints VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell

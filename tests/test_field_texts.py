@@ -34,7 +34,7 @@ SOURCES = [
 class Limb:
     """A limb.
 
-    It hangs on the trunk.
+    It is attached to the trunk.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Link(Bundle):
 
 def test_a_docstring_is_composed_of_the_fields() -> None:
     assert inspect.getdoc(Limb) == (
-        "A limb.\n\nIt hangs on the trunk.\n\nAttributes\n----------\n"
+        "A limb.\n\nIt is attached to the trunk.\n\nAttributes\n----------\n"
         "name : str\n"
         "force : (n, 2) float\n    On the foot, in world axes, whoever asks (N).\n"
         "lower, upper : float\n    Range of the knee (rad).\n"

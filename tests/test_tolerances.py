@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import heelstrike as hs
@@ -24,13 +25,18 @@ OF_A_POLYNOMIAL = {("control/stepping_constraints.py", "blend", 10.0)}
 """The smoothest step of degree five is 10 s³ - 15 s⁴ + 6 s⁵."""
 
 
+@cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def place(path: Path) -> str:
     return path.relative_to(HOME).as_posix()
 
 
 def small_constants(path: Path) -> Iterator[tuple[str, float]]:
     """Constants of a module that are less than a thousandth, as tolerances are."""
-    for statement in ast.parse(path.read_text(encoding="utf-8")).body:
+    for statement in tree_of(path).body:
         if not isinstance(statement, ast.Assign):
             continue
         target, value = statement.targets[0], statement.value
@@ -60,7 +66,7 @@ def test_every_shared_tolerance_says_what_it_decides_and_is_used() -> None:
             names.add(ast.unparse(statement.targets[0]))
     users = defaultdict(set)
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.ImportFrom) and node.module == tolerances.__name__:
                 for alias in node.names:
                     users[alias.name].add(place(path))
@@ -80,7 +86,7 @@ def is_coefficient(number: float) -> bool:
 
 def nameless(path: Path) -> set[tuple[str, str, float]]:
     """Numbers of kernels that are no coefficients: file, kernel and number."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = tree_of(path)
     kernels = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and is_kernel(n)]
     return {
         (place(path), kernel.name, node.value)

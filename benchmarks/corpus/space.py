@@ -19,6 +19,7 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ from heelstrike.robot import SpatialRobot, load_robot
 from heelstrike.robot.spatial.robot import quaternion_places
 
 Floats = NDArray[np.float64]
+LOOKS = ("mesh", "texture", "material", "keyframe", "sensor", "skin")
 TOLERANCE = 1e-11
 STATES = 5
 
@@ -69,6 +71,28 @@ class Outcome:
 Answers = dict[str, Any]
 
 
+def without_meshes(path: Path) -> str:
+    """An MJCF file without what is looked at, or is not there, and words that MuJoCo has forgotten.
+
+    Raises
+    ------
+    Refused
+        If a body has its mass from a mesh.
+    """
+    root = ElementTree.parse(path).getroot()
+    for body in root.iter("body"):
+        if body.find("inertial") is None and any("mesh" in geom.attrib for geom in body):
+            raise Refused(f"body {body.get('name')!r} may have its mass from a mesh")
+    for element in root.iter():
+        element.attrib.pop("material", None)
+        element.attrib.pop("sensornoise", None)
+        for child in list(element):
+            hull = child.tag == "geom" and "mesh" in (child.get("type"), *child.attrib)
+            if hull or child.tag in LOOKS:
+                element.remove(child)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
 class MuJoCo:
     """MJCF, by the engine that defines it."""
 
@@ -80,7 +104,13 @@ class MuJoCo:
         try:
             self.model = mujoco.MjModel.from_xml_path(str(path))
         except (ValueError, mujoco.FatalError) as error:
-            raise Refused(str(error)) from error
+            if "<include" in path.read_text(encoding="utf-8", errors="replace"):
+                raise Refused(str(error)) from error
+            self.name = "MuJoCo, without meshes"
+            try:
+                self.model = mujoco.MjModel.from_xml_string(without_meshes(path))
+            except (ValueError, mujoco.FatalError) as other:
+                raise Refused(f"{error}; {other}") from other
         if (self.model.nq, self.model.nv) != (robot.nq, robot.nv):
             raise Refused(f"MuJoCo has {self.model.nq} positions and {self.model.nv} velocities")
         self.data = mujoco.MjData(self.model)
@@ -119,6 +149,13 @@ class Pinocchio:
             self.model = pin.buildModelFromXML(mechanics(text), *root)
         except (ValueError, RuntimeError) as error:
             raise Refused(str(error)) from error
+        known = {*robot.joint_names, "root_joint"}
+        fixed = [self.model.getJointId(each) for each in self.model.names[1:] if each not in known]
+        if fixed:  # what moves no mass
+            try:
+                self.model = pin.buildReducedModel(self.model, fixed, pin.neutral(self.model))
+            except ValueError as error:  # joints and links of one name
+                raise Refused(str(error)) from error
         if self.model.nv != robot.nv:
             raise Refused(f"Pinocchio has {self.model.nv} velocities")
         self.data = self.model.createData()
@@ -229,7 +266,7 @@ def outcome(robot: Published, clones: Path, scratch: Path) -> Outcome:
     try:
         peer = peer_of(path, text, loaded)
         result.engine, result.difference = peer.name, difference(loaded, peer)
-    except Refused as refused:
+    except (Refused, ElementTree.ParseError) as refused:
         result.said = " ".join(str(refused).split())[:160]
     return result
 

@@ -354,12 +354,12 @@ def forget(package: str) -> None:
         os.environ["HEELSTRIKE_KEEP_GAITS"] = "0"
 
 
-def run(mutants: list[Mutant], *, anew: bool = False) -> None:
+def run(mutants: list[Mutant], *, again: bool = False) -> None:
     """Ask for all mutants that the ledger does not know, or for all."""
     import pytest
 
     copy_sources()
-    known = set() if anew else {_entry_key(each) for each in read_lines(LEDGER)}
+    known = set() if again else {_entry_key(each) for each in read_lines(LEDGER)}
     asker = Asker([mutant for mutant in mutants if key(mutant) not in known])
     os.chdir(COPY)
     setting = {"DEADLINE": str(DEADLINE), "VERDICT": str(VERDICT)}
@@ -445,7 +445,7 @@ def main() -> None:
     if asked.command == "run":
         run(mutants)
     elif asked.command == "again":
-        run(survivors(mutants), anew=True)
+        run(survivors(mutants), again=True)
     elif asked.command == "list":
         for mutant in mutants:
             print(mutant.kind, *key(mutant), sep="\t")

@@ -14,7 +14,7 @@ TIE = 1e-9
 
 
 class Terrain:
-    """A polyline that goes on for ever at both ends.
+    """A polyline that goes on forever at both ends.
 
     Parameters
     ----------

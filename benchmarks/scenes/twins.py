@@ -15,7 +15,7 @@ relative to the velocity and what the known forces do in the time compared:
 Coulomb's law may have several solutions. Where a twin of time stepping differs and its own record
 breaks no law, both are right; such instants are counted, not objected to. So are windows of
 event-driven twins that begin with other contact forces in the same state: what stuck goes on to
-stick, and what is put there anew leaves if it can.
+stick, and what is put there again leaves if it can.
 """
 
 from __future__ import annotations

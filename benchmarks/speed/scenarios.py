@@ -138,7 +138,7 @@ def walking(*, duration: float = 1.0) -> Scenario:
 
 
 def chain(joints: int) -> str:
-    """Return a planar chain of hinges that hangs on the world, as MJCF: no contacts."""
+    """Return a planar chain of hinges that is attached to the world, as MJCF: no contacts."""
     body = ""
     for i in range(joints, 0, -1):
         place = "0 0 -0.1" if i > 1 else "0 0 0"

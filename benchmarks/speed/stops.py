@@ -31,7 +31,7 @@ def left_alone() -> Scenario:
 
 
 def thrown_about() -> Scenario:
-    """Return a walker2d under torques drawn anew every 10 ms."""
+    """Return a walker2d under torques drawn again every 10 ms."""
     alone = left_alone()
     times = THROW * np.arange(round(alone.duration / THROW))
     torque = np.random.default_rng(1).uniform(-TORQUE, TORQUE, (times.size, alone.robot.nu, 1))

@@ -14,7 +14,7 @@ from typing import Any
 
 from rich.console import Console
 
-from heelstrike.experiments.engines import compared, peers
+from heelstrike.experiments.engines import peers, raced
 from heelstrike.view.style import save_figure
 from speed import endurance, footprint, laws, precision, scaling, steps, stops, threads
 from speed.figures import draw
@@ -42,7 +42,7 @@ def measure(wanted: Sequence[str], *, quick: bool) -> dict[str, Any]:
     for name in wanted:
         print(f"measuring {name}", file=sys.stderr)
         try:
-            results[name] = PARTS[name].measure(quick=quick, peers=compared(found))
+            results[name] = PARTS[name].measure(quick=quick, peers=raced(found))
         except KeyboardInterrupt:
             return {**results, "interrupted": name}
     return results

@@ -107,12 +107,17 @@ if TYPE_CHECKING:
     from heelstrike.experiments.campaigns import Campaign as Campaign
     from heelstrike.experiments.campaigns import CampaignResults as CampaignResults
     from heelstrike.experiments.comparison import compare as compare
+    from heelstrike.experiments.engine_comparison import compare_engines as compare_engines
+    from heelstrike.experiments.people import mimic as mimic
+    from heelstrike.experiments.planners import PlannerComparison as PlannerComparison
+    from heelstrike.experiments.planners import compare_planners as compare_planners
     from heelstrike.experiments.spring_mass import SpringMass as SpringMass
     from heelstrike.gait import ContactPhase as ContactPhase
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import GaitFamily as GaitFamily
     from heelstrike.gait import Motion as Motion
     from heelstrike.gait import PhasedGait as PhasedGait
+    from heelstrike.gait import Planner as Planner
     from heelstrike.gait import Repeat as Repeat
     from heelstrike.gait import StepFamily as StepFamily
     from heelstrike.gait import gait_family as gait_family
@@ -122,6 +127,7 @@ if TYPE_CHECKING:
     from heelstrike.gait import make_invariant as make_invariant
     from heelstrike.gait import optimize_gait as optimize_gait
     from heelstrike.gait import optimize_motion as optimize_motion
+    from heelstrike.gait import plan_motion as plan_motion
     from heelstrike.robot import Robot as Robot
     from heelstrike.robot import RobotBuilder as RobotBuilder
     from heelstrike.robot import RobotWarning as RobotWarning
@@ -220,6 +226,8 @@ _HOME = {
     "Motion": "heelstrike.gait",
     "MotionTracking": "heelstrike.control",
     "PhasedGait": "heelstrike.gait",
+    "Planner": "heelstrike.gait",
+    "PlannerComparison": "heelstrike.experiments.planners",
     "Policy": "heelstrike.control",
     "Push": "heelstrike.sim",
     "Repeat": "heelstrike.gait",
@@ -257,6 +265,8 @@ _HOME = {
     "builtin_robots": "heelstrike.robot",
     "cell": "heelstrike.compiler.bundle",
     "compare": "heelstrike.experiments.comparison",
+    "compare_engines": "heelstrike.experiments.engine_comparison",
+    "compare_planners": "heelstrike.experiments.planners",
     "constrained": "heelstrike.sim",
     "contact_forward_dynamics": "heelstrike.contact",
     "contact_inverse_dynamics": "heelstrike.contact",
@@ -282,11 +292,13 @@ _HOME = {
     "load_run": "heelstrike.sim",
     "load_snapshot": "heelstrike.sim",
     "make_invariant": "heelstrike.gait",
+    "mimic": "heelstrike.experiments.people",
     "monodromy": "heelstrike.analysis.stability.monodromy",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
     "optimize_motion": "heelstrike.gait",
     "part": "heelstrike.compiler.bundle",
+    "plan_motion": "heelstrike.gait",
     "report": "heelstrike.view.report",
     "run_derivatives": "heelstrike.sim.linearized.derivatives",
     "saltation_matrix": "heelstrike.contact",

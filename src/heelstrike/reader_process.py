@@ -1,4 +1,4 @@
-"""Another process, in which files from elsewhere are read.
+"""Another process, in which files from elsewhere are read, and engines of others run.
 
 Parsers of foreign formats crash, hang or fill the memory over a file that is damaged, or made to
 hurt. So they run in a process of their own, which has a limit of time everywhere and of memory on
@@ -49,12 +49,23 @@ class ReadingError(Exception):
 
 
 class ReaderProcess:
-    """A process that is given orders, one at a time, and is started when it is needed."""
+    """A process that is given orders, one at a time, and is started when it is needed.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    python : str, optional
+        Program of another Python, of version 3.11 or later, which imports its own packages and none
+        of this one's; by default that of this process.
+    remembers : bool
+        Whether an order means something only after those before it. It is then not given again
+        when the process has ended, nor ever done here.
+    """
+
+    def __init__(self, *, python: str | None = None, remembers: bool = False) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         self._owner = os.getpid()
         self._lock = threading.Lock()
+        self._python, self._remembers = python, remembers
 
     def ask(self, job: str, order: bytes, *, patience: float, memory: int = MOST_MEMORY) -> bytes:
         """Have a function of bytes called in the process, and return the bytes that it returns.
@@ -79,13 +90,13 @@ class ReaderProcess:
             If the function raised, or its process did not survive it.
         """
         if self._owner != os.getpid():  # a fork, to which the other's process does not answer
-            self.__init__()  # type: ignore[misc]
+            self.__init__(python=self._python, remembers=self._remembers)  # type: ignore[misc]
         with self._lock:
             used = self._process is not None
             try:
                 return self._asked(job, order, patience, memory)
             except _GoneError:
-                if not used:
+                if not used or self._remembers:
                     raise
             return self._asked(job, order, patience, memory)  # was it this file, or one before?
 
@@ -98,6 +109,8 @@ class ReaderProcess:
 
     def _asked(self, job: str, order: bytes, patience: float, memory: int) -> bytes:
         if self._process is None and not self._start():
+            if self._remembers or self._python is not None:
+                raise ReadingError(f"no process of {self._python or 'Python'} can be started")
             try:
                 return _function(job)(order)
             except Exception as error:
@@ -141,15 +154,18 @@ class ReaderProcess:
 
     def _start(self) -> bool:
         """Start the process; return whether there is one."""
-        if getattr(sys, "frozen", False) or not sys.executable:
-            return False
+        python, path = self._python, ""
+        if python is None:
+            if getattr(sys, "frozen", False) or not sys.executable:
+                return False
+            python, path = sys.executable, os.pathsep.join(filter(None, sys.path))
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", __file__],
+                [python, "-P", __file__],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                env={**os.environ, "PYTHONPATH": path},
                 creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
             )
         except OSError:

@@ -220,7 +220,7 @@ def test_members_are_not_called_like_what_every_bundle_has(name: str) -> None:
 
 
 def test_a_class_keeps_its_type_however_many_there_are() -> None:
-    """Were it made anew, machine code for it would be looked for again at every call."""
+    """Were it made again, machine code for it would be looked for again at every call."""
 
     def made(name: str) -> type[Bundle]:
         return type(name, (Bundle,), {"size": number(float)})

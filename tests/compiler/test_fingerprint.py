@@ -1,4 +1,4 @@
-"""Fingerprints: machine code is made anew for what changes it, and for nothing else."""
+"""Fingerprints: machine code is made again for what changes it, and for nothing else."""
 
 from __future__ import annotations
 

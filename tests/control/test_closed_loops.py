@@ -23,6 +23,8 @@ from heelstrike.gait.request import Request
 from heelstrike.gait.transcription import Transcription
 from heelstrike.robot import Robot, RobotBuilder
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 LIGHT = 1e-9
 NAMES = ("own", "lever")
 LEVER = 0.05

@@ -1,7 +1,7 @@
 """What holds for every stock controller: one suite for all of them.
 
 Each law is compiled and the same in Python, says what it does in a run when it is asked itself,
-begins anew with every run, lives through snapshots, pickles and batches, and does the same under
+starts again with every run, lives through snapshots, pickles and batches, and does the same under
 both methods.
 """
 
@@ -25,8 +25,9 @@ from heelstrike.sim.controller.law import Law
 def phased() -> hs.PhasedGait:
     robot = hs.load_robot("rabbit")
     gait = hs.optimize_gait(
-        robot, step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1
-    )
+        robot, step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1,
+        joint_ranges={"right_knee": (0.2, 2.6)},
+    )  # fmt: skip
     return hs.PhasedGait.from_gait(robot, gait)
 
 

@@ -16,6 +16,8 @@ from heelstrike.errors import GaitError
 from heelstrike.experiments.walk import design, typical_step, walk, why_unstable
 from heelstrike.sim.method import Method
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 FLAT = ("human7", "geyer7", "spring_flamingo", "walker2d")
 POINTS = ("rabbit", "rabbit_optimtraj")
 # What the optimiser finds by itself after the parabola has failed, without the time that takes.

@@ -10,6 +10,8 @@ import pytest
 import heelstrike as hs
 from heelstrike.errors import GaitError
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 SLOPES = np.array([0.0, 0.03])
 SPEEDS = [0.40, 0.45]
 ASKED = {"step_duration": 0.70, "starts": 1}

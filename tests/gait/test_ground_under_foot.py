@@ -11,6 +11,8 @@ from heelstrike.gait import load_gait
 from heelstrike.gait.stairs import Stairs
 from heelstrike.sim import EventKind
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 LENGTH, DURATION = 0.35, 0.8
 STEPS = 3
 

@@ -12,6 +12,8 @@ import heelstrike as hs
 from heelstrike.errors import GaitError
 from heelstrike.gait.request import ranges_kept
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 STEP = {"step_length": 0.3, "step_duration": 0.7, "starts": 1}
 
 

@@ -137,7 +137,7 @@ def test_a_builder_may_go_on() -> None:
         ({"torque": -5}, "torque must not be negative"),
         ({"torque": 0}, "torque must go from low to high"),
         ({"sense": 2}, "sense is 1 or -1"),
-        ({"parent": "nowhere"}, "joint 'b' hangs on link 'nowhere'.*Links are: a"),
+        ({"parent": "nowhere"}, "joint 'b' is attached to link 'nowhere'.*Links are: a"),
         ({"name": "a"}, "there is a joint 'a' already"),
         ({"link": "a"}, "there is a link 'a' already"),
     ],

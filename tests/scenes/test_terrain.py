@@ -21,7 +21,7 @@ VALLEY = Terrain(np.array([[-1.0, 1], [0, 0], [1, 1]]), np.array([0.5, 0.8]), np
         (STEP, (-0.3, 0.9), 0.5),  # the edge of the step: a 3-4-5 triangle
         (STEP, (1.0, 0.7), 0.2),
         (STEP, (0.1, 0.3), -0.1),  # inside, behind the wall
-        (STEP, (-9.0, 0.3), 0.3),  # the ends go on for ever
+        (STEP, (-9.0, 0.3), 0.3),  # the ends go on forever
         (STEP, (9.0, 0.3), -0.2),
         (RIDGE, (0.0, 0.7), 0.7),
         (RIDGE, (0.0, -0.5), -0.5 / np.sqrt(2)),

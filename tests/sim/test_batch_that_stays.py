@@ -1,4 +1,4 @@
-"""hs.Batch: lanes are simulations to the last bit, end by themselves, and begin anew."""
+"""hs.Batch: lanes are simulations to the last bit, end by themselves, and start again."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_lanes_are_simulations_to_the_last_bit(method: Method, threads: int) -> 
             assert_same(batch, lane, single)
     assert batch.going.all()
     assert (batch.complementarity < 1e-9).all()
-    # Some begin anew, on the ground and with the pushes that they have; the others go on.
+    # Some start again, on the ground and with the pushes that they have; the others go on.
     mask = np.arange(LANES) % 2 == 0
     batch.reset(mask)
     for lane in np.flatnonzero(mask).tolist():

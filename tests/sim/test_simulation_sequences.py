@@ -23,7 +23,7 @@ METHODS = {
 
 
 class Sway:
-    """Torques that hang on all calls before."""
+    """Torques that depend on all calls before."""
 
     def __init__(self) -> None:
         self.calls: list[float] = []

@@ -28,7 +28,7 @@ METHODS = {
 
 
 class Sway:
-    """Torques that hang on all calls before: a controller in Python that can be kept."""
+    """Torques that depend on all calls before: a controller in Python that can be kept."""
 
     def __init__(self) -> None:
         self.calls = 0

@@ -108,7 +108,7 @@ def test_bars_are_slimmer_than_what_they_connect(leg: Robot) -> None:
 
 
 def test_what_touches_has_no_bars() -> None:
-    """Of bravo7 the head alone stands apart; the feet, which hang on bones, have theirs unused."""
+    """Of bravo7 the head alone stands apart; the feet, attached to bones, have theirs unused."""
     robot = load_robot("bravo7")
     (neck,) = [bar for bar in bars(robot) if robot.link_names[bar.link] == "trunk"]
     np.testing.assert_allclose(neck.corners[:, 0], 0.0, atol=1e-12)

@@ -33,7 +33,7 @@ from heelstrike.sim.snapshot import Snapshot
 
 # How often a Newton step is halved when the walk does not go on after it.
 HALVINGS = 6
-# A step that differs by less than this part of what the one before did is not differentiated anew.
+# A step that differs by less than this part of what the one before did is not differentiated again.
 FAST = 0.1
 
 

@@ -134,7 +134,7 @@ class Carried:
     """Members of its memory."""
     relabelled: Callable[[Any, float], None] | None = None
     """``relabelled(memory, time)`` makes of the memory at the end of a step, which took a time,
-    that at the beginning of the next: legs exchanged, times counted anew."""
+    that at the beginning of the next: legs exchanged, times counted again."""
 
     def of(self, simulation: Simulation) -> Floats:
         """Return the numbers that are carried, (m,)."""

@@ -16,6 +16,8 @@ An impact is a large force over one step, and counts like any other force.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, overload
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,7 +29,11 @@ from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import soles
 from heelstrike.sim.run import Run
+from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.tolerances import STANDING_GAP
+
+if TYPE_CHECKING:
+    from heelstrike.analysis.spatial.zero_moment_point import SpatialZeroMomentPoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,21 +67,35 @@ class ZeroMomentPoint:
         return np.asarray(np.fmax.reduce(alone, axis=1, initial=np.nan))
 
 
-def zero_moment_point(run: Run, *, motion: Motion | None = None) -> ZeroMomentPoint:
+@overload
+def zero_moment_point(run: Run, *, motion: Motion | None = None) -> ZeroMomentPoint: ...
+
+
+@overload
+def zero_moment_point(run: SpatialRun) -> SpatialZeroMomentPoint: ...
+
+
+def zero_moment_point(
+    run: Run | SpatialRun, *, motion: Motion | None = None
+) -> ZeroMomentPoint | SpatialZeroMomentPoint:
     """Locate the zero moment points of a run (paper eq. 44, 45).
 
     Parameters
     ----------
-    run : Run
+    run : Run or SpatialRun
         The run.
     motion : Motion, optional
-        Its motion, if already at hand.
+        Its motion, if already at hand; of the plane.
 
     Returns
     -------
-    ZeroMomentPoint
+    ZeroMomentPoint or SpatialZeroMomentPoint
         Of each foot and of the whole robot, row by row.
     """
+    if isinstance(run, SpatialRun):
+        from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
+
+        return spatial_zero_moment_point(run)
     robot, rows = run.robot, len(run.time)
     reference = sole_points(run, motion=motion)
     foot = np.full((rows, len(robot.feet)), np.nan)

@@ -51,7 +51,7 @@ def campaign(
         bool, typer.Option("--film/--no-film", help="Write a film and a page of a replayed trial.")
     ] = True,
     afresh: Annotated[
-        bool, typer.Option("--afresh", help="Begin anew whatever is in --out.")
+        bool, typer.Option("--afresh", help="Discard what is in --out and start again.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip

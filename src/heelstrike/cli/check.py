@@ -56,7 +56,7 @@ def check(
     """
     with stage("loading"):
         from heelstrike.experiments.checking import check_motion
-        from heelstrike.gait.motion_files import load_recorded_motion
+        from heelstrike.gait.recordings.motion import load_recorded_motion
         from heelstrike.robot import builtin_robots
         from heelstrike.robot.library import load_planar_robot
         from heelstrike.view.page.page import check_page, save_html

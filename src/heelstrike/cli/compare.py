@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from heelstrike.cli import INTERRUPTED
+from heelstrike.cli.engines import InEngines, compare_in_engines
 from heelstrike.cli.options import (
     SEVERAL,
     AsJson,
@@ -61,13 +62,14 @@ def compare(
         float,
         typer.Option(help="Restitution of the ground; methods that know none are left out."),
     ] = 0.0,
+    others: InEngines,
     how: Reading,
     out: Annotated[
         Path, typer.Option(file_okay=False, help="Directory for the table and the figure.")
     ] = Path("compare"),
     as_json: AsJson = False,
 ) -> None:
-    """Walk the same steps by several methods and tell how far they differ."""
+    """Walk the same steps by several methods, or in several engines; tell how far they differ."""
     import heelstrike as hs
     from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
     from heelstrike.experiments.walk import beginning
@@ -78,6 +80,9 @@ def compare(
     methods = methods_asked(case, method or USUAL, step)
     case = with_gait(case, walking.gait)
     start = beginning(case.robot, case.gait, case.ground, case.law)
+    if others.engines is not None:
+        compare_in_engines(case, start, others, steps, out, as_json=as_json)
+        return
     doing = f"walking {steps} steps by {len(methods)} methods"
     with stage(doing, when_slow="(compiling each of them, once: about a minute)"):
         comparison = hs.compare(

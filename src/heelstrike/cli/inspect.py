@@ -75,14 +75,14 @@ def inspect(
 def look_in_space(robot: str, picture: Path | None, how: Reading, *, as_json: bool) -> None:
     """Print what a robot in space consists of, and draw it into a file."""
     from heelstrike.robot.library import load_robot
-    from heelstrike.robot.spatial.inspection import spatial_facts, spatial_text
+    from heelstrike.robot.spatial.inspection import spatial_description, spatial_facts
     from heelstrike.view.drawing import robot_picture
 
     found = load_robot(robot, dimension=3, **how.keywords())
     if as_json:
         typer.echo(json.dumps(spatial_facts(found), indent=2))
     else:
-        output().print(Text(spatial_text(found)), soft_wrap=True)
+        output().print(Text(spatial_description(found)), soft_wrap=True)
     if picture is not None:
         robot_picture(found, picture)
         tell(f"drawn into {picture}")
@@ -98,10 +98,23 @@ def look_at(
 ) -> None:
     """Print what was found of a robot, and draw it into a file."""
     from heelstrike.robot.inspection import facts
+    from heelstrike.robot.spatial.robot import SpatialRobot
     from heelstrike.view.drawing import robot_picture
     from heelstrike.view.terminal import terminal_drawing
 
     robot = inspection.robot
+    if isinstance(robot, SpatialRobot):
+        if picture is not None:
+            raise typer.BadParameter(
+                f"{robot.name} is a robot in space, and pictures are of the plane: leave it out, "
+                "or say --projected",
+                param_hint="--out",
+            )
+        if as_json:
+            typer.echo(json.dumps(facts(inspection), indent=2))
+        else:
+            output().print(Text(in_options(inspection.text())), soft_wrap=True)
+        return
     if robot is not None:
         for push in pushes:
             push.place(robot)

@@ -11,7 +11,9 @@ from heelstrike.cli.campaign import campaign
 from heelstrike.cli.check import check
 from heelstrike.cli.compare import compare
 from heelstrike.cli.inspect import inspect
+from heelstrike.cli.mimic import mimic
 from heelstrike.cli.paper import paper
+from heelstrike.cli.planners import planners
 from heelstrike.cli.report import report
 from heelstrike.cli.robots import robots
 from heelstrike.cli.simulate import simulate
@@ -39,8 +41,10 @@ for command in (
     zoo,
     campaign,
     check,
+    mimic,
     paper,
     compare,
+    planners,
     robots,
     inspect,
 ):

@@ -15,6 +15,9 @@ from heelstrike.cli.terminal import many, output, spoken, stage, tell, wrote
 from heelstrike.cli.values import range_called, ranges_called
 from heelstrike.errors import SimulationError
 
+SPEEDS, GAIT = "0.2:0.6", "gait"
+"""Speeds that a walker is commanded (m/s), and what it follows, if nobody says."""
+
 
 class Learned(StrEnum):
     """What is learned."""
@@ -37,22 +40,26 @@ def train(
         Learned, typer.Option(help="To run as far as it can, or to walk at a commanded speed.")
     ] = Learned.RUN,
     speeds: Annotated[
-        str,
-        typer.Option(metavar="LOW:HIGH", help="Speeds in m/s that a walker is commanded."),
-    ] = "0.2:0.6",
+        str | None,
+        typer.Option(
+            metavar="LOW:HIGH", help="Speeds in m/s that a walker is commanded.",
+            show_default=SPEEDS,
+        ),
+    ] = None,
     reference: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="gait|posture|FILE.json",
             help="What a walker follows: gaits that are designed over the speeds, the robot as it "
             "stands in its file, or a gait of yours.",
+            show_default=GAIT,
         ),
-    ] = "gait",
+    ] = None,
     randomise: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=LOW:HIGH",
-            help="What is drawn anew for each episode of a walker: friction, mass (factor), push "
+            help="What is drawn again for each episode of a walker: friction, mass (factor), push "
             "(N s), push_period (s), delay (s), slope (rad), roughness (m); repeat the option.",
         ),
     ] = None,
@@ -71,7 +78,7 @@ def train(
         bool, typer.Option("--film/--no-film", help="Write film and page of a run, too.")
     ] = True,
     afresh: Annotated[
-        bool, typer.Option("--afresh", help="Begin anew whatever is in --out.")
+        bool, typer.Option("--afresh", help="Discard what is in --out and start again.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
@@ -91,11 +98,21 @@ def train(
         recipe = WALKING if task is Learned.WALK else Recipe()
         if task is Learned.WALK:
             learned = named_task(
-                "Walk", file=robot, reference=reference, speeds=range_called(speeds, "--speeds"),
+                "Walk", file=robot, reference=reference or GAIT,
+                speeds=range_called(speeds or SPEEDS, "--speeds"),
                 randomise=ranges_called(randomise),
             )  # fmt: skip
-        elif randomise:
-            raise SimulationError("--randomise is for walkers: add --task walk")
+        elif needless := [
+            name
+            for name, given in (
+                ("--randomise", randomise), ("--speeds", speeds), ("--reference", reference),
+            )
+            if given
+        ]:  # fmt: skip
+            verb = "is" if len(needless) == 1 else "are"
+            raise SimulationError(
+                f"{', '.join(needless)} {verb} for walkers: add --task walk, or leave it out"
+            )
         else:
             learned = task_of(robot)
         folder = out or Path(f"train-{Path(robot).stem}")

@@ -153,6 +153,17 @@ def range_called(words: str, where: str) -> tuple[float, float]:
     return _number(low, where, SimulationError), _number(high, where, SimulationError)
 
 
+def numbers_called(words: str, where: str) -> list[float]:
+    """Make numbers of ``A,B,...``.
+
+    Raises
+    ------
+    SimulationError
+        If one of them is none.
+    """
+    return [_number(word, where, SimulationError) for word in words.split(",")]
+
+
 def ranges_called(several: Sequence[str] | None) -> dict[str, tuple[float, float]]:
     """Make named ranges of ``NAME=LOW:HIGH``.
 

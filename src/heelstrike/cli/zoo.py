@@ -65,7 +65,7 @@ def zoo(
         ),
     ] = None,
     afresh: Annotated[
-        bool, typer.Option("--afresh", help="Begin anew whatever is in --out.")
+        bool, typer.Option("--afresh", help="Discard what is in --out and start again.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:

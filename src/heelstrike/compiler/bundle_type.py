@@ -123,7 +123,7 @@ class BundleType(types.Type):
         return made._getvalue()
 
 
-@cache  # for good: a type made anew would be another, and machine code for it compiled again
+@cache  # for good: a type made again would be another, and machine code for it compiled again
 def bundle_type(cls: Any) -> BundleType:
     """Return the type of a class of bundles."""
     kind: type[BundleType] = type(cls.__name__, (BundleType,), {})

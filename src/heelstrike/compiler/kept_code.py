@@ -166,7 +166,7 @@ def _clear(place: Path) -> None:
 def _say_damaged(file: Path, reason: str) -> None:
     _say(
         "damaged",
-        f"Compiled code kept in {file} cannot be used: {reason}. It is compiled anew and written "
+        f"Compiled code kept in {file} cannot be used: {reason}. It is compiled again and written "
         "again. Should this come back, look after the disk.",
     )
 
@@ -175,8 +175,8 @@ def say_nowhere(failures: Sequence[str]) -> None:
     """Warn that machine code was kept nowhere, and why."""
     _say(
         "nowhere",
-        f"Compiled code cannot be kept ({'; '.join(failures)}), so it will be compiled anew at the "
-        "next start, too. Set NUMBA_CACHE_DIR to a directory with space that you can write to.",
+        f"Compiled code cannot be kept ({'; '.join(failures)}), so it will be compiled again "
+        "at the next start. Set NUMBA_CACHE_DIR to a directory with space that you can write to.",
     )
 
 

@@ -3,8 +3,7 @@
 Compilers and libraries use what the processor at hand offers, and sums then round differently from
 one machine to the next. ``HEELSTRIKE_PLAIN_CODE=1`` in the environment makes them use what every
 processor of the kind has: Numba and the straight-line code compile for the generic one, NumPy and
-OpenBLAS take their basic loops. It is slower, and good for showing that an answer does not hang on
-rounding.
+OpenBLAS take their basic loops. It is slower, and shows that an answer does not depend on rounding.
 
 It holds for what this package and NumPy compute. MuJoCo, CasADi's solvers and the C library's
 functions (sines, exponentials) look at the processor themselves.

@@ -309,7 +309,7 @@ class _Cache(NullCache):
     """Machine code on disk that is good for exactly what the kernel is made of.
 
     Numba's own cache looks at the file of a kernel only: it would go on using yesterday's machine
-    code of a kernel whose callee in another file has changed, compile anew for the sake of a
+    code of a kernel whose callee in another file has changed, compile again for the sake of a
     comment, and take damaged files for good.
     """
 

@@ -93,7 +93,7 @@ class Ground(ShownInNotebooks):
     """Inclination in rad of ground without a profile; positive climbs along +x."""
     profile: ArrayLike | None = None
     """(ns + 1, 2) Corners (x, z) of the ground in metres, from left to right; two corners with the
-    same x make a vertical step. The first and last segments go on for ever. See also :meth:`stairs`
+    same x make a vertical step. The first and last segments go on forever. See also :meth:`stairs`
     and :meth:`rough`."""
     shape: GroundShape | None = None
     """A smooth curve in the place of slope and profile, perhaps of a class of one's own."""

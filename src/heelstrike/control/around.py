@@ -216,7 +216,7 @@ class Around(Law):
         self._shell, self._extents, self._late = shell, dict(extents), late
 
     def __reduce__(self) -> Any:
-        """Copies are made anew of shell and controller: their bundles have no name."""
+        """Copies are made again of shell and controller: their bundles have no name."""
         numbers: Any = self.parameters
         more = {name: each for name, each in vars(self).items() if name not in _MADE}
         made_of = self._shell, self.inside, numbers.own, self.period, self._extents, self._late
@@ -279,7 +279,7 @@ class Composed(ControllerFunction):
         self.partner = function.partner
 
     def __reduce__(self) -> Any:
-        """Copies are made anew of shell and function."""
+        """Copies are made again of shell and function."""
         return composed, self._made_of
 
     def begin(self) -> None:

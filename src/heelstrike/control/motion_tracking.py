@@ -56,6 +56,10 @@ class Parameters(Bundle):
     """Whether the force along each row is one of those that hold the robot."""
     fresh: Integers = array("phases", "nc", of=int)
     """Whether the touchdown of a contact point ends a phase."""
+    rolls: Integers = array("phases", of=int)
+    """Whether all that comes down at the end of a phase is of links that stand already: a foot that
+    rolls flat may touch at no speed, and so late by any small error. Then time ends the phase, and
+    the torques of the next one press the foot down."""
     following: Integers = array("phases", of=int)
     """The phase after each; -1 after the last of a motion that never repeats."""
     kp: Floats = array("nu")
@@ -107,6 +111,9 @@ def advance_phase(t: float, contacts: Contacts, parameters: Parameters, memory: 
     if ends_by_touchdown:
         if touched and gone >= parameters.earliest * duration:
             memory.start = t
+            memory.phase = parameters.following[phase]
+        elif parameters.rolls[phase] == 1 and gone >= duration:
+            memory.start += duration
             memory.phase = parameters.following[phase]
     elif gone >= duration:
         memory.start += duration
@@ -213,7 +220,8 @@ class MotionTracking(Law):
     """Follow a motion of any phases by computed torque.
 
     A phase ends when the points come down that stand in the next one, in its second half; one in
-    which nothing comes down ends by time. Nothing brings back what the joints do not reach, as the
+    which nothing comes down ends by time, and so at the latest does one in which a foot that stands
+    rolls onto other points of its own. Nothing brings back what the joints do not reach, as the
     pitch of a trunk on a point: motions may be unstable under this law.
 
     Parameters
@@ -250,6 +258,12 @@ class MotionTracking(Law):
         for p, following in enumerate(starts):
             for name in points[following] - points[p] if following >= 0 else ():
                 fresh[p, robot.contact_names.index(name)] = 1
+        link = robot.model.contact_link
+        stood = [{int(link[robot.contact_names.index(n)]) for n in phase} for phase in points]
+        rolls = [
+            bool(row.any()) and set(link[row == 1].tolist()) <= links
+            for row, links in zip(fresh, stood, strict=True)
+        ]
         parameters = Parameters(
             duration=np.array([phase.duration for phase in cycle]),
             begins=np.concatenate([phase.breakpoints[:-1] for phase in cycle]),
@@ -258,6 +272,7 @@ class MotionTracking(Law):
             force=np.concatenate([phase.force_pieces for phase in cycle]),
             stands=np.array(stands),
             fresh=fresh,
+            rolls=np.array(rolls, np.int64),
             following=np.array(starts),
             kp=gains_of("kp", kp, robot),
             kd=gains_of("kd", kd, robot),

@@ -234,7 +234,7 @@ def shorten(
 ) -> None:  # fmt: skip
     """Choose among the solutions of equations that :func:`solve_to_rank` left open the shortest.
 
-    Which unknowns that leaves free, and zero, hangs on rounding where pivots tie; the shortest
+    Which unknowns that leaves free, and zero, depends on rounding where pivots tie; the shortest
     solution does not, and changes no faster than the equations do. Unknowns from `first` on count
     for their length, each for that of a force with `lean` as much across it; those before follow.
 

@@ -251,8 +251,8 @@ def _difference(name: str, run: Run, reference: Run) -> Difference:
         touchdowns=len(ours),
         touchdown_s=_largest(landing[:, 1]),
         impulse_Ns=_largest(landing[:, 2]),
-        zmp_m=_root_mean_square(series["zmp"]),
-        energy_J=_root_mean_square(series["energy"]),
+        zmp_m=root_mean_square(series["zmp"]),
+        energy_J=root_mean_square(series["energy"]),
         position=float(series["position"][-1]) if len(series["position"]) else math.nan,
         penetration_m=run.certificates.penetration,
         slip_m=max_slip(run),
@@ -268,7 +268,7 @@ def _landings(run: Run) -> Floats:
         if stance.touchdown == run.time[0]:
             continue
         contacts = list(run.robot.feet[stance.foot].contacts)
-        impulse = _landing_impulse(run, contacts, stance.touchdown)
+        impulse = landing_impulse(run, contacts, stance.touchdown)
         found.append((stance.foot, stance.touchdown, impulse))
     return np.array(found, dtype=np.float64).reshape(-1, 3)
 
@@ -286,11 +286,25 @@ def _nearest(ours: Floats, theirs: Floats) -> Floats:
     return np.array(found, dtype=np.float64).reshape(-1, 3)
 
 
-def _landing_impulse(run: Run, contacts: list[int], touchdown: float) -> float:
+def landing_impulse(run: Run, contacts: list[int], touchdown: float) -> float:
     """Normal impulse on some contact points over the landing.
 
     Time stepping and compliant laws have it all in their forces; event-driven runs have impacts
     apart, in their events.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    contacts : list of int
+        The contact points.
+    touchdown : float
+        When it begins, in s; it lasts for `LANDING`.
+
+    Returns
+    -------
+    float
+        In N s.
     """
     end = touchdown + LANDING
     spans = np.minimum(run.time[1:], end) - run.time[:-1]
@@ -312,13 +326,26 @@ def _against(run: Run, reference: Run) -> tuple[Floats, dict[str, Floats]]:
     """Differences of a run from the reference on a common grid of instants."""
     end = min(run.time[-1], reference.time[-1])
     grid = np.linspace(0.0, end, max(2, round(end / GRID) + 1))
-    ours, theirs = _sampled(run, grid), _sampled(reference, grid)
+    ours, theirs = sampled(run, grid), sampled(reference, grid)
     apart = {name: ours[name] - theirs[name] for name in ours}
     return grid, apart | {"position": np.abs(apart["position"]).max(axis=1)}
 
 
-def _sampled(run: Run, grid: Floats) -> dict[str, Floats]:
-    """Positions (linearly), energy and zero moment point (the row before) at given instants."""
+def sampled(run: Run, grid: Floats) -> dict[str, Floats]:
+    """Positions (linearly), energy and zero moment point (the row before) at given instants.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    grid : (n,) float
+        Instants in s.
+
+    Returns
+    -------
+    dict
+        ``position``, ``energy`` and ``zmp``, n rows each.
+    """
     before = np.clip(np.searchsorted(run.time, grid + 1e-9, side="right") - 1, 0, None)
     position = np.column_stack([np.interp(grid, run.time, column) for column in run.position.T])
     zmp = zero_moment_point(run).stance if run.robot.feet else np.full(len(run.time), np.nan)
@@ -333,6 +360,13 @@ def _largest(values: Floats) -> float:
     return float(np.fmax.reduce(np.abs(values), initial=math.nan))
 
 
-def _root_mean_square(values: Floats) -> float:
+def root_mean_square(values: Floats) -> float:
+    """Root mean square of the numbers that are finite; NaN of none.
+
+    Parameters
+    ----------
+    values : array
+        Numbers.
+    """
     finite = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(finite**2))) if len(finite) else math.nan

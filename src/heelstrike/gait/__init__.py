@@ -1,5 +1,7 @@
 """Gaits: how they are represented, saved, and found by optimisation."""
 
+from heelstrike.gait.cart_table.center_of_mass import Planner
+from heelstrike.gait.cart_table.plan import plan_motion
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.cost import Cost, Instant
 from heelstrike.gait.family import GaitFamily, gait_family, load_gait_family
@@ -29,6 +31,7 @@ __all__ = [
     "MotionPhase",
     "Phase",
     "PhasedGait",
+    "Planner",
     "Repeat",
     "StepFamily",
     "Touchdown",
@@ -39,4 +42,5 @@ __all__ = [
     "make_invariant",
     "optimize_gait",
     "optimize_motion",
+    "plan_motion",
 ]

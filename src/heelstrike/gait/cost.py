@@ -45,6 +45,12 @@ class Instant:
     """(nu,) Rates of the joints with motors, in the order of the actuators."""
     force: Any
     """(2,) Force of the ground on the robot along the ground and away from it (N)."""
+    acceleration: Any = None
+    """(nv,) Accelerations of all coordinates in a motion; None in gaits of one step, whose costs
+    know none."""
+    time: Any = None
+    """Time since the beginning of a motion (s); None in gaits of one step, whose costs know no
+    time."""
 
 
 OwnCost = Callable[[Instant], Any]

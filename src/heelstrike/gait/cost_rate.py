@@ -77,6 +77,9 @@ def _own_rate(cost: OwnCost, now: Instant) -> Any:
     if rate.numel() != 1:
         raise GaitError(f"the cost function must return one number, got {rate.numel()}")
     known = casadi.vertcat(now.position, now.velocity, now.torque, now.force)
+    for each in (now.acceleration, now.time):
+        if each is not None:
+            known = casadi.vertcat(known, each)
     unknown = {s.name() for s in casadi.symvar(rate)} - {s.name() for s in casadi.symvar(known)}
     if unknown:
         raise GaitError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from os import PathLike
 
@@ -390,22 +390,51 @@ class Gait(ShownInNotebooks):
         return result
 
     @takes(GaitError)
-    def save(self, path: str | PathLike[str]) -> None:
+    def save(
+        self,
+        path: str | PathLike[str],
+        *,
+        rate: float = 1000.0,
+        steps: int = 2,
+        joints: Sequence[str] | None = None,
+        degrees: bool = False,
+    ) -> None:
         """Write the gait to a readable JSON file; :func:`load_gait` reads it back unchanged.
+
+        Where the name ends in .csv or .tsv, write a table of joint positions over time instead, for
+        a robot or another program. ``heelstrike check`` and
+        :func:`~heelstrike.gait.recordings.motion.load_recorded_motion` read it, to the last bit.
 
         Parameters
         ----------
         path : str or path
             File to write.
+        rate : float
+            Rows a second of a table.
+        steps : int
+            Steps that are in a table; two are a whole cycle.
+        joints : sequence of str, optional
+            Joints of a table, in their order; all driven ones by default.
+        degrees : bool
+            Whether angles of a table are in degrees.
 
         Raises
         ------
         GaitError
-            If the file cannot be written.
+            If the file cannot be written, or there is no such joint.
         """
         from heelstrike.gait.file import save_gait
+        from heelstrike.gait.recordings.saving import is_table, save_joints, times_at
 
-        save_gait(self, path)
+        if not is_table(path):
+            save_gait(self, path)
+            return
+        time = times_at(rate, steps * self.step_duration)
+        # No joint of a gait says whether it turns; a slide is no joint of a leg that walks.
+        save_joints(
+            path, self.joint_names, time, self.position(time),
+            hinges=[True] * len(self.joint_names), joints=joints, degrees=degrees,
+        )  # fmt: skip
 
     def __repr__(self) -> str:
         return (

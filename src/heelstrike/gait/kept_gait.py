@@ -31,7 +31,7 @@ class KeptGait:
 
     def __init__(self, request: Request) -> None:
         self._robot = request.robot
-        # A function has no fingerprint, and what was started near a gait hangs on that gait.
+        # A function has no fingerprint, and what was started near a gait depends on that gait.
         nameless = callable(request.cost) or request.warm_start is not None
         self._file = None if nameless else kept_file("gaits", _fingerprint(request))
 

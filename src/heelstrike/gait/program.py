@@ -376,19 +376,43 @@ class Program:
 
     def polished(self, unknowns: Floats) -> Floats:
         """Satisfy the equations to rounding, by the least change of the unknowns."""
-        import scipy.sparse.linalg
-
-        exact = np.flatnonzero(self._lower == self._upper)
         step = np.ptp([self.request.duration_bounds, self.request.length_bounds], axis=1) > 0.0
         free = np.append(np.full(self.size - 2, True), step)
-        polished = unknowns.copy()
-        for _ in range(3):
-            missing = np.array(self._blocks.value(polished)[1]).ravel()[exact] - self._lower[exact]
-            rows = self._slopes(polished).sparse().tocsr()[exact][:, free]
-            # Equations may depend on each other: then, and only then, does the shift matter.
-            normal = rows @ rows.T + SHIFT * scipy.sparse.identity(exact.size)
-            polished[free] -= rows.T @ scipy.sparse.linalg.spsolve(normal.tocsc(), missing)
-        return polished
+        return satisfied(
+            unknowns, lambda x: np.array(self._blocks.value(x)[1]).ravel(), self._slopes,
+            (self._lower, self._upper), free,
+        )  # fmt: skip
+
+
+def satisfied(
+    unknowns: Floats, value: Callable[[Floats], Floats], slopes: Callable[[Floats], Any],
+    bounds: tuple[Floats, Floats], free: Any,
+) -> Floats:  # fmt: skip
+    """Change unknowns least so that constraints are satisfied to rounding whose bounds are equal.
+
+    Parameters
+    ----------
+    unknowns : (n,) array
+        Where to begin: nearly there.
+    value, slopes : callable
+        Return the constraints (m,) at unknowns, and their derivatives (m, n), a CasADi matrix.
+    bounds : two (m,) arrays
+        Lower and upper bounds.
+    free : (n,) array of bool
+        Which unknowns may change.
+    """
+    import scipy.sparse.linalg
+
+    lower, upper = bounds
+    exact = np.flatnonzero(lower == upper)
+    found = unknowns.copy()
+    for _ in range(3):
+        missing = value(found)[exact] - lower[exact]
+        rows = slopes(found).sparse().tocsr()[exact][:, free]
+        # Equations may depend on each other: then, and only then, does the shift matter.
+        normal = rows @ rows.T + SHIFT * scipy.sparse.identity(exact.size)
+        found[free] -= rows.T @ scipy.sparse.linalg.spsolve(normal.tocsc(), missing)
+    return found
 
 
 class Ipopt:

@@ -259,7 +259,7 @@ class RobotBuilder:
             )
 
     def loop(self, link: str, other: str | None, *, at: Pair, other_at: Pair | None = None) -> None:
-        """Close a loop: join two links, which hang on others already, by one more hinge.
+        """Close a loop: join two links, which depend on others already, by one more hinge.
 
         It holds exactly, whatever it takes; what it takes is recorded as ``Run.loop_force``.
 
@@ -455,7 +455,7 @@ class RobotBuilder:
         # The massless links of one base share its name; nothing else does.
         if any(link.name == name for link in self._links) and not joint.startswith("root_"):
             raise self._error(f"there is a link {name!r} already.")
-        place = -1 if parent is None else self._index(parent, f"joint {joint!r} hangs on")
+        place = -1 if parent is None else self._index(parent, f"joint {joint!r} is attached to")
         try:
             numbers, torque = _numbers(properties), _torque(properties.get("torque"))
         except RobotError as error:

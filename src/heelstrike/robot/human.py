@@ -54,7 +54,12 @@ _LIMITS = {"hip": (-90.0, 90.0), "knee": (-10.0, 130.0), "ankle": (-60.0, 60.0)}
 
 @takes(RobotError)
 def human(
-    mass: float = 75.0, height: float = 1.8, *, table: BodyTable | str = BodyTable.WINTER
+    mass: float = 75.0,
+    height: float = 1.8,
+    *,
+    table: BodyTable | str = BodyTable.WINTER,
+    thigh: float | None = None,
+    shank: float | None = None,
 ) -> Robot:
     """Build a planar human of seven links from tables of body segments.
 
@@ -74,6 +79,9 @@ def human(
         Its height (m).
     table : BodyTable or its value, ``"winter"`` or ``"de_leva"``
         Where the numbers of the segments come from.
+    thigh, shank : float, optional
+        Lengths from hip to knee and from knee to ankle (m), where they are known; else those that
+        go with the height.
 
     Returns
     -------
@@ -83,7 +91,7 @@ def human(
     Raises
     ------
     RobotError
-        If mass or height is not positive, or there is no such table.
+        If mass, height or a length is not positive, or there is no such table.
 
     Examples
     --------
@@ -101,7 +109,12 @@ def human(
         raise RobotError(
             f"there is no table {table!r} of body segments; there are {known}."
         ) from None
-    thigh, shank, ankle = _THIGH * height, _SHANK * height, _ANKLE * height
+    thigh = _THIGH * height if thigh is None else thigh
+    shank = _SHANK * height if shank is None else shank
+    ankle = _ANKLE * height
+    for what, value in (("thigh", thigh), ("shank", shank)):
+        if not 0.0 < value < math.inf:
+            raise RobotError(f"the {what} of a human must be positive, got {value} m.")
     legs = 2.0 * sum(segments[name].mass for name in ("foot", "shank", "thigh"))
 
     body = RobotBuilder("human")

@@ -20,9 +20,15 @@ from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.looks import is_file
 from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.reading import read_bodies, read_mjcf
-from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS, builtin_robots, load_planar_robot
+from heelstrike.robot.library import (
+    NO_CONTACTS,
+    NO_MOTORS,
+    builtin_robots,
+    load_planar_robot,
+    load_robot,
+)
 from heelstrike.robot.loops import coupling_words, latch_words
-from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats, label
+from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats, Integers, label
 from heelstrike.robot.plausibility import (
     Finding,
     FindingKind,
@@ -31,6 +37,7 @@ from heelstrike.robot.plausibility import (
 )
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.sides.symmetry import find_mirror
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.warning import RobotWarning
 from heelstrike.tolerances import LEVEL_SOLE
 
@@ -44,7 +51,7 @@ class Inspection:
 
     source: str
     """What was looked at."""
-    robot: Robot | None
+    robot: Robot | SpatialRobot | None
     """The robot, None if the file gives none. If the file holds impossible inertias, it is the
     robot with the nearest possible ones: to look at, not to simulate."""
     findings: tuple[Finding, ...]
@@ -59,7 +66,7 @@ class Inspection:
 
     def text(self) -> str:
         """Return everything in words: tree, masses, limits, contact points, findings."""
-        parts = [] if self.robot is None else [_description(self.robot)]
+        parts = [] if self.robot is None else [_words(self.robot)]
         if self.findings:
             parts.append("\n".join(["findings", *(f"  - {found}" for found in self.findings)]))
         else:
@@ -73,7 +80,9 @@ class Inspection:
 
 
 @takes(RobotError)
-def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptions]) -> Inspection:
+def inspect_robot(
+    robot: Robot | SpatialRobot | str | os.PathLike[str], **how: Unpack[LoadOptions]
+) -> Inspection:
     """Look at a robot for what has fooled others.
 
     Left and right that differ; inertias that violate the triangle inequality (the sum of two
@@ -82,7 +91,7 @@ def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptio
 
     Parameters
     ----------
-    robot : Robot, str or path
+    robot : Robot, SpatialRobot, str or path
         A robot, the name of a built-in one, or the path of an MJCF or URDF file. A file tells more
         than a robot: a planar robot has forgotten its moments of inertia in space.
     **how : LoadOptions
@@ -107,19 +116,26 @@ def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptio
     if isinstance(robot, Robot):
         Options(**how)  # which says what is wrong with them
         return Inspection(robot.source or robot.name, robot, tuple(_of_robot(robot)))
+    if isinstance(robot, SpatialRobot):
+        Options(**how)
+        return Inspection(robot.source or robot.name, robot, ())
     path = _file(robot)
     findings: list[Finding] = []
     refused: RobotError | None = None
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RobotWarning)
         try:
-            found: Robot | None = load_planar_robot(robot, **how)
+            found: Robot | SpatialRobot | None = load_planar_robot(robot, **how)
         except RobotError as error:
             if path is None:
                 raise
-            refused, found = error, None
+            said_in_plane = len(caught)
+            found = _in_space(path, how)
+            refused = error if found is None else None
+            # What was said of the robot that it is not.
+            del caught[slice(said_in_plane, None) if found is None else slice(said_in_plane)]
         if path is not None:
-            findings += _of_inertias(path, how)
+            findings += _of_inertias(path, how, whole=isinstance(found, SpatialRobot))
         if refused is not None and path is not None:
             try:
                 found = read_mjcf(path, lenient=True, **how)
@@ -133,10 +149,25 @@ def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptio
         for words in said
         if not any(told in words for told in TOLD)
     ]
-    if found is not None:
+    if isinstance(found, Robot):
         findings += _of_robot(found)
     return Inspection(str(robot), found, tuple(dict.fromkeys(findings)), refused is None)
 
+
+def _in_space(path: Path, how: LoadOptions) -> SpatialRobot | None:
+    """Robot of three dimensions out of a file, None of one whose trunk does not move freely.
+
+    Such a one is a robot of the plane, of which a joint has slipped out of it.
+    """
+    try:
+        robot: Robot | SpatialRobot = load_robot(path, **how)
+    except RobotError:
+        return None
+    return robot if isinstance(robot, SpatialRobot) and robot.floating else None
+
+
+IN_SPACE = "They are taken as they are."
+IN_PLANE_ONLY = "In the plane only the moment about its normal acts, which is taken as it is."
 
 TOLD = (DIFFERENT, UNLIKELY, NO_MOTORS, NO_CONTACTS)
 """Remarks of the reader that inspection makes by itself."""
@@ -150,7 +181,7 @@ def _file(robot: str | os.PathLike[str]) -> Path | None:
     return path if is_file(path) else None
 
 
-def _of_inertias(path: Path, how: LoadOptions) -> Iterator[Finding]:
+def _of_inertias(path: Path, how: LoadOptions, *, whole: bool) -> Iterator[Finding]:
     """Inertias that the file states in three dimensions and no body can have; masses of zero."""
     for name, mass, tensor in read_bodies(path, Options(**how)):
         if not mass >= MASSLESS:
@@ -162,8 +193,8 @@ def _of_inertias(path: Path, how: LoadOptions) -> Iterator[Finding]:
             yield Finding(
                 FindingKind.INERTIA,
                 f"body {name!r} has the principal moments {given} kg m². No body has: none is "
-                "negative, and the sum of two is at least the third. In the plane only the moment "
-                "about its normal acts, which is taken as it is.",
+                "negative, and the sum of two is at least the third. "
+                + (IN_SPACE if whole else IN_PLANE_ONLY),
             )
 
 
@@ -262,6 +293,14 @@ def _ranges(robot: Robot) -> Iterator[Finding]:
 # In words
 
 
+def _words(robot: Robot | SpatialRobot) -> str:
+    if isinstance(robot, Robot):
+        return _description(robot)
+    from heelstrike.robot.spatial.inspection import spatial_description
+
+    return spatial_description(robot)
+
+
 def _description(robot: Robot) -> str:
     points = _bottoms(robot)
     lines = [
@@ -335,7 +374,7 @@ def _of_locked(robot: Robot) -> list[str]:
     for one in robot.locked:
         axis = ", ".join(f"{value:.3g}" for value in one.axis) if any(one.axis) else ""
         rows.append((one.name, one.link, one.kind, axis, f"{one.position:.4g}", one.reason))
-    return _aligned(rows)
+    return aligned(rows)
 
 
 def _foot_words(foot: Foot, points: Floats) -> str:
@@ -349,11 +388,12 @@ def _table(robot: Robot) -> list[str]:
         ("", "", "", "", "kg m²", "x, z", "rad, m", "N m, N", ""),
     ]
     rows: list[tuple[str, ...]] = [*headings]
-    rows += [_row(robot, joint, indent) for joint, indent in _tree(robot)]
-    return _aligned(rows)
+    rows += [_row(robot, joint, indent) for joint, indent in tree(robot.model.parent)]
+    return aligned(rows)
 
 
-def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
+def aligned(rows: list[tuple[str, ...]]) -> list[str]:
+    """Lines of a table, its columns as wide as they need be."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return [
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
@@ -361,10 +401,10 @@ def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
     ]
 
 
-def _tree(robot: Robot) -> Iterator[tuple[int, str]]:
+def tree(parents: Integers) -> Iterator[tuple[int, str]]:
     """Joints in the order of the tree, each with the lines that lead to it."""
     children: dict[int, list[int]] = {}
-    for joint, parent in enumerate(robot.model.parent.tolist()):
+    for joint, parent in enumerate(parents.tolist()):
         children.setdefault(parent, []).append(joint)
     # A stack, since a chain may be longer than Python recurses.
     stack = [(joint, "", "") for joint in reversed(children.get(-1, []))]
@@ -406,13 +446,14 @@ def _row(robot: Robot, joint: int, indent: str) -> tuple[str, ...]:
         f"{mass:.5g}" if mass else "",
         f"{model.inertia[joint]:.4g}" if mass else "",
         f"{center[0]:.4g}, {center[1]:.4g}" if mass else "",
-        _span(model.lower[joint], model.upper[joint]),
-        _span(model.torque_lower[driven[0]], model.torque_upper[driven[0]]) if len(driven) else "",
+        span(model.lower[joint], model.upper[joint]),
+        span(model.torque_lower[driven[0]], model.torque_upper[driven[0]]) if len(driven) else "",
         ", ".join(extra),
     )
 
 
-def _span(low: float, high: float) -> str:
+def span(low: float, high: float) -> str:
+    """Write a range."""
     if np.isinf(low) and np.isinf(high):
         return "free"
     if low == -high:
@@ -432,6 +473,10 @@ def facts(inspection: Inspection) -> dict[str, Any]:
     }
     if robot is None:
         return result
+    if isinstance(robot, SpatialRobot):
+        from heelstrike.robot.spatial.inspection import spatial_facts
+
+        return result | spatial_facts(robot)
     model = robot.model
 
     of_joints = {

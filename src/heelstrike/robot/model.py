@@ -75,7 +75,7 @@ _LATER: dict[str, Any] = {"default": 0, "later": True}
 class Model(Bundle):
     """A planar kinematic tree with inertia, contact points and actuators.
 
-    Every link hangs on its parent by one joint of one degree of freedom, so that link ``i`` and
+    Every link is attached to its parent by one joint of one degree of freedom. So link ``i`` and
     coordinate ``i`` belong together; a body with several joints becomes a chain of links of which
     all but the last are massless. All link frames are parallel to the world frame when ``q``
     equals `reference`; vectors are (x, z) pairs in link axes, lengths in metres.

@@ -78,7 +78,7 @@ TOLD = 2
 
 
 class Scene(NamedTuple):
-    """What a motion hangs on and no method changes: who decides the torques, robot and ground.
+    """What a motion depends on and no method changes: who decides the torques, robot and ground.
 
     Attributes
     ----------

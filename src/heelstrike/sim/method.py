@@ -274,7 +274,7 @@ class Method(ABC):
         return int(min(duration / (self.row_period[1] * record_every), 2.0**62)) + 2
 
     def reconsider(self, work: Any) -> None:  # noqa: B027 - most methods decide at every step
-        """Look anew at what was decided, for it has been changed from outside; nothing by default.
+        """Look again at what was decided, for it has been changed from outside; nothing by default.
 
         Parameters
         ----------

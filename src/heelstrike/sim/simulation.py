@@ -75,6 +75,8 @@ _OUTCOMES = tuple(Outcome)
 _USUAL = TimeStepping()
 _CLOCK = Mold(Clock())
 
+AnyRobot = Robot | SpatialRobot
+
 CAN_GO_ON = (RunStatus.COMPLETED, RunStatus.INTERRUPTED)
 
 
@@ -341,7 +343,7 @@ class Simulation:
         self._has_warned = self._has_warned or has_warned(self.method, setting)
 
     def _reconsider(self) -> None:
-        """Decide this instant anew, even if it had been: what it hangs on has been changed."""
+        """Decide this instant again, even if it had been: what it depends on has been changed."""
         self._clock.moving = 0
         self.method.reconsider(self._work)
 
@@ -379,7 +381,7 @@ class Simulation:
 
     @property
     def controller(self) -> Controller | None:
-        """What decides the torques; one that is set begins anew."""
+        """What decides the torques; one that is set starts again."""
         return self._controller
 
     @controller.setter
@@ -797,7 +799,7 @@ class Simulation:
             memory.damping[driven] += model.stall_torque[driven] / model.no_load_speed[driven]
 
     def snapshot(self) -> Snapshot:
-        """Return everything that the further course hangs on.
+        """Return everything that the further course depends on.
 
         Raises
         ------
@@ -812,7 +814,7 @@ class Simulation:
         return Snapshot.pictured(beside, dict(self._identity), taken)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Be again as a simulation was; the record begins anew.
+        """Be again as a simulation was; the record starts again.
 
         Parameters
         ----------
@@ -839,7 +841,7 @@ class Simulation:
         self.error = None
 
     def forget(self) -> None:
-        """Forget what was: the record begins anew, and pushes that are over are gone from it.
+        """Forget what was: the record starts again, and pushes that are over are gone from it.
 
         How it goes on does not change. For simulations without an end, whose record is looked at
         piece by piece.
@@ -998,7 +1000,7 @@ def simulate(
 
 @takes(SimulationError)
 def simulate(
-    robot: Robot | SpatialRobot,
+    robot: AnyRobot,
     controller: Controller | None = None,
     *,
     duration: float,
@@ -1009,7 +1011,7 @@ def simulate(
 
     Parameters
     ----------
-    robot : Robot
+    robot : Robot or SpatialRobot
         The robot.
     controller : object with ``torque(t, state, contacts)``, or None
         Decides the joint torques; None applies none.

@@ -25,7 +25,7 @@ _FORMAT = 6
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """Everything that the further course of a simulation hangs on.
+    """Everything that the further course of a simulation depends on.
 
     Made by :meth:`heelstrike.Simulation.snapshot`, taken up by
     :meth:`heelstrike.Simulation.restore` or as the `state` of a new simulation.

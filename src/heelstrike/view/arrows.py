@@ -21,7 +21,7 @@ LONGEST_ARROW = 1.3
 
 
 class Arrows:
-    """Arrows on axes, drawn anew for every set of forces.
+    """Arrows on axes, drawn again for every set of forces.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """The picture of a run at one instant, redrawn frame by frame on a single canvas.
 
-Only what moves is drawn anew: the canvas is wiped with a copy of its background, and a handful of
+Only what moves is drawn again: the canvas is wiped with a copy of its background, and a handful of
 artists whose data change are drawn over it.
 """
 

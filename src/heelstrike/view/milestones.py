@@ -1,6 +1,6 @@
 """Numbers of metres along the ground of a film.
 
-Each number is drawn once and kept as a picture: matplotlib lays a text out anew in every frame,
+Each number is drawn once and kept as a picture: matplotlib lays a text out again in every frame,
 which takes as long as all else that moves.
 """
 

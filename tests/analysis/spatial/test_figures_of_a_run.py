@@ -10,12 +10,9 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
-from heelstrike.analysis.spatial import (
-    capture_point_in_space,
-    motion_in_space,
-    pressure_in_space,
-    summarize_in_space,
-)
+from heelstrike.analysis.spatial import summarize_in_space
+from heelstrike.analysis.spatial.links import link_motion
+from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 
 G = 9.81
 BLOCK = """<mujoco model="block"><worldbody><body name="block" pos="0 0 0.05"><freejoint/>
@@ -56,12 +53,12 @@ def test_the_figures_of_a_slide(slide: hs.sim.spatial.SpatialRun) -> None:
 
 def test_the_zero_moment_point_of_a_slide(slide: hs.sim.spatial.SpatialRun) -> None:
     """Friction at the ground and inertia above it: it lies μ h ahead of the centre of mass."""
-    found = pressure_in_space(slide)
+    found = spatial_zero_moment_point(slide)
     row = 50
-    center = motion_in_space(slide, np.array([row])).center_of_mass[0]
-    ahead = found.point[row] - center
+    center = link_motion(slide, np.array([row])).center_of_mass[0]
+    ahead = found.total[row] - center
     np.testing.assert_allclose(ahead[:2], 0.3 * 0.05 * np.array([0.8, 0.6]), atol=1e-5)
-    assert found.point[row, 2] == pytest.approx(0.0, abs=1e-9)
+    assert found.total[row, 2] == pytest.approx(0.0, abs=1e-9)
     corners = found.polygon[row] - [*center[:2], 0.0]
     assert len(corners) == 4
     np.testing.assert_allclose(np.abs(corners), np.tile([0.1, 0.075, 0.0], (4, 1)), atol=1e-9)
@@ -73,7 +70,7 @@ def test_the_zero_moment_point_of_a_slide(slide: hs.sim.spatial.SpatialRun) -> N
 
 def test_no_moment_about_the_zero_moment_point(slide: hs.sim.spatial.SpatialRun) -> None:
     row = 20
-    point = pressure_in_space(slide, np.array([row])).point[0]
+    point = spatial_zero_moment_point(slide, np.array([row])).total[0]
     arm = slide.contact_point[row] - slide.gap[row][:, None] * slide.contact_normal[row] - point
     moment = np.cross(arm, slide.world_force[row]).sum(axis=0)
     np.testing.assert_allclose(moment[:2], 0.0, atol=1e-12)
@@ -81,29 +78,11 @@ def test_no_moment_about_the_zero_moment_point(slide: hs.sim.spatial.SpatialRun)
 
 def test_nothing_pushes(slide: hs.sim.spatial.SpatialRun) -> None:
     high = replace(slide, gap=slide.gap + 1.0, contact_force=np.zeros_like(slide.contact_force))
-    found = pressure_in_space(high)
-    assert np.isnan(found.point).all()
+    found = spatial_zero_moment_point(high)
+    assert np.isnan(found.total).all()
     assert np.isnan(found.margin).all()
     assert all(len(corners) == 0 for corners in found.polygon)
     assert np.isnan(summarize_in_space(high).friction_use_max)
-
-
-def test_outside_is_negative() -> None:
-    from heelstrike.analysis.spatial.support import inside
-
-    square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
-    assert inside(np.array([0.5, 1.0]), square) == pytest.approx(0.5)
-    assert inside(np.array([-3.0, 1.0]), square) == pytest.approx(-3.0)
-    assert inside(np.array([5.0, 6.0]), square) == pytest.approx(-5.0)
-    assert inside(np.array([1.0, 1.0]), square[:2]) == pytest.approx(-1.0)
-    assert inside(np.array([3.0, 4.0]), square[:1]) == pytest.approx(-5.0)
-
-
-def test_the_capture_point_of_a_pendulum(slide: hs.sim.spatial.SpatialRun) -> None:
-    center, velocity = np.array([[1.0, 2.0, 0.981]]), np.array([[0.5, -1.0, 3.0]])
-    found = capture_point_in_space(slide, center, velocity)
-    delay = np.sqrt(0.981 / G)
-    np.testing.assert_allclose(found, [[1.0 + 0.5 * delay, 2.0 - delay, 0.0]])
 
 
 def test_a_turn_is_counted_whole(slide: hs.sim.spatial.SpatialRun) -> None:

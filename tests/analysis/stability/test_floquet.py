@@ -195,7 +195,7 @@ def test_what_cannot_be_measured() -> None:
 
 
 def test_numbers_on_which_nothing_hangs() -> None:
-    """The last is written anew from the second; the third only from itself, and matters."""
+    """The last is written again from the second; the third only from itself, and matters."""
     matrix = np.array(
         [[0.5, 0.1, 0.0, 0.0], [0.0, 0.2, 0.0, 0.0], [0.0, 0.0, 0.7, 0.0], [0.0, 9.0, 0.0, 0.0]]
     )

@@ -17,6 +17,8 @@ from heelstrike.control.gait_lqr.flat import FlatOrbit, _sampled
 from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.held import HeldRobot
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 Floats = NDArray[np.float64]
 
 
@@ -84,7 +86,7 @@ def test_linear_equations_are_those_of_the_robot_on_its_foot(place: int) -> None
 
 @pytest.mark.parametrize("first", [0, -1])
 def test_a_touchdown_is_that_of_heel_and_toe_one_after_the_other(first: int) -> None:
-    """Each when it is down, to first order; the clock begins anew with the first."""
+    """Each when it is down, to first order; the clock starts again with the first."""
     stance, robot = orbit().stance, walking.bravo7()
     points, mirror = list(stance.swing.contacts), robot.mirror
     one, other = (points[0], points[-1]) if first == 0 else (points[-1], points[0])

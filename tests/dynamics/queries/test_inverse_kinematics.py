@@ -59,7 +59,7 @@ def test_out_of_reach_gives_the_nearest_pose_and_what_is_missing() -> None:
     ankle = dynamics.link_poses(robot, found.q).origin[robot.feet[0].link]
     length = np.linalg.norm(robot.model.offset[[4, 5]], axis=1).sum()
     assert not found.reached
-    # The ankle hangs on a straight leg below the hip: thigh and shank are missing of five metres.
+    # The ankle depends on a straight leg below the hip: thigh and shank are missing of five metres.
     assert found.residual == pytest.approx(5.0 - length, abs=1e-9)
     np.testing.assert_allclose(ankle, [hip[0], hip[1] - length], atol=1e-4)
 

@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 from spatial_cases import FREE, NAMED, RANDOM, SpatialCase
 
+from heelstrike import dynamics
 from heelstrike.dynamics import spatial
+from heelstrike.errors import RobotError
 from heelstrike.robot import SpatialRobot
 
 TOLERANCE = 1e-11
@@ -158,3 +160,19 @@ def test_gravity_and_coriolis_forces_make_the_bias_force(case: SpatialCase) -> N
         bias = spatial.bias_force(robot, q, v)
         parts = spatial.gravity_force(robot, q) + spatial.coriolis_force(robot, q, v)
         assert np.abs(bias - parts).max() <= TOLERANCE * (1.0 + np.abs(bias).max())
+
+
+def test_the_same_questions_are_asked_of_the_plane_and_of_space() -> None:
+    """Those of `heelstrike.dynamics` are handed on; what space does not know yet is refused."""
+    robot = NAMED[0].robot()
+    q, v = next(NAMED[0].states(1))
+    np.testing.assert_array_equal(dynamics.mass_matrix(robot, q), spatial.mass_matrix(robot, q))
+    np.testing.assert_array_equal(dynamics.momentum(robot, q, v), spatial.momentum(robot, q, v))
+    found = dynamics.point_position(robot, q, local=(0.0, 0.1, 0.0), link="right_foot")
+    np.testing.assert_array_equal(
+        found, spatial.point_position(robot, q, "right_foot", (0.0, 0.1, 0.0))
+    )
+    with pytest.raises(RobotError, match="loop_jacobian is asked of robots of the plane"):
+        dynamics.loop_jacobian(robot, q)
+    with pytest.raises(RobotError, match="must have 9 entries"):
+        dynamics.bias_force(robot, q, v[:4])

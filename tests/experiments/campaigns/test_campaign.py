@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -22,10 +23,10 @@ import pytest
 from scipy import stats
 
 import heelstrike as hs
-from heelstrike.experiments.campaigns import Draw, Outcome
+from heelstrike.experiments.campaigns import Draw, Outcome, Share
 from heelstrike.experiments.campaigns import campaign as module
 from heelstrike.experiments.campaigns import trials as trials_module
-from heelstrike.experiments.campaigns.store import DATABASE, Store
+from heelstrike.experiments.campaigns.store import COLUMNS, DATABASE, Store
 from heelstrike.experiments.campaigns.trials import run_block
 from heelstrike.experiments.campaigns.workers import process_pool
 
@@ -146,6 +147,33 @@ def test_a_trial_that_takes_too_long_is_given_up() -> None:
     assert fine.status == (hs.RunStatus.COMPLETED,)
 
 
+def test_a_controller_in_python_is_given_up_as_well() -> None:
+    class Slow:
+        def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+            return np.zeros(6)
+
+    trial = replace(cases.limp(9.0), controller=Slow())
+    (outcome,) = hs.Campaign(trial, {"ground.friction": 0.5}, 1).run(limit=1e-9).outcomes
+    assert outcome.given_up
+    assert "took more than 1e-09 s of the processor: interrupted at t = " in outcome.message
+
+
+def test_a_trial_that_was_given_up_is_tried_again(tmp_path: Path) -> None:
+    campaign = hs.Campaign(cases.limp(9.0), FRICTION, 3)
+    assert all(each.given_up for each in campaign.run(tmp_path, limit=1e-9).outcomes)
+    assert as_text(campaign.run(tmp_path)) == as_text(campaign.run())
+    assert as_text(campaign.load(tmp_path)) == as_text(campaign.run())
+
+
+def test_a_misspelt_name_of_a_rare_share_is_refused_before_anything_runs() -> None:
+    rare = [
+        Share(1e3, FRICTION),
+        Share(1.0, {"state.v.rot_x": stats.norm(0.0, 0.1)}),
+    ]
+    with pytest.raises(hs.HeelstrikeError, match="rot_x"):
+        hs.Campaign(cases.limp(), rare, 2000, 3)
+
+
 def counted(monkeypatch: pytest.MonkeyPatch, most: int = 10**9) -> list[int]:
     """Note the trials that are simulated; end the process, as it were, after some blocks."""
     seen: list[int] = []
@@ -264,6 +292,27 @@ def test_a_damaged_folder_is_refused(tmp_path: Path) -> None:
     blocked.write_text("")
     with pytest.raises(hs.WriteError, match="cannot write"):
         made(3).run(blocked)
+
+
+def test_a_folder_is_read_whose_writer_was_killed_within_a_block(tmp_path: Path) -> None:
+    """What lies there then is a half-written database and a journal that undoes the half."""
+    there, copy = tmp_path / "there", tmp_path / "copy"
+    copy.mkdir()
+    results = made(5).run(there)
+    database = sqlite3.connect(there / DATABASE)
+    database.execute("PRAGMA cache_size = 1")
+    names = ", ".join(f'"{name}"' for name in COLUMNS[1:])
+    for number in range(2000):
+        database.execute(
+            "INSERT INTO trials SELECT randomblob(16), number + 5, status, "
+            f"{names} FROM trials WHERE number = {number % 5} LIMIT 1"
+        )
+    for file in there.iterdir():
+        if file.name.startswith(DATABASE):
+            shutil.copy(file, copy)
+    database.close()
+    assert (copy / f"{DATABASE}-journal").stat().st_size > 0
+    assert as_text(made(5).load(copy)) == as_text(results)
 
 
 class Deadly:

@@ -94,6 +94,8 @@ def test_several_walks_and_a_gait(tmp_path: Path) -> None:
         ('controller = "JointFeedback"\n[parameters]\n"ground.friction" = { a = 1, b = 2 }',
          "one distribution by its name"),
         ('controller = "JointFeedback"\n[[shares]]\nwieght = 1', "Did you mean 'weight'"),
+        ('controller = "JointFeedback"\n[parameters]\nground.friction = 0.5',
+         'in quotes, as in "ground.friction" = 1.0'),
         ("walks = 3", "walks are tables"),
     ],
 )  # fmt: skip

@@ -19,7 +19,12 @@ from heelstrike.experiments.campaigns.verdict import influences, sobol_orders
 
 
 def results_of(
-    parameters: Any, good: Any, *, trials: int, draw: Draw = Draw.RANDOM, seed: int = 1
+    parameters: Any,
+    good: Any,
+    *,
+    trials: int | None = None,
+    draw: Draw = Draw.RANDOM,
+    seed: int = 1,
 ) -> hs.CampaignResults:
     """Return the results of a campaign whose outcomes are known: `good` takes the values."""
     plan = planned(parameters, draw, trials, seed)
@@ -88,6 +93,14 @@ def test_what_the_outcome_hangs_on() -> None:
     failed = np.flatnonzero(~results.success)
     assert told.worst == tuple(failed[:10].tolist())
     assert str(told).startswith(f"walked on: {300 - len(failed)} of 300")
+
+
+def test_trials_that_were_chosen_have_no_interval() -> None:
+    grid = results_of({"b": [0.1, 0.5, 0.9]}, lambda values: values[:, 0] < 0.8, draw=Draw.GRID)
+    told = str(verdict(grid))
+    assert "walked on: 2 of 3, 66.7 %\n  slipped: 1 of 3, 33.3 %" in told
+    drawn = results_of({"b": stats.uniform()}, lambda values: values[:, 0] < 0.8, trials=20)
+    assert "% (" in str(verdict(drawn))
 
 
 def test_a_page_holds_everything_and_asks_for_nothing(tmp_path: Path) -> None:

@@ -18,8 +18,9 @@ from heelstrike.analysis import zero_moment_point
 from heelstrike.cli.main import app
 from heelstrike.errors import GaitError
 from heelstrike.experiments.checking import Check, check_motion
+from heelstrike.experiments.checking import check as check_module
 from heelstrike.experiments.checking.stance import placed
-from heelstrike.gait.motion_files import RecordedMotion
+from heelstrike.gait.recordings.motion import RecordedMotion
 
 STEPS = 3
 
@@ -120,6 +121,20 @@ def test_fifty_rows_a_second_are_enough() -> None:
             for check in (found, own())
         )
         assert one == pytest.approx(other, abs=0.15)
+
+
+def test_walks_with_tolerances_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the motion itself walks and too few of them do, the verdict is no."""
+    wide = {"robot.mass.trunk *": [1.0, 4.0]}
+    monkeypatch.setattr(check_module, "TOLERANCES", wide)
+    found = check_motion(walking.bravo7(), motion(), trials=8)
+    assert found.fall is None
+    assert [each.cause for each in found.findings if each.broken] == ["tolerances"]
+    assert found.headline.startswith("no: tolerances at 0 s: ")
+    monkeypatch.setattr(check_module, "TOLERANCES", {"robot.mass.trunk *": 1.0})
+    found = check_motion(walking.bravo7(), motion(), trials=8)
+    assert found.good
+    assert "8 of 8 walks with tolerances succeed" in str(found)
 
 
 def test_robots_whose_trunk_does_not_follow_are_refused() -> None:

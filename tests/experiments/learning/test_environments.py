@@ -189,7 +189,7 @@ def observed_by(lanes: Any, seed: int = 5) -> list[str]:
 
 
 def test_environments_go_on_in_a_fork_and_in_another_process(tmp_path: Path) -> None:
-    """Threads of the first process are not there in the second; a pickle begins anew."""
+    """Threads of the first process are not there in the second; a pickle starts again."""
     lanes = TaskVectorEnv("Hopper", 2, threads=2)
     expected = observed_by(lanes)
     if hasattr(os, "fork"):

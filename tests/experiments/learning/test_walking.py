@@ -1,4 +1,4 @@
-"""Walk-v0: a motion that is followed, named rewards, what is drawn anew, policies in the loop."""
+"""Walk-v0: a motion that is followed, named rewards, what is drawn again, policies in the loop."""
 
 from __future__ import annotations
 

@@ -11,6 +11,8 @@ import heelstrike as hs
 from heelstrike.gait.phased.family import Postures
 from heelstrike.gait.phased.surface import Surface
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 
 @cache
 def gait() -> hs.PhasedGait:

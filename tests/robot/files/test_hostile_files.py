@@ -1,4 +1,4 @@
-"""Robot files made to hurt: to crash the parser, to run for ever, to fill the memory.
+"""Robot files made to hurt: to crash the parser, to run forever, to fill the memory.
 
 What a file costs is judged by the work it makes, not by time: calls of Python functions are
 counted, and the parser must not have been asked where a file is refused beforehand. The faults are
@@ -210,8 +210,8 @@ REFUSED: dict[str, tuple[Files, str]] = {
     "capitals": ({"robot.xml": "<MUJOCO/>"}, "begins with <MUJOCO>"),
     "bytes": ({"robot.xml": "\x01\x02\x03" * 1000}, "not well-formed XML"),
     "zeros": ({"robot.xml": "\0" * 1000}, "not a text file"),
-    "urdf: hangs on itself": (urdf(2, [(1, 1)]), "'l1' hangs on itself"),
-    "urdf: a circle": (urdf(4, [(0, 1), (2, 3), (3, 2)]), "hangs on itself"),
+    "urdf: is attached to itself": (urdf(2, [(1, 1)]), "'l1' is attached to itself"),
+    "urdf: a circle": (urdf(4, [(0, 1), (2, 3), (3, 2)]), "is attached to itself"),
     "urdf: two parents": (urdf(3, [(0, 2), (1, 2)]), "the second that moves link 'l2'"),
     "urdf: no such link": (urdf(2, [(0, 7)]), "no link of that name"),
     "urdf: long chain": (

@@ -232,7 +232,7 @@ def test_a_misspelt_element_is_named() -> None:
 
 def test_links_in_a_circle() -> None:
     text = sdf().replace("<parent>world</parent>", "<parent>shin</parent>")
-    with pytest.raises(RobotError, match="hangs on itself, through a circle"):
+    with pytest.raises(RobotError, match="is attached to itself, through a circle"):
         read_mjcf(text)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,11 +12,12 @@ from scipy.spatial import ConvexHull
 
 import heelstrike as hs
 from heelstrike.dynamics import spatial
+from heelstrike.errors import RobotError
 from heelstrike.robot import RobotWarning, SpatialRobot
 from heelstrike.robot.shapes.solids import few_corners, hull_corners
 
 
-def with_geoms(geoms: str, folder: Path, assets: str = "") -> SpatialRobot:
+def with_geoms(geoms: str, folder: Path, assets: str = "", **how: Any) -> SpatialRobot:
     path = folder / "robot.xml"
     path.write_text(
         f'<mujoco><compiler angle="radian"/>{assets}<worldbody><geom type="plane" size="9 9 1"/>'
@@ -25,7 +27,7 @@ def with_geoms(geoms: str, folder: Path, assets: str = "") -> SpatialRobot:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RobotWarning)
-        robot = hs.load_robot(path)
+        robot = hs.load_robot(path, **how)
     assert isinstance(robot, SpatialRobot)
     return robot
 
@@ -90,6 +92,21 @@ def test_a_mesh_is_its_hull(tmp_path: Path) -> None:
     )
     signs = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
     assert places(robot) == sorted((signs + np.array([5, 0, 0])).tolist())
+
+
+def test_meshes_of_a_link_share_few_points(tmp_path: Path) -> None:
+    draw = np.random.default_rng(6)
+    points = draw.normal(size=(200, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    vertices = " ".join(map(repr, points.ravel().tolist()))
+    asset = f'<asset><mesh name="round" vertex="{vertices}"/></asset>'
+    two = '<geom type="mesh" mesh="round"/><geom type="mesh" mesh="round" pos="3 0 0"/>'
+    assert with_geoms(two, tmp_path, asset).nc == 32
+    assert with_geoms(two, tmp_path, asset, mesh_points=12).nc == 12
+    with pytest.warns(RobotWarning, match="the 12 corners that stand for the meshes .* by up to"):
+        hs.load_robot(tmp_path / "robot.xml", mesh_points=12)
+    with pytest.raises(RobotError, match="mesh_points is 6 or more, not 5"):
+        hs.load_robot(tmp_path / "robot.xml", mesh_points=5)
 
 
 def test_what_has_no_points_is_told(tmp_path: Path) -> None:

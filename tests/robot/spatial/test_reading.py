@@ -207,6 +207,32 @@ def test_next_to_no_inertia_stays_so(tmp_path: Path, dimension: int) -> None:
     assert dynamics.mass_matrix(robot, [0.3])[0, 0] == pytest.approx(2.0, rel=1e-12)
 
 
+def test_joints_of_a_urdf_that_move_no_mass_are_fixed(tmp_path: Path) -> None:
+    """A rod without inertia about its own axis, and fingers without mass, as URDF files have."""
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="{}"/></inertial>'
+
+    def joint(name: str, parent: str, child: str) -> str:
+        return (
+            f'<joint name="{name}" type="continuous"><parent link="{parent}"/>'
+            f'<child link="{child}"/><axis xyz="0 0 1"/></joint>'
+        )
+
+    urdf = (
+        f'<robot name="r"><link name="a">{inertial.format(1)}</link>'
+        f'<link name="rod">{inertial.format(0)}</link><link name="leg">{inertial.format(2)}</link>'
+        '<link name="finger"/>'
+        + joint("spin", "a", "rod") + joint("hip", "a", "leg") + joint("tip", "leg", "finger")
+        + "</robot>"
+    )  # fmt: skip
+    robot = load(urdf, tmp_path, "urdf", dimension=3)
+    assert robot.joint_names == ("root", "hip")
+    assert robot.total_mass == pytest.approx(3.0)
+    words = said(urdf, tmp_path, "urdf")
+    assert "2 joints move no mass" in words
+    assert "spin, tip" in words
+    assert words.count("moves freely") == 1
+
+
 def test_a_negative_moment_is_refused(tmp_path: Path) -> None:
     text = FREE.replace('diaginertia="0.1 0.2 0.25"', 'fullinertia="0.1 0.2 0.25 0.5 0 0"')
     with pytest.raises(RobotError, match=r"principal moment of inertia -"):

@@ -84,7 +84,7 @@ def test_a_law_brings_its_period() -> None:
 
 
 class Plan(hs.Bundle):
-    """A plan that is made anew every 2 ms."""
+    """A plan that is made again every 2 ms."""
 
     made: float = hs.cell(float)
     goal: float = hs.cell(float)
@@ -99,7 +99,7 @@ class Whether(hs.Bundle):
 
 @hs.controller
 def plans(t, state, robot, parameters: Whether, memory: Plan, torque):
-    """Follow a goal that jumps whenever it is planned anew."""
+    """Follow a goal that jumps whenever it is planned again."""
     if (parameters.patient == 0 or robot.trial == 0) and t >= memory.made + 2e-3:
         memory.made = t
         memory.goal = 0.1 - memory.goal

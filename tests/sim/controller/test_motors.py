@@ -45,12 +45,12 @@ def swing(t: float, parameters: Wave, torque: Any) -> None:
 
 
 def steady(size: float, **options: Any) -> hs.Law:
-    """The same command for ever."""
+    """The same command forever."""
     return swing(Wave(size=np.array([size]), rate=np.zeros(1)), **options)
 
 
 class Held:
-    """The same command for ever, asked for from Python and held."""
+    """The same command forever, asked for from Python and held."""
 
     def __init__(self, command: float, *, commands_voltage: bool = False) -> None:
         self.command, self.commands_voltage = command, commands_voltage

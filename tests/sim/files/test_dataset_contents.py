@@ -63,7 +63,7 @@ CONTENTS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "ground_corner": (
         ("corner", "axis"),
         "m",
-        "corners of the ground; its end segments go on for ever",
+        "corners of the ground; its end segments go on forever",
     ),
     "ground_friction": (
         ("segment",),

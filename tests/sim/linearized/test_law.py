@@ -29,7 +29,7 @@ def test_a_law_that_acts_on_forces_is_refused() -> None:
     robot = walking.bravo7()
     simulation = hs.Simulation(robot, leans(), state=robot.reference_state())
     simulation.advance(0.002)
-    with pytest.raises(hs.SimulationError, match="hang on forces"):
+    with pytest.raises(hs.SimulationError, match="depend on forces"):
         hs.step_derivatives(simulation)
     hs.step_derivatives(simulation, answers=False)
 

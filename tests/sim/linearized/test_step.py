@@ -28,7 +28,7 @@ def test_of_corners_that_land_together_the_second_comes_as_the_first_has_left_it
 
     A small error makes either corner come down first; the block turns about it and comes down with
     the other, sooner than it would have without the impact. At rest only the place has an error,
-    which hangs on when either landed. The derivatives from either side are those of the two orders,
+    which depends on when either landed. Derivatives from either side are those of the two orders,
     and central differences their mean; these have an error of their step at most, as what lies
     between two impacts is of second order, of either sign.
     """

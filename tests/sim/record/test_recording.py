@@ -260,7 +260,7 @@ TWO_HINGES = """
 def test_every_joint_that_friction_holds_is_recorded(
     method: hs.TimeStepping | hs.EventDriven,
 ) -> None:
-    """Two rods at rest, one below the other: each joint bears the moment of what hangs on it."""
+    """Two rods at rest, one below the other: each joint bears the moment of what depends on it."""
     upper, lower = 0.5, 0.3
     run = hs.simulate(
         read_mjcf(TWO_HINGES),

@@ -71,7 +71,7 @@ def test_sliders_and_choices_act(chromium: Any, viewer: Viewer) -> None:
         seen.page.keyboard.press("ArrowLeft")
         wait_until(lambda: session.values["friction"] == 0.74, "less friction")
         assert session.live.simulation.ground.friction == 0.74
-        assert seen.time > 0.0  # it did not begin anew
+        assert seen.time > 0.0  # it did not start again
         seen.page.select_option("#rate", "0.25")
         wait_until(lambda: session.rate == 0.25, "slow motion")
         seen.page.select_option("select[name=step]", "2 ms")

@@ -18,6 +18,8 @@ import heelstrike as hs
 from heelstrike.view.live.stage import Control, Stage, friction_control
 from heelstrike.view.live.viewer import Viewer, view
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 pytest.importorskip("websockets", reason="the live view is not installed: heelstrike[watch]")
 pytest.importorskip("playwright", reason="playwright, which drives the browser, is missing")
 

@@ -109,7 +109,7 @@ def test_the_simulation_goes_on_as_by_itself() -> None:
     assert {event[1] for event in shown._events} == {EventKind.TOUCHDOWN, EventKind.LIFTOFF}
     assert shown.told["light"]["level"] == "good"
     ask(session, "play", on=False)
-    for _ in range(2):  # what is halted is told as it is, and so is what begins anew
+    for _ in range(2):  # what is halted is told as it is, and so is what starts again
         newest = session.history.newest
         assert newest is not None
         assert shown.told["light"]["text"].startswith(f"{newest.solver.solves} contact problems")
@@ -519,7 +519,7 @@ def test_commands_that_wait_are_not_without_bounds() -> None:
     for _ in range(2 * sessions.MOST_COMMANDS):
         session.ask("a", {"do": "seek", "time": 0.0})
     assert session._commands.qsize() == sessions.MOST_COMMANDS
-    session.ask("a", {"do": "release"})  # or it would pull for ever
+    session.ask("a", {"do": "release"})  # or it would pull forever
     assert session._commands.qsize() == sessions.MOST_COMMANDS + 1
 
 

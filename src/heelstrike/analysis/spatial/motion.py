@@ -1,55 +1,69 @@
-"""Where the links of a robot in space and its centre of mass are, row by row."""
+"""Centre of mass, momentum and energy of a robot in space in every row of a run."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from heelstrike.dynamics import spatial
-from heelstrike.field_texts import dataclass
-from heelstrike.robot.model import Floats, Integers
+from heelstrike.compiler.bundle import Bundle, array
+from heelstrike.compiler.compilation import kernel
+from heelstrike.dynamics.spatial.kinematics import forward_kinematics, link_velocities
+from heelstrike.dynamics.spatial.totals import (
+    center_of_mass,
+    kinetic_energy,
+    momentum,
+    potential_energy,
+)
+from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
+from heelstrike.robot.model import Floats
+from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.spatial.run import SpatialRun
 
 
-@dataclass(frozen=True, eq=False)
-class SpatialMotion:
-    """Motion of a robot in space, in world axes, in some rows of a run."""
+class CentroidalMotion(Bundle):
+    """How the mass of a robot in space moves, row by row, in world axes."""
 
-    origin: Floats
-    """(n, nl, 3) Position of every link frame, in m."""
-    rotation: Floats
-    """(n, nl, 3, 3) Rotation of every link: its axes, in the world's, are the columns."""
-    center_of_mass: Floats
-    """(n, 3) Position of the robot's centre of mass, in m."""
-    center_of_mass_velocity: Floats
-    """(n, 3) Its velocity, in m/s."""
+    center_of_mass: Floats = array("nt", 3)
+    """Position of the robot's centre of mass, in m."""
+    momentum: Floats = array("nt", 6)
+    """Momentum along x, y, z in N s, then moment of momentum about the centre of mass in N m s."""
+    kinetic: Floats = array("nt")
+    potential: Floats = array("nt")
+    """kinetic, potential: Energies in J; the kinetic one includes rotors, the potential one joint
+    springs."""
 
 
-def motion_in_space(run: SpatialRun, rows: Integers | None = None) -> SpatialMotion:
-    """Follow the robot of a run through some of its rows.
+@kernel
+def _follow(
+    model: SpatialModel,
+    position: Floats,
+    velocity: Floats,
+    work: SpatialWorkspace,
+    motion: CentroidalMotion,
+) -> None:
+    for row in range(position.shape[0]):
+        forward_kinematics(model, position[row], work)
+        link_velocities(model, velocity[row], work)
+        center_of_mass(model, work, motion.center_of_mass[row])
+        momentum(model, work, motion.momentum[row])
+        kinetic_energy(model, velocity[row], work, motion.kinetic[row : row + 1])
+        potential_energy(model, position[row], work, motion.potential[row : row + 1])
+
+
+def centroidal_motion(run: SpatialRun) -> CentroidalMotion:
+    """Follow centre of mass, momentum and energy of a robot in space through a run.
 
     Parameters
     ----------
     run : SpatialRun
         The run.
-    rows : (n,) int, optional
-        Which rows; all by default.
 
     Returns
     -------
-    SpatialMotion
-        Where links and centre of mass are in each.
+    CentroidalMotion
+        Row by row.
     """
-    robot = run.robot
-    mass = robot.model.mass
-    total = max(robot.total_mass, 1e-300)
-    chosen = range(len(run.time)) if rows is None else rows.tolist()
-    origin = np.zeros((len(chosen), robot.nl, 3))
-    rotation = np.zeros((len(chosen), robot.nl, 3, 3))
-    center = np.zeros((len(chosen), 3))
-    velocity = np.zeros((len(chosen), 3))
-    for i, row in enumerate(chosen):
-        poses = spatial.link_poses(robot, run.position[row])
-        origin[i], rotation[i] = poses.origin, poses.rotation
-        center[i] = mass @ poses.center_of_mass / total
-        velocity[i] = spatial.center_of_mass_velocity(robot, run.position[row], run.velocity[row])
-    return SpatialMotion(origin, rotation, center, velocity)
+    model = run.robot.model
+    q, v = (np.ascontiguousarray(each, np.float64) for each in (run.position, run.velocity))
+    result = CentroidalMotion.allocate(nt=len(q))
+    _follow(model, q, v, SpatialWorkspace.allocate(model.extents), result)
+    return result

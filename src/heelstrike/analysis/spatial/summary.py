@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from heelstrike.analysis.spatial.motion import motion_in_space
-from heelstrike.analysis.spatial.support import pressure_in_space, pushing_in_space
+from heelstrike.analysis.spatial.links import link_motion
+from heelstrike.analysis.spatial.support import pushing_in_space
+from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 from heelstrike.analysis.summary import UNKNOWN, Words, plain
 from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
@@ -141,11 +142,11 @@ def summarize_in_space(run: SpatialRun) -> SpatialSummary:
     count = len(run.time)
     duration = float(run.time[-1] - run.time[0]) if count else 0.0
     ends = np.array([0, count - 1]) if count else np.zeros(0, dtype=np.int64)
-    center = motion_in_space(run, ends).center_of_mass
+    center = link_motion(run, ends).center_of_mass
     moved = center[-1] - center[0] if count else np.zeros(3)
     distance = float(np.hypot(moved[0], moved[1]))
     every = max(1, -(-count // MOST_LOOKED_AT))
-    margin = pressure_in_space(run, np.arange(0, count, every)).margin
+    margin = spatial_zero_moment_point(run, np.arange(0, count, every)).margin
     held = np.diff(run.time)
     power = run.torque[:-1] * _mean_speed(run)
     scale = run.robot.weight * distance

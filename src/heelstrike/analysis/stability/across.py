@@ -127,7 +127,7 @@ def _alike(bases: list[Floats]) -> list[Floats]:
 def _with_consequence(matrices: list[Floats], of_robot: int) -> tuple[list[int], list[int]]:
     """Tell coordinates on which something hangs from those that nothing but they themselves feel.
 
-    The latter's own multipliers are one, of what stays as it is, and zero, of what is written anew.
+    The latter's own multipliers are one, of what stays, and zero, of what is written again.
     """
     kept = list(range(len(matrices[0])))
     while True:

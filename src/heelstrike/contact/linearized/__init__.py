@@ -12,7 +12,7 @@ made, and nothing else:
   e⁺ = (DΔ + (f⁺ − DΔ f⁻) ∇g / (∇g f⁻)) e⁻
   (:func:`~heelstrike.contact.linearized.motion.saltation_matrix`);
 - on a section, which is the event itself whenever that is, the undisturbed walk waits: f⁺ = 0.
-  Every clock that begins anew at an event, a controller's or a step's, makes it a section.
+  Every clock that starts again at an event, a controller's or a step's, makes it a section.
 
 At lift-off and where slip begins forces are continuous, DΔ = 1 and f⁺ = f⁻: the identity. Where a
 point comes to rest g is its sliding velocity, DΔ = 1 and f⁺ ≠ f⁻. Of points that come down in one

@@ -86,7 +86,7 @@ class Chart:
     ----------
     directions : (nq + nv, m) float
         Errors of the state by the coordinates, orthonormal as they count, and near to errors of
-        single numbers of the state: differences of a walk whose map has a kink hang on them.
+        single numbers of the state: differences of a walk whose map has a kink depend on them.
     """
 
     def __init__(self, standing: Standing, origin: Floats, scale: Floats | None = None) -> None:

@@ -145,7 +145,7 @@ def touching_height(ground: Ground, x: float, radius: float) -> float:
         heights.append(float(corner[1] + np.sqrt(radius**2 - (corner[0] - x) ** 2)))
     for k in np.flatnonzero(model.normal[:, 1] > 0.0):
         foot = x - radius * model.normal[k, 0]  # where the disc would touch this segment
-        first, last = k == 0, k == len(left) - 1  # which go on for ever
+        first, last = k == 0, k == len(left) - 1  # which go on forever
         if (first or left[k, 0] <= foot) and (last or foot <= right[k, 0]):
             slope = -model.normal[k, 0] / model.normal[k, 1]
             base = left[k, 1] + slope * (x - left[k, 0])

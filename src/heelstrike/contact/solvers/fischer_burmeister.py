@@ -47,7 +47,7 @@ KINK = 0.3
 """A derivative of the function where it has none: 1 - 1/√2, that of equal arguments."""
 
 OUTWARDS = 20.0
-"""Powers of two in which starting points go outwards, then begin anew."""
+"""Powers of two in which starting points go outwards, then start again."""
 
 DAMPING_FLOOR, WEAKEST, RANGE = 1e-15, -12.0, 10.0
 """Least damping, rounding of a matrix of diagonal one; the powers of ten in which it grows with the

@@ -16,16 +16,15 @@ from heelstrike.contact.spatial.workspace import (
 
 @kernel
 def find_velocities(rows: int, scaled: ScaledBlocks, x: Floats, u: Floats) -> None:
-    """Write ``u = matrix x + offset``."""
+    """Write ``u = matrix x + offset``; the matrix is symmetric."""
     matrix, offset = scaled.matrix, scaled.offset
     for row in range(rows):
-        even, odd = offset[row], 0.0
-        for pair in range(rows // 2):
-            even += matrix[row, 2 * pair] * x[2 * pair]
-            odd += matrix[row, 2 * pair + 1] * x[2 * pair + 1]
-        if rows % 2 == 1:
-            even += matrix[row, rows - 1] * x[rows - 1]
-        u[row] = even + odd
+        u[row] = offset[row]
+    for column in range(rows):
+        own = x[column]
+        if own != 0.0:
+            for row in range(rows):
+                u[row] += matrix[column, row] * own
 
 
 @kernel

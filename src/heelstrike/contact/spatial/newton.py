@@ -156,13 +156,15 @@ def list_unknowns(
 
 @kernel
 def apply_matrix(rows: int, scaled: ScaledBlocks, change: Floats, moved: Floats) -> None:
-    """Write what a change of the impulses does to the velocities."""
+    """Write what a change of the impulses does to the velocities; the matrix is symmetric."""
     matrix = scaled.matrix
     for row in range(rows):
-        total = 0.0
-        for column in range(rows):
-            total += matrix[row, column] * change[column]
-        moved[row] = total
+        moved[row] = 0.0
+    for column in range(rows):
+        own = change[column]
+        if own != 0.0:
+            for row in range(rows):
+                moved[row] += matrix[column, row] * own
 
 
 @kernel
@@ -301,7 +303,7 @@ def iterate_newton(
     ridge : float
         What is added to the diagonal.
     named : bool
-        Whether the modes of the first step are those of the iterate, not named anew.
+        Whether the modes of the first step are those of the iterate, not named again.
     tally, iterate, newton
         Counts, impulses and scratch. The best impulses so far are kept.
     """

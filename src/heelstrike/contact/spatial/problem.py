@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 
 from heelstrike.contact.sets import CONE
@@ -23,10 +25,22 @@ from heelstrike.contact.spatial.modes import (
     SpatialSolver,
     SpatialStatus,
 )
-from heelstrike.contact.spatial.workspace import Floats, block_answer, block_problem
+from heelstrike.contact.spatial.workspace import (
+    BlockAnswer,
+    BlockProblem,
+    BlockWorkspace,
+    Floats,
+    block_answer,
+    block_problem,
+)
 from heelstrike.field_texts import dataclass
 
 COMPONENTS = 3
+
+KEPT_CONTACTS = 16
+"""Problems of up to so many contacts are solved in memory that is kept."""
+
+_kept = threading.local()
 
 
 @dataclass(frozen=True)
@@ -64,18 +78,15 @@ def solve_in_space(
     """
     count = friction.size
     rows = COMPONENTS * count
-    work = block_workspace(count, rows)
+    problem, work, answer = _memory(max(count, 1))
+    problem.count = count
     work.settings.tolerance, work.settings.floor = tolerance, floor
     work.settings.ways = WAYS if fallback else NEWTON + 1
-    problem = block_problem(
-        max(count, 1), max(rows, 1), count=count,
-        first=COMPONENTS * np.arange(max(count, 1) + 1),
-        set=np.full(max(count, 1), CONE),
-    )  # fmt: skip
     problem.friction[:count] = friction
     problem.delassus[:rows, :rows] = delassus
     problem.free[:rows] = free
-    answer = block_answer(max(count, 1), max(rows, 1), mode=np.full(max(count, 1), STICK))
+    answer.mode[:] = STICK
+    answer.impulse[:] = 0.0
     status = SpatialStatus(solve_block_problem(problem, work, answer))
     if status is not SpatialStatus.SOLVED and proof_of_none(delassus, free) is not None:
         status = SpatialStatus.IMPOSSIBLE
@@ -97,3 +108,20 @@ def solve_in_space(
         mode=tuple(SpatialContactMode(int(value)) for value in answer.mode[:count]),
         certificate=certificate,
     )
+
+
+def _memory(count: int) -> tuple[BlockProblem, BlockWorkspace, BlockAnswer]:
+    """Return memory to solve in; that of few contacts is kept, for each thread and number."""
+    if not hasattr(_kept, "memory"):
+        _kept.memory = {}
+    kept: dict[int, tuple[BlockProblem, BlockWorkspace, BlockAnswer]] = _kept.memory
+    if count not in kept:
+        rows = COMPONENTS * count
+        problem = block_problem(
+            count, rows, first=COMPONENTS * np.arange(count + 1), set=np.full(count, CONE)
+        )
+        made = problem, block_workspace(count, rows), block_answer(count, rows)
+        if count > KEPT_CONTACTS:
+            return made
+        kept[count] = made
+    return kept[count]

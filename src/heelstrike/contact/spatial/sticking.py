@@ -30,8 +30,11 @@ nothing; each refinement leaves this over the least eigenvalue that moves anythi
 REFINEMENTS = 6
 """How often the answer is refined."""
 
-REFINED = 1e-15
+REFINED = 1e-14
 """Velocities that are left, of data of size one, below which nothing is to be gained."""
+
+STAGNANT = 0.25
+"""Part of them that a refinement leaves where rounding is all there is."""
 
 ROUNDS_OF_OPENING = 4
 """How often contacts that pull are opened, and open ones that sink closed."""
@@ -100,6 +103,7 @@ def hold(size: int, scaled: ScaledBlocks, newton: NewtonSystem, x: Floats) -> bo
         system[i, i] += FIRM
     if not factorize(size, system):
         return False
+    before = math.inf
     for turn in range(REFINEMENTS):
         left = 0.0
         for i in range(size):
@@ -109,8 +113,9 @@ def hold(size: int, scaled: ScaledBlocks, newton: NewtonSystem, x: Floats) -> bo
                     total += matrix[row[i], row[j]] * x[row[j]]
             right[i] = -total
             left = max(left, abs(total))
-        if left <= REFINED:
+        if left <= REFINED or left > STAGNANT * before:
             break
+        before = left
         solve_factored(size, system, right)
         for i in range(size):
             x[row[i]] += right[i]

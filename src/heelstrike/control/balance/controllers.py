@@ -218,7 +218,7 @@ class FootstepFeedback(WholeBody):
     """Walk, and step where and when balance needs it.
 
     What :class:`WholeBody` does as long as nothing disturbs it. A capture point that the centre of
-    pressure alone does not bring back is answered by another foothold at another time, found anew
+    pressure alone does not bring back is answered by another foothold at another time, found again
     at every call; the gait is then left for a lower body and a higher swing foot, and taken up
     again as the disturbance dies away. A foot that meets the ground early stands at once, one that
     meets it late goes on looking for it, and the slope is estimated from the footholds.
@@ -291,7 +291,7 @@ def feet_to_balance_on(robot: Robot, *, point_feet: bool = False) -> list[Sole]:
         if len(links) != LINKS or any(robot.model.axis[link, 0] == 0.0 for link in links):
             raise ControllerError(
                 f"whole-body control needs legs of hip, knee and ankle; foot "
-                f"{robot.feet[foot.foot].name!r} of robot {robot.name!r} hangs on "
+                f"{robot.feet[foot.foot].name!r} of robot {robot.name!r} is attached to "
                 f"{', '.join(robot.joint_names[link] for link in reversed(links))}"
             )
     return feet

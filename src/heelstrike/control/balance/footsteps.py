@@ -17,7 +17,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance.reference import Reference, value_at
 
 COMMITTED = 0.06
-"""A landing sooner than this, in durations of a step, is not planned anew."""
+"""A landing sooner than this, in durations of a step, is not planned again."""
 
 TIMES = 25
 """Remaining times that a plan is chosen from, besides the gait's own."""

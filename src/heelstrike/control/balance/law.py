@@ -112,7 +112,7 @@ def begin_at_touchdown(
 def learn_slope(parameters: Parameters, memory: Memory) -> None:
     """Estimate the slope, from the foot that stands and the one that stood before it.
 
-    Both lie on the ground. Where a foot is as it touches hangs on how it is moved, and that on
+    Both lie on the ground. Where a foot is as it touches depends on how it is moved, and that on
     the slope that is believed: an error of the estimate would confirm itself.
     """
     length = memory.sole[0] - memory.rear[0]
@@ -224,7 +224,7 @@ def decide(t: float, landed: bool, tilt: float, parameters: Parameters, memory: 
         alarm = max(alarm, min(abs(tilt + atan(memory.slope)) / BUMP - 1.0, 1.0))
         amiss = sqrt(plan.cost)
         if plan.remaining < COMMITTED * reference.duration:
-            # A foot that is as good as down cannot be placed anew: the next one will be off by
+            # A foot that is as good as down cannot be placed again: the next one will be off by
             # what this one misses, not by what missing it costs.
             amiss /= sqrt(max(parameters.planning.capture_weight, 1.0))
         span = parameters.alarmed - parameters.calm

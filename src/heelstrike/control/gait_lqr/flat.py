@@ -6,7 +6,7 @@ its motor: of joints' errors e = (δq, δq̇) at a time s since the last touchdo
     ė = A(s) e + B(s) δτ,    e⁺ = J e⁻.
 
 Heel and toe meet the ground together on the gait. A disturbed foot's come down one after the other,
-and the clock begins anew at the first, which is a section therefore: the robot goes on to there,
+and the clock starts again at the first, which is a section therefore: the robot goes on to there,
 suffers a plastic impact of one point, turns about it until the other is down, and suffers another,
 with a saltation matrix of its own. Their product is J, one for either order; the regulator is for
 their mean.
@@ -138,7 +138,7 @@ class FlatOrbit:
         return np.asarray(np.linalg.solve(still.B[speeds], wanted - still.rate[speeds]))
 
     def regulator(self, cost: Floats, effort: Floats, count: int | None = None) -> Floats:
-        """Gains (intervals, nu, 2 nu) of the least cost for ever.
+        """Gains (intervals, nu, 2 nu) of the least cost forever.
 
         Those of torques that follow at once, in the middles of `FINE` even intervals; or, of
         `count` intervals over each of which torques are held, at their beginnings.

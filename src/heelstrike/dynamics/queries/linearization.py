@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,9 +14,12 @@ from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 
 if TYPE_CHECKING:
     import casadi
+
+    from heelstrike.dynamics.spatial.queries.linearization import SpatialLinearization
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +41,7 @@ class Linearization:
     """(k, 2, nu) Its derivative with respect to the joint torques."""
 
 
+@overload
 def linearize(
     robot: Robot,
     q: ArrayLike,
@@ -45,7 +49,28 @@ def linearize(
     torque: ArrayLike,
     *,
     contacts: Iterable[int | str] = (),
-) -> Linearization:
+) -> Linearization: ...
+
+
+@overload
+def linearize(
+    robot: SpatialRobot,
+    q: ArrayLike,
+    v: ArrayLike,
+    torque: ArrayLike,
+    *,
+    contacts: Iterable[int | str] = (),
+) -> SpatialLinearization: ...
+
+
+def linearize(
+    robot: Robot | SpatialRobot,
+    q: ArrayLike,
+    v: ArrayLike,
+    torque: ArrayLike,
+    *,
+    contacts: Iterable[int | str] = (),
+) -> Linearization | SpatialLinearization:
     """Linearise the equations of motion about a state, with derivatives exact to rounding.
 
     The derivatives come from the traced kernels (algorithmic differentiation), not from
@@ -53,7 +78,7 @@ def linearize(
 
     Parameters
     ----------
-    robot : Robot
+    robot : Robot or SpatialRobot
         The robot.
     q, v : (nq,) and (nv,) array
         State.
@@ -67,7 +92,7 @@ def linearize(
 
     Returns
     -------
-    Linearization
+    Linearization or SpatialLinearization
         A, B, and the same for the contact forces.
 
     Raises
@@ -75,6 +100,10 @@ def linearize(
     RobotError
         If a vector has the wrong length or there is no such contact point.
     """
+    if isinstance(robot, SpatialRobot):
+        from heelstrike.dynamics.spatial.queries.linearization import linearize_in_space
+
+        return linearize_in_space(robot, q, v, torque, contacts=contacts)
     held = contact_indices(robot, contacts)
     position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
     gamma = joint_vector(robot, "torque", torque)

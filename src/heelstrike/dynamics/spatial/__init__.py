@@ -16,6 +16,7 @@ from heelstrike.dynamics.spatial.queries.equations_of_motion import (
 )
 from heelstrike.dynamics.spatial.queries.equations_of_motion import mass_matrix as mass_matrix
 from heelstrike.dynamics.spatial.queries.equations_of_motion import passive_force as passive_force
+from heelstrike.dynamics.spatial.queries.linearization import SpatialLinearization
 from heelstrike.dynamics.spatial.queries.momenta import angular_momentum as angular_momentum
 from heelstrike.dynamics.spatial.queries.momenta import center_of_mass as center_of_mass
 from heelstrike.dynamics.spatial.queries.momenta import (
@@ -32,6 +33,9 @@ from heelstrike.dynamics.spatial.queries.momenta import kinetic_energy as kineti
 from heelstrike.dynamics.spatial.queries.momenta import momentum as momentum
 from heelstrike.dynamics.spatial.queries.momenta import momentum_matrix as momentum_matrix
 from heelstrike.dynamics.spatial.queries.momenta import potential_energy as potential_energy
+from heelstrike.dynamics.spatial.queries.points import (
+    contact_bias_acceleration as contact_bias_acceleration,
+)
 from heelstrike.dynamics.spatial.queries.points import contact_jacobian as contact_jacobian
 from heelstrike.dynamics.spatial.queries.points import contact_positions as contact_positions
 from heelstrike.dynamics.spatial.queries.points import lowest_positions as lowest_positions
@@ -50,4 +54,4 @@ from heelstrike.dynamics.spatial.queries.poses import integrate as integrate
 from heelstrike.dynamics.spatial.queries.poses import link_poses as link_poses
 from heelstrike.dynamics.spatial.queries.poses import link_velocities as link_velocities
 
-__all__ = ["SpatialPoses", "SpatialVelocities"]
+__all__ = ["SpatialLinearization", "SpatialPoses", "SpatialVelocities"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan2, sqrt
+from math import atan2, copysign, sqrt
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.spatial.algebra import Vector
@@ -62,8 +62,6 @@ def turn_between(start: Quaternion, end: Quaternion) -> Vector:
     back = start[0], -start[1], -start[2], -start[3]
     w, x, y, z = quaternion_product(back, end)
     sine = sqrt(x * x + y * y + z * z + NO_TURN)
-    angle = 2.0 * atan2(sine, abs(w))
-    factor = angle / sine
-    if w < 0.0:  # the same orientation, which the other sign reaches by less of a turn
-        factor = -factor
+    # Of the two signs of a quaternion, that which turns less.
+    factor = copysign(2.0 * atan2(sine, abs(w)) / sine, w)
     return x * factor, y * factor, z * factor

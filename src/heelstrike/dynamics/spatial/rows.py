@@ -10,9 +10,19 @@ from __future__ import annotations
 from math import sqrt
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.dynamics.spatial.algebra import Vector, cross, dot, spatial, velocity_at
+from heelstrike.dynamics.spatial.algebra import (
+    Vector,
+    angular,
+    cross,
+    dot,
+    less,
+    spatial,
+    sum_of,
+    times,
+    velocity_at,
+)
 from heelstrike.dynamics.spatial.equations import solve_lower
-from heelstrike.dynamics.spatial.kinematics import place_of, point_position
+from heelstrike.dynamics.spatial.kinematics import place_of, point_bias, point_position
 from heelstrike.dynamics.spatial.rotations import NO_TURN, Matrix, matrix, turned
 from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
 from heelstrike.robot.model import Floats, Integers
@@ -46,6 +56,39 @@ def contact_point(
         center[1] + rim * down[1] - radius * normal[1],
         center[2] + rim * down[2] - radius * normal[2],
     )
+
+
+@kernel
+def contact_bias(
+    model: SpatialModel, work: SpatialWorkspace, contact: int, normal: Vector
+) -> Vector:
+    """Acceleration at v̇ = 0 of gap and sliding velocity of a contact, in world axes.
+
+    It belongs to the point that touches, not to the material there: a sphere that rolls on the
+    ground has none, although its lowest point is drawn towards its centre.
+    """
+    link = model.contact_link[contact]
+    motion = spatial(work.velocity, link)
+    w = angular(motion)
+    arm = less(contact_point(model, work, contact, normal), contact_center(model, work, contact))
+    of_center = point_bias(work, link, contact_center(model, work, contact))
+    turning = angular(spatial(work.bias_acceleration, link))
+    along = model.contact_axis
+    local = along[contact, 0], along[contact, 1], along[contact, 2]
+    axis = turned(matrix(work.rotation, link), local)
+    moved = times(rate_of_lowest(axis, normal, cross(w, axis)), model.contact_rim[contact])
+    return sum_of(of_center, sum_of(cross(turning, arm), cross(w, moved)))
+
+
+@kernel
+def rate_of_lowest(axis: Vector, normal: Vector, rate: Vector) -> Vector:
+    """Rate of :func:`lowest_of_rim` by that of the axis."""
+    part = dot(axis, normal)
+    u = less(times(axis, part), normal)
+    u_rate = sum_of(times(rate, part), times(axis, dot(rate, normal)))
+    inverse = 1.0 / sqrt(dot(u, u) + NO_TURN)
+    down = times(u, inverse)
+    return times(less(u_rate, times(down, dot(down, u_rate))), inverse)
 
 
 @kernel

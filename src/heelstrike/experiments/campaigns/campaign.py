@@ -173,7 +173,7 @@ class Campaign:
             raise SimulationError(f"the duration of trials must be positive, got {duration!r}")
         self.seed, self.draw = seed, draw
         self.plan = planned(parameters, draw, trials, seed)
-        check_parameters(self.trials, list(map(self.plan.of, range(min(len(self), BLOCK)))))
+        check_parameters(self.trials, list(map(self.plan.of, self.plan.first_trials())))
         self._description = dict(description or {})
         self._bases = {
             name: inputs_digest(each, self.duration) for name, each in self.trials.items()
@@ -206,11 +206,12 @@ class Campaign:
         workers : int, optional
             Number of own threads; one a processor by default.
         limit : float, optional
-            Seconds of a processor after which a trial is given up.
+            Seconds of a processor after which a trial is given up; the next call tries it again.
+            A controller in Python is interrupted between two of its calls.
         progress : callable, optional
             Called often with how far it is.
         afresh : bool
-            Begin anew whatever is in the folder.
+            Discard what is in the folder and start again.
 
         Returns
         -------
@@ -236,7 +237,7 @@ class Campaign:
             known: dict[bytes, Outcome] = {}
             if store is not None:
                 store.begin(self.about, self._description, afresh=afresh)
-                known = store.known()
+                known = {key: each for key, each in store.known().items() if not each.given_up}
             wanted = [i for i, digest in enumerate(digests) if digest not in known]
             begin, found = perf_counter(), len(self) - len(wanted)
             show = progress or (lambda _: None)
@@ -436,29 +437,34 @@ def _by_others(executor: Any, blocks: Iterable[Block]) -> Iterator[Done]:
     worker = executor if again is None else again()
     waiting: deque[tuple[Block, Any]] = deque()
     source = iter(blocks)
-    while True:
-        try:
-            for block in source:
-                waiting.append((block, None))
-                waiting[-1] = block, worker.submit(run_block, block)
-                if len(waiting) >= AHEAD:
+    try:
+        while True:
+            try:
+                for block in source:
+                    waiting.append((block, None))
+                    waiting[-1] = block, worker.submit(run_block, block)
+                    if len(waiting) >= AHEAD:
+                        break
+                if not waiting:
                     break
-            if not waiting:
-                break
-            block, future = waiting[0]
-            outcomes = future.result()
-            waiting.popleft()
-            yield block, outcomes
-        except BrokenExecutor:
-            if again is None:
-                raise
-            # One of those that were at work did it: each by itself now.
-            suspects, waiting = [block for block, _ in waiting], deque()
-            for block in suspects:
-                yield block, _alone(again, block)
-            worker = again()
-    if again is not None:
-        worker.shutdown()
+                block, future = waiting[0]
+                outcomes = future.result()
+                waiting.popleft()
+                yield block, outcomes
+            except BrokenExecutor:
+                if again is None:
+                    raise
+                # One of those that were at work did it: each by itself now.
+                suspects, waiting = [block for block, _ in waiting], deque()
+                for block in suspects:
+                    yield block, _alone(again, block)
+                worker = again()
+    finally:
+        for _, future in waiting:
+            if hasattr(future, "cancel"):
+                future.cancel()
+        if again is not None:
+            worker.shutdown()
 
 
 def _alone(make: Callable[[], Any], block: Block) -> list[Outcome]:

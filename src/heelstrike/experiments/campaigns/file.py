@@ -15,6 +15,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.experiments.campaigns.campaign import Campaign
 from heelstrike.experiments.campaigns.parameters import Draw, Share
 from heelstrike.experiments.campaigns.store import about_in, reading, refuse_another
+from heelstrike.experiments.campaigns.targets import GROUPS
 from heelstrike.experiments.laws import check_law, gait_for, law_called
 from heelstrike.gait import Gait, load_gait
 from heelstrike.robot import Robot, builtin_robots
@@ -186,6 +187,13 @@ def _parameters(given: Mapping[str, Any], where: str) -> Mapping[str, Any] | lis
 def _distributions(given: Any, where: str) -> dict[str, Any]:
     if not isinstance(given, dict):
         raise SimulationError(f"{where}: parameters are a table of names")
+    for group in GROUPS:
+        if isinstance(given.get(group), dict):
+            number = next(iter(given[group]), "NUMBER")
+            raise SimulationError(
+                f'{where}: write names of parameters in quotes, as in "{group}.{number}" = 1.0; '
+                "without quotes TOML makes a table of a name with a dot"
+            )
     return {name: _distribution(each, f"{where}, {name!r}") for name, each in given.items()}
 
 

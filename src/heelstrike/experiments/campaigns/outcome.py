@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
 from heelstrike.field_texts import dataclass
+from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.run import Run
 
 if TYPE_CHECKING:
@@ -46,6 +47,11 @@ class Outcome:
     """Deepest penetration of a contact point, in m."""
     residual: float = math.nan
     """Largest relative residual of the contact problems."""
+
+    @property
+    def given_up(self) -> bool:
+        """Whether it was ended before its time because it took too long."""
+        return self.status == RunStatus.INTERRUPTED.value
 
 
 def judged(run: Run, gait: Gait | None) -> Outcome:

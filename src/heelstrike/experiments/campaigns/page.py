@@ -73,7 +73,7 @@ def _influences(found: Verdict) -> Iterator[str]:
         for each in found.influences
     ]  # fmt: skip
     head = ("parameter", "trials", "rank correlation", "by chance", "Sobol index", "with others")
-    yield "<h2>What it hangs on</h2>"
+    yield "<h2>What it depends on</h2>"
     yield grid(head, rows)
 
 

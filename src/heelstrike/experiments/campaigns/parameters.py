@@ -70,6 +70,14 @@ class Plan:
     """(n,) The seed of what is random within each trial."""
     base: int = 0
     """Of a sensitivity design, the n of its matrices; else 0."""
+    random: bool = True
+    """Whether its trials are drawn from distributions, each by itself: shares of them estimate
+    probabilities then. Those of a grid and of a sensitivity design are chosen."""
+
+    def first_trials(self) -> list[int]:
+        """Return for each parameter the first trial in which it differs, if there is one."""
+        differs = np.isfinite(self.values)
+        return sorted({int(rows.argmax()) for rows in differs.T if rows.any()})
 
     def of(self, number: int) -> dict[str, Any]:
         """Return what is other in a trial, by the names of its parameters."""
@@ -117,7 +125,8 @@ def planned(
     else:
         count, base = _count(draw, trials, names, shares)
         values = _drawn(shares, names, texts, _uniform(draw, count, base, seed, len(names)))
-    return Plan(names, values, texts, _own_seeds(seed, len(values)), base)
+    chosen = draw in (Draw.GRID, Draw.SENSITIVITY)
+    return Plan(names, values, texts, _own_seeds(seed, len(values)), base, not chosen)
 
 
 def own_sequence(seed: int, number: int) -> np.random.SeedSequence:

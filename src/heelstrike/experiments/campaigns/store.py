@@ -105,7 +105,7 @@ class Store:
             for digest, number, outcome in zip(digests, numbers, outcomes, strict=True)
         ]
         with self._told(), self._database as connection:
-            connection.executemany(f"INSERT OR IGNORE INTO trials VALUES ({marks})", rows)
+            connection.executemany(f"INSERT OR REPLACE INTO trials VALUES ({marks})", rows)
 
     def close(self) -> None:
         """Let go of the folder."""
@@ -162,11 +162,22 @@ def reading(folder: Path) -> Iterator[sqlite3.Connection]:
     if not (folder / DATABASE).is_file():
         raise SimulationError(f"{folder} has no campaign: there is no {DATABASE} in it")
     with told(folder):
-        connection = sqlite3.connect(f"{(folder / DATABASE).resolve().as_uri()}?mode=ro", uri=True)
+        connection = _readable((folder / DATABASE).resolve().as_uri())
         try:
             yield connection
         finally:
             connection.close()
+
+
+def _readable(address: str) -> sqlite3.Connection:
+    """Open a database whose last writer may have been killed: only who may write can undo that."""
+    connection = sqlite3.connect(f"{address}?mode=rw", uri=True)
+    try:
+        connection.execute("SELECT count(*) FROM about")
+        return connection
+    except sqlite3.OperationalError:  # a folder that cannot be written to
+        connection.close()
+        return sqlite3.connect(f"{address}?mode=ro", uri=True)
 
 
 def about_in(connection: sqlite3.Connection) -> dict[str, str]:
@@ -188,7 +199,7 @@ def refuse_another(connection: sqlite3.Connection, about: Mapping[str, str], fol
         raise SimulationError(
             f"{folder} has another campaign: its {' and '.join(differing)} "
             f"{'was' if len(differing) == 1 else 'were'} other. Ask for the same to go on with it, "
-            "for another folder, or to begin anew (afresh=True)"
+            "for another folder, or to start again (afresh=True)"
         )
 
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import pickle
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from time import thread_time
 from typing import Any
 
 import numpy as np
@@ -89,13 +92,33 @@ def laid_out(trial: Trial, values: Mapping[str, Any], seed: int) -> Laid:
     return laid(trial, {name: each for name, each in values.items() if name != TRIAL}, seed)
 
 
-def replayed(trial: Trial, lane: Laid, duration: float, record_every: int = ROWS) -> Run:
+def replayed(
+    trial: Trial, lane: Laid, duration: float, record_every: int = ROWS,
+    progress: Callable[[float], None] | None = None,
+) -> Run:  # fmt: skip
     """Simulate a trial alone, to the last bit as in its block."""
     return simulate(
         lane.robot, lane.controller, state=lane.state, duration=duration, method=trial.method,
         ground=lane.ground, pushes=lane.pushes, control_period=trial.control_period,
-        on_error=OnError.STOP, record_every=record_every,
+        on_error=OnError.STOP, record_every=record_every, progress=progress,
     )  # fmt: skip
+
+
+def _alone(
+    block: Block, trial: Trial, lane: Laid, stopped: Callable[[], bool] | None
+) -> Outcome:  # fmt: skip
+    """Simulate one trial under a controller in Python, until it has taken too long."""
+    end = math.inf if block.limit is None else thread_time() + block.limit
+
+    def look(_: float) -> None:
+        if thread_time() > end or (stopped is not None and stopped()):
+            raise KeyboardInterrupt  # which ends a run quietly, as that of a person
+
+    found = judged_as_in(trial, replayed(trial, lane, block.duration, progress=look))
+    if found.given_up and thread_time() > end:
+        told = f"took more than {block.limit:g} s of the processor: {found.message}"
+        return replace(found, message=told)
+    return found
 
 
 def _simulated(
@@ -106,7 +129,7 @@ def _simulated(
         found = {}
         for index, lane in lanes:
             try:
-                found[index] = judged_as_in(trial, replayed(trial, lane, block.duration))
+                found[index] = _alone(block, trial, lane, stopped)
             except Exception as error:
                 found[index] = failed(error)
         return found

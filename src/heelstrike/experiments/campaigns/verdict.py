@@ -1,4 +1,4 @@
-"""What a campaign says: how often it went well, what that hangs on, why it failed."""
+"""What a campaign says: how often it went well, what that depends on, why it failed."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Proportion:
     """count, trials: How often, of how many."""
     low: float
     high: float
-    """low, high: Interval of the probability."""
+    """low, high: Interval of the probability; NaN where trials were chosen, not drawn."""
 
     @property
     def share(self) -> float:
@@ -56,15 +56,15 @@ class Proportion:
         return self.count / self.trials if self.trials else math.nan
 
     def __str__(self) -> str:
-        return (
-            f"{self.count} of {self.trials}, {100.0 * self.share:.1f} % "
-            f"({100.0 * self.low:.1f} to {100.0 * self.high:.1f} %)"
-        )
+        told = f"{self.count} of {self.trials}, {100.0 * self.share:.1f} %"
+        if math.isnan(self.low):
+            return told
+        return f"{told} ({100.0 * self.low:.1f} to {100.0 * self.high:.1f} %)"
 
 
 @dataclass(frozen=True)
 class Influence:
-    """What the outcome hangs on a parameter."""
+    """How the outcome depends on a parameter."""
 
     name: str
     """The parameter."""
@@ -73,7 +73,7 @@ class Influence:
     rank: float
     """Spearman's rank correlation of its value with the outcome; NaN of texts and of too few."""
     chance: float
-    """Probability of one as large where nothing hangs on it."""
+    """Probability of one as large where nothing depends on it."""
     first_order: float = math.nan
     total_order: float = math.nan
     """first_order, total_order: Sobol indices: parts of the variance of the outcome that this
@@ -89,7 +89,7 @@ class Verdict:
     causes: tuple[tuple[str, Proportion], ...]
     """First causes of the others, the most frequent first."""
     influences: tuple[Influence, ...]
-    """What the outcome hangs on, the strongest first."""
+    """What the outcome depends on, the strongest first."""
     worst: tuple[int, ...]
     """Trials that failed soonest."""
 
@@ -99,7 +99,7 @@ class Verdict:
         for each in self.influences:
             if math.isfinite(each.total_order):
                 lines.append(
-                    f"hangs on {each.name}: alone {each.first_order:.2f}, with others "
+                    f"depends on {each.name}: alone {each.first_order:.2f}, with others "
                     f"{each.total_order:.2f} of the variance"
                 )
             elif math.isfinite(each.rank) and each.chance < 1.0 - CONFIDENCE:
@@ -158,25 +158,27 @@ def verdict(results: CampaignResults, *, bounds: Bounds = Bounds.WILSON) -> Verd
     Returns
     -------
     Verdict
-        How often it went well, why not, and what that hangs on.
+        How often it went well, why not, and what that depends on. Intervals are of trials that were
+        drawn; those of a grid or a sensitivity design have none.
     """
     good, count = results.success, len(results)
-    causes = [
-        (cause, proportion(each, count, bounds=bounds)) for cause, each in results.causes.items()
-    ]
+
+    def share(some: int) -> Proportion:
+        if results.plan.random:
+            return proportion(some, count, bounds=bounds)
+        return Proportion(some, count, math.nan, math.nan)
+
+    causes = [(cause, share(each)) for cause, each in results.causes.items()]
     time = results.column("time").astype(np.float64)
     soon = np.argsort(np.where(np.isnan(time), -1.0, time), kind="stable")
     worst = [results.numbers[i] for i in soon.tolist() if not good[i]][:SHOWN]
-    return Verdict(
-        proportion(int(good.sum()), count, bounds=bounds), tuple(causes), influences(results),
-        tuple(worst),
-    )  # fmt: skip
+    return Verdict(share(int(good.sum())), tuple(causes), influences(results), tuple(worst))
 
 
 def influences(
     results: CampaignResults, outcome: Callable[[CampaignResults], ArrayLike] | None = None
 ) -> tuple[Influence, ...]:
-    """Say what the outcome hangs on.
+    """Say what the outcome depends on.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ def process_pool(processes: int) -> Callable[[], ProcessPoolExecutor]:
     Parameters
     ----------
     processes : int
-        How many each has. They are begun anew, not copied: threads of this process do no harm.
+        How many each has. They are started again, not copied: threads of this process do no harm.
     """
     context = multiprocessing.get_context("spawn")
     return partial(ProcessPoolExecutor, processes, mp_context=context)

@@ -27,7 +27,7 @@ HARD = 0.3
 
 ORDER = (
     "degrees", "range", "scuff", "speed", "zero moment point", "friction", "torque", "impact",
-    "walk",
+    "walk", "tolerances",
 )  # fmt: skip
 """Causes in the order in which one brings about another."""
 

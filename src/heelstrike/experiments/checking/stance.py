@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from heelstrike.dynamics import contact_positions
 from heelstrike.errors import GaitError
 from heelstrike.field_texts import dataclass
-from heelstrike.gait.motion_files import RecordedMotion
+from heelstrike.gait.recordings.motion import RecordedMotion
 from heelstrike.gait.sole import sole
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot

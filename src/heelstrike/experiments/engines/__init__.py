@@ -4,7 +4,7 @@ Each adapter needs its engine, which ``pip install 'heelstrike[peers]'`` brings;
 there. :func:`peers` says which are, :func:`simulators` loads them.
 """
 
-from heelstrike.experiments.engines.packages import compared, peers, simulators
+from heelstrike.experiments.engines.packages import compared, peers, raced, simulators
 from heelstrike.experiments.engines.peer import (
     Engine,
     InvalidRunError,
@@ -23,5 +23,6 @@ __all__ = [
     "check_flight",
     "compared",
     "peers",
+    "raced",
     "simulators",
 ]

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import pybullet
-from pybullet_utils.bullet_client import BulletClient  # type: ignore[import-not-found,unused-ignore]
+from pybullet_utils.bullet_client import BulletClient
 
+from heelstrike.dynamics import contact_positions
 from heelstrike.experiments.engines.links import Link, links
 from heelstrike.experiments.engines.peer import Engine, Peer
 from heelstrike.experiments.engines.scenario import Scenario
@@ -29,20 +30,30 @@ class BulletPeer(Peer):
     Its controller of springs and dampers (PD_CONTROL) runs in C++, but adds its torques to those of
     the substeps before, so that with it each step is a call. Without it all steps are substeps of
     one call. What changes of the commands over time, Python sets before each step.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    step : float
+        Seconds.
+    **options
+        Of ``setPhysicsEngineParameter``.
     """
 
     settling = 0.2
     lacks = ("armature",)
 
-    def __init__(self, scenario: Scenario, step: float) -> None:
+    def __init__(self, scenario: Scenario, step: float, **options: float) -> None:
         super().__init__(scenario, step)
         self._engine = BulletClient(pybullet.DIRECT)
+        self._options = {"numSolverIterations": ITERATIONS} | options
         self._body = self._build()
         robot = scenario.robot
         self._driven = [int(joint) for joint in robot.model.actuator_joint]
         self._one_call = scenario.feedback is None and not np.any(robot.model.damping)
         self._substeps = 0
         # What changes of the commands is added in every step to what its controllers do.
+        self._torque: list[float] | None = None
         varying = len(self.commands) > 1
         self._torques = (self.commands - self.commands[0]).tolist() if varying else []
 
@@ -50,9 +61,7 @@ class BulletPeer(Peer):
         engine, robot = self._engine, self.scenario.robot
         gravity = robot.model.gravity
         engine.setGravity(gravity[0], 0.0, gravity[1])
-        engine.setPhysicsEngineParameter(
-            fixedTimeStep=self.step, numSubSteps=0, numSolverIterations=ITERATIONS
-        )
+        engine.setPhysicsEngineParameter(fixedTimeStep=self.step, numSubSteps=0, **self._options)
         ground = engine.createMultiBody(0.0, engine.createCollisionShape(pybullet.GEOM_PLANE))
         chain = links(robot, least_radius=RADIUS)
         straight = [[0.0, 0.0, 0.0, 1.0]] * len(chain)
@@ -71,8 +80,8 @@ class BulletPeer(Peer):
             linkJointAxis=[link.axis for link in chain],
             basePosition=[0.0, 0.0, 0.0],
         )
-        # The friction of two bodies is the product of theirs.
-        engine.changeDynamics(ground, -1, lateralFriction=1.0, restitution=0.0)
+        # Friction and restitution of two bodies are the products of theirs.
+        engine.changeDynamics(ground, -1, lateralFriction=1.0, restitution=1.0)
         for i, link in enumerate(chain):
             self._set_dynamics(body, i, link)
             for other in range(i):  # points meet the ground only
@@ -91,7 +100,7 @@ class BulletPeer(Peer):
             lateralFriction=self.scenario.friction,
             spinningFriction=0.0,
             rollingFriction=0.0,
-            restitution=0.0,
+            restitution=self.scenario.restitution,
             linearDamping=0.0,
             angularDamping=0.0,
             jointDamping=link.damping,
@@ -115,6 +124,7 @@ class BulletPeer(Peer):
         """Put the robot somewhere, at time 0."""
         for i in range(len(q)):
             self._engine.resetJointState(self._body, i, q[i], v[i])
+        self._torque = None
         if self.scenario.feedback is not None:
             self._set_law()
 
@@ -142,9 +152,13 @@ class BulletPeer(Peer):
     def simulate(self, steps: int) -> None:
         """Simulate some steps: in one call, or each with its own."""
         step, control = self._engine.stepSimulation, self._engine.setJointMotorControlArray
-        if self._one_call:
+        if self._one_call and self._torque is None:
             self._ask_for(0 if steps == 1 else steps)
             step()
+        elif self._torque is not None:
+            for _ in range(steps):  # it forgets torques after each
+                control(self._body, self._driven, pybullet.TORQUE_CONTROL, forces=self._torque)
+                step()
         elif not self._torques:
             for _ in range(steps):
                 step()
@@ -170,6 +184,28 @@ class BulletPeer(Peer):
         """Force and depth of each contact in the last step."""
         found = self._engine.getContactPoints(bodyA=self._body)
         return [(contact[9], -contact[8]) for contact in found]
+
+    def hold(self, torque: Floats) -> None:
+        """Apply torques from now on."""
+        self._ask_for(0)
+        self._torque = np.asarray(torque).tolist()
+
+    def forces(self) -> Floats:
+        """Forces on the contact points in the last step."""
+        robot = self.scenario.robot
+        found = np.zeros((robot.nc, 2))
+        touching = self._engine.getContactPoints(bodyA=self._body)
+        if not touching:
+            return found
+        q, _ = self.coordinates()
+        places = contact_positions(robot, q + self.zero)
+        for contact in touching:
+            own = np.flatnonzero(robot.model.contact_link == contact[3])
+            near = own[np.argmin(np.abs(places[own, 0] - contact[5][0]))]
+            force = np.multiply(contact[9], contact[7])
+            force += np.multiply(contact[10], contact[11]) + np.multiply(contact[12], contact[13])
+            found[near] += force[2], force[0]
+        return found
 
 
 ENGINE = Engine(

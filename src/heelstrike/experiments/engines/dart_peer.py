@@ -28,14 +28,19 @@ class DartPeer(Peer):
         Seconds.
     detector : str
         Of collisions: ``"DART"``, its own and the quickest, ``"FCL"``, ``"ODE"`` or ``"BULLET"``.
+    split : bool
+        Whether penetrations are taken back apart from velocities.
     """
 
     settling = 0.2
     lacks = ("armature",)
 
-    def __init__(self, scenario: Scenario, step: float, *, detector: str = "DART") -> None:
+    def __init__(
+        self, scenario: Scenario, step: float, *, detector: str = "DART", split: bool = False
+    ) -> None:
         super().__init__(scenario, step)
         self._world, self._robot = _world(scenario, step, detector)
+        self._world.getConstraintSolver().setSplitImpulseEnabled(split)
         model = scenario.robot.model
         self._forces = np.zeros((len(self.commands), scenario.robot.nv))
         self._forces[:, model.actuator_joint] = self.commands
@@ -62,6 +67,23 @@ class DartPeer(Peer):
         """Where it is now."""
         return self._robot.getPositions(), self._robot.getVelocities()
 
+    def hold(self, torque: Floats) -> None:
+        """Apply torques from now on."""
+        self._forces = np.zeros((1, self.scenario.robot.nv))
+        self._forces[0, self.scenario.robot.model.actuator_joint] = torque
+        self._robot.setCommands(self._forces[0])
+
+    def forces(self) -> Floats:
+        """Forces on the contact points in the last step."""
+        found = np.zeros((self.scenario.robot.nc, 2))
+        for contact in self._world.getLastCollisionResult().getContacts():
+            first = contact.collisionObject1.getShapeFrame().getName()
+            second = contact.collisionObject2.getShapeFrame().getName()
+            # It acts on the first of the two.
+            own, sign = (first, 1.0) if first.isdigit() else (second, -1.0)
+            found[int(own)] += sign * contact.force[2], sign * contact.force[0]
+        return found
+
     def contacts(self) -> list[tuple[float, float]]:
         """Force and depth of each contact in the last step."""
         found = self._world.getLastCollisionResult().getContacts()
@@ -78,17 +100,17 @@ def _world(scenario: Scenario, step: float, detector: str) -> tuple[Any, Any]:
     detectors = dartpy.simulation.CollisionDetectorType
     world.setCollisionDetector(getattr(detectors, detector))
     skeleton = _skeleton(scenario)
-    world.addSkeleton(_ground(scenario.friction))
+    world.addSkeleton(_ground(scenario))
     world.addSkeleton(skeleton)
     return world, skeleton
 
 
-def _ground(friction: float) -> Any:
+def _ground(scenario: Scenario) -> Any:
     ground = dartpy.dynamics.Skeleton("ground")
     _, floor = ground.createWeldJointAndBodyNodePair()
     block = floor.createShapeNode(dartpy.dynamics.BoxShape([100.0, 10.0, 1.0]))
     block.setRelativeTranslation([0.0, 0.0, -0.5])
-    _touch(block, friction)
+    _touch(block, scenario.friction, 1.0)  # restitutions are multiplied
     ground.setMobile(False)
     return ground
 
@@ -117,10 +139,11 @@ def _skeleton(scenario: Scenario) -> Any:
             joint.setPositionLowerLimit(0, link.lower)
             joint.setPositionUpperLimit(0, link.upper)
             joint.setLimitEnforcement(True)
-        for center, radius in link.points:
+        for (center, radius), contact in zip(link.points, link.contacts, strict=True):
             shape = body.createShapeNode(dynamics.SphereShape(radius))
+            shape.setName(str(contact))
             shape.setRelativeTranslation(center)
-            _touch(shape, scenario.friction)
+            _touch(shape, scenario.friction, scenario.restitution)
         bodies.append(body)
     if feedback is not None:
         for i, driven in enumerate(model.actuator_joint):
@@ -132,9 +155,11 @@ def _skeleton(scenario: Scenario) -> Any:
     return skeleton
 
 
-def _touch(shape: Any, friction: float) -> None:
+def _touch(shape: Any, friction: float, restitution: float) -> None:
     shape.createCollisionAspect()
-    shape.createDynamicsAspect().setFrictionCoeff(friction)
+    aspect = shape.createDynamicsAspect()
+    aspect.setFrictionCoeff(friction)
+    aspect.setRestitutionCoeff(restitution)
 
 
 ENGINE = Engine(

@@ -41,6 +41,7 @@ class DrakePeer(Peer):
     """
 
     settling = 1.0
+    bounces = False
 
     def __init__(
         self,
@@ -74,10 +75,14 @@ class DrakePeer(Peer):
         logging.getLogger("drake").setLevel(logging.ERROR)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of the deprecated approximation
-            self._simulator, self._plant = _simulator(scenario, self.commands, config, material)
+            self._simulator, self._plant, self._source, self._own = _simulator(
+                scenario, self.commands, config, material
+            )
         self._context = self._plant.GetMyMutableContextFromRoot(
             self._simulator.get_mutable_context()
         )
+        self._forces = np.zeros((scenario.robot.nc, 2))
+        self._watched = False
 
     def place(self, q: Floats, v: Floats) -> None:
         """Put the robot somewhere, at time 0."""
@@ -88,11 +93,42 @@ class DrakePeer(Peer):
 
     def simulate(self, steps: int) -> None:
         """Simulate some steps in one call."""
+        if self._watched:
+            self._forces = self._forces_now()  # which is kept, and costs nothing twice
         self._simulator.AdvanceTo((self.done + steps) * self.step)
 
     def coordinates(self) -> tuple[Floats, Floats]:
         """Where it is now."""
         return self._plant.GetPositions(self._context), self._plant.GetVelocities(self._context)
+
+    def hold(self, torque: Floats) -> None:
+        """Apply torques from now on."""
+        if self._source is not None:
+            context = self._source.GetMyMutableContextFromRoot(
+                self._simulator.get_mutable_context()
+            )
+            self._source.get_mutable_source_value(context).SetFromVector(torque)
+
+    def record(self, steps: int) -> Floats:
+        """Simulate some steps one by one, and tell what happened in each."""
+        self._watched = True
+        return super().record(steps)
+
+    def forces(self) -> Floats:
+        """Forces on the contact points in the last step."""
+        return self._forces
+
+    def _forces_now(self) -> Floats:
+        """Forces on the contact points in the step that follows: Drake tells them beforehand."""
+        found = np.zeros((self.scenario.robot.nc, 2))
+        results = self._plant.get_contact_results_output_port().Eval(self._context)
+        for i in range(results.num_point_pair_contacts()):
+            one = results.point_pair_contact_info(i)
+            pair, force = one.point_pair(), one.contact_force()
+            # It acts on the second of the two.
+            own, sign = (pair.id_B, 1.0) if pair.id_B in self._own else (pair.id_A, -1.0)
+            found[self._own[own]] += sign * force[2], sign * force[0]
+        return found
 
     def contacts(self) -> list[tuple[float, float]]:
         """Force and depth of each contact now."""
@@ -101,12 +137,15 @@ class DrakePeer(Peer):
         return [(abs(float(one.contact_force()[2])), float(one.point_pair().depth)) for one in each]
 
 
-def _simulator(scenario: Scenario, commands: Floats, config: Any, material: Any) -> tuple[Any, Any]:
+def _simulator(
+    scenario: Scenario, commands: Floats, config: Any, material: Any
+) -> tuple[Any, Any, Any, dict[Any, int]]:
+    """Return simulator, plant, source of the commands, and contact points by their geometries."""
     model = scenario.robot.model
     builder = framework.DiagramBuilder()
     plant, scene = plants.AddMultibodyPlant(config, builder)
     plant.mutable_gravity_field().set_gravity_vector([model.gravity[0], 0.0, model.gravity[1]])
-    bodies = _add_robot(plant, scenario, material)
+    bodies, points = _add_robot(plant, scenario, material)
     plant.RegisterCollisionGeometry(
         plant.world_body(), math.RigidTransform(), geometry.HalfSpace(), "ground", material
     )
@@ -116,15 +155,19 @@ def _simulator(scenario: Scenario, commands: Floats, config: Any, material: Any)
         [shape for body in bodies for shape in plant.GetCollisionGeometriesForBody(body)]
     )
     scene.collision_filter_manager().Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(own))
+    source = None
     if scenario.robot.nu:
         source = builder.AddSystem(_commands(scenario, commands))
         port = plant.get_actuation_input_port(tree.default_model_instance())
         builder.Connect(source.get_output_port(), port)
-    return analysis.Simulator(builder.Build()), plant
+    return analysis.Simulator(builder.Build()), plant, source, points
 
 
-def _add_robot(plant: Any, scenario: Scenario, material: Any) -> list[Any]:
-    """Add links, joints, contact points, actuators, springs and dampers; return the bodies."""
+def _add_robot(plant: Any, scenario: Scenario, material: Any) -> tuple[list[Any], dict[Any, int]]:
+    """Add links, joints, contact points, actuators, springs and dampers.
+
+    Return the bodies, and contact points by their geometries.
+    """
     robot, feedback = scenario.robot, scenario.feedback
     model = robot.model
     pose = math.RigidTransform
@@ -133,6 +176,7 @@ def _add_robot(plant: Any, scenario: Scenario, material: Any) -> list[Any]:
         damping[model.actuator_joint] += feedback.parameters.kd
     bodies: list[Any] = []
     joints: list[Any] = []
+    points: dict[Any, int] = {}
     for i, link in enumerate(links(robot)):
         inertia = tree.SpatialInertia.Zero()
         if link.mass or link.inertia:
@@ -155,10 +199,13 @@ def _add_robot(plant: Any, scenario: Scenario, material: Any) -> list[Any]:
         )
         bodies.append(body)
         joints.append(plant.AddJoint(joint))
-        for number, (center, radius) in enumerate(link.points):
-            plant.RegisterCollisionGeometry(
+        for number, ((center, radius), contact) in enumerate(
+            zip(link.points, link.contacts, strict=True)
+        ):
+            shape = plant.RegisterCollisionGeometry(
                 body, pose(center), geometry.Sphere(radius), f"{link.name}_{number}", material
             )
+            points[shape] = contact
     for i, driven in enumerate(model.actuator_joint):
         actuator = plant.AddJointActuator(robot.actuator_names[i], joints[driven])
         actuator.set_default_rotor_inertia(float(model.armature[driven]))
@@ -167,7 +214,7 @@ def _add_robot(plant: Any, scenario: Scenario, material: Any) -> list[Any]:
             spring = tree.RevoluteSpring if model.axis[driven, 0] else tree.PrismaticSpring
             rest = float(-model.reference[driven])
             plant.AddForceElement(spring(joints[driven], rest, float(feedback.parameters.kp[i])))
-    return bodies
+    return bodies, points
 
 
 def _commands(scenario: Scenario, commands: Floats) -> Any:

@@ -15,7 +15,7 @@ from heelstrike.robot.model import Floats
 
 @dataclass(frozen=True)
 class Link:
-    """A link and the joint that it hangs on; vectors are (3,), in link axes."""
+    """A link and the joint that it depends on; vectors are (3,), in link axes."""
 
     name: str
     parent: int
@@ -39,6 +39,8 @@ class Link:
     position of the robot."""
     points: tuple[tuple[Floats, float], ...]
     """Centre (3,) and radius of the contact points."""
+    contacts: tuple[int, ...]
+    """Which contact points of the robot these are."""
 
 
 def links(robot: Robot, *, least_radius: float = 0.0) -> list[Link]:
@@ -89,6 +91,7 @@ def links(robot: Robot, *, least_radius: float = 0.0) -> list[Link]:
             float(model.damping[i]),
             float(model.armature[i]),
             points(i),
+            tuple(np.flatnonzero(model.contact_link == i).tolist()),
         )
         for i in range(robot.nv)
     ]

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
+from heelstrike.dynamics import contact_positions
 from heelstrike.experiments.engines.peer import Engine, InvalidRunError, Peer
 from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.robot import State
@@ -36,6 +37,12 @@ class MuJoCoPeer(Peer):
         it allows, elliptic cones and sharper friction; None for its defaults.
     tolerance : float or None
         Tolerance of its contact solver; None for the default.
+    impratio : float or None
+        How much harder friction is than the normal direction; None for 1, or 10 if `stiff`.
+    elliptic : bool
+        Whether cones are elliptic; they are if `stiff`.
+    noslip : int
+        Iterations of its solver that takes slip away after the others.
     """
 
     settling = 3.0
@@ -48,6 +55,9 @@ class MuJoCoPeer(Peer):
         integrator: str = "euler",
         stiff: float | None = None,
         tolerance: float | None = None,
+        impratio: float | None = None,
+        elliptic: bool = False,
+        noslip: int = 0,
     ) -> None:
         super().__init__(scenario, step)
         spec = _spec(scenario)
@@ -62,9 +72,15 @@ class MuJoCoPeer(Peer):
             for geom in spec.geoms:
                 geom.solref = stiff * step, 1.0
                 geom.solimp = 0.9999, 0.9999, 1e-3, 0.5, 2.0
+        if elliptic:
+            spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        if impratio is not None:
+            spec.option.impratio = impratio
+        spec.option.noslip_iterations = noslip
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.zero = np.zeros(self.model.nq)
+        self._contact_of = _contacts(self.model, scenario)
         self._states, self._none = self._room(1, self.steps)
 
     def _room(self, runs: int, steps: int) -> tuple[Floats, Floats]:
@@ -110,6 +126,21 @@ class MuJoCoPeer(Peer):
         for i in range(self.data.ncon):
             mujoco.mj_contactForce(self.model, self.data, i, force[i])
         return [(f[0], -contact.dist) for f, contact in zip(force, self.data.contact, strict=True)]
+
+    def hold(self, torque: Floats) -> None:
+        """Apply torques from now on."""
+        self.commands = np.array(torque, dtype=np.float64)[None]
+
+    def forces(self) -> Floats:
+        """Forces on the contact points in the last step."""
+        found = np.zeros((self.scenario.robot.nc, 2))
+        force = np.zeros(6)
+        for i, contact in enumerate(self.data.contact[: self.data.ncon]):
+            mujoco.mj_contactForce(self.model, self.data, i, force)
+            world = force[:3] @ contact.frame.reshape(3, 3)
+            # It acts on the second of the two, of which the ground, a plane, is the first.
+            found[self._contact_of[int(contact.geom[1])]] += world[2], world[0]
+        return found
 
     def batch_work(self, starts: Sequence[State], threads: int) -> Callable[[], float]:
         """Return what simulates from several states on threads and returns the seconds it took."""
@@ -157,6 +188,25 @@ def _spec(scenario: Scenario) -> Any:
         else:
             geom.friction = scenario.friction, 0.0, 0.0
     return spec
+
+
+def _contacts(model: Any, scenario: Scenario) -> dict[int, int]:
+    """Our index of the contact point of each geom that touches the ground.
+
+    They are found by where they are when all joints are somewhere of their own.
+    """
+    robot = scenario.robot
+    q = robot.model.reference + 0.1 * np.arange(1.0, robot.nq + 1.0)
+    data = mujoco.MjData(model)
+    data.qpos[:] = q
+    mujoco.mj_kinematics(model, data)
+    ours = contact_positions(robot, q)
+    found = {}
+    for geom in range(model.ngeom):
+        if model.geom_bodyid[geom]:
+            apart = np.hypot(*(ours - data.geom_xpos[geom][[0, 2]]).T)
+            found[geom] = int(np.argmin(apart))
+    return found
 
 
 ENGINE = Engine(

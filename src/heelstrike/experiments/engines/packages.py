@@ -27,6 +27,10 @@ class Package:
     adapter: str | None
     """Module of this package that asks it to simulate and has an `Engine` named ``ENGINE``; None if
     there is none."""
+    elsewhere: bool = False
+    """Whether it is imported in a process without this package: by the system's Python, say."""
+    raced: bool = True
+    """Whether its steps are timed beside ours: not where their loop is in Python."""
 
 
 PACKAGES = {
@@ -35,7 +39,17 @@ PACKAGES = {
     "bullet": Package("Bullet", "pybullet", "pybullet", "bullet_peer"),
     "dart": Package("DART", "dartpy", "dartpy", "dart_peer"),
     "pinocchio": Package("Pinocchio", "pinocchio", "pin", "pinocchio_peer"),
-    "siconos": Package("Siconos", "siconos", "siconos", None),
+    "pinocchio_contact": Package(
+        "Pinocchio's solvers", "pinocchio", "pin", "pinocchio_contact_peer", raced=False
+    ),
+    "physx": Package("PhysX", "sapien", "sapien", "physx_peer", raced=False),
+    "simbody": Package(
+        "Simbody", "opensim", "opensim", "simbody_peer", elsewhere=True, raced=False
+    ),
+    "ode": Package("ODE", "ode", "python3-pyode", "ode_peer", elsewhere=True, raced=False),
+    "siconos": Package(
+        "Siconos", "siconos", "python3-siconos", "siconos_peer", elsewhere=True, raced=False
+    ),
 }
 PARTS_OF_STEPS = ("pinocchio",)
 """Engines without a loop of their own: a part of a step is timed, never compared with a step."""
@@ -43,12 +57,25 @@ PARTS_OF_STEPS = ("pinocchio",)
 NOT_INSTALLED = "not installed"
 
 
-def peers() -> dict[str, str]:
-    """Engines by name, each with its version or why it is not compared with."""
-    return {name: _state(package) for name, package in PACKAGES.items()}
+def peers(*, load: bool = True) -> dict[str, str]:
+    """Engines by name, each with its version or why it is not compared with.
+
+    Parameters
+    ----------
+    load : bool
+        Whether those that this process can have are loaded, to see that they can be.
+
+    Returns
+    -------
+    dict
+        Versions, or reasons, by the names of engines.
+    """
+    return {name: _state(package, load) for name, package in PACKAGES.items()}
 
 
-def _state(package: Package) -> str:
+def _state(package: Package, load: bool) -> str:
+    if package.elsewhere:
+        return _state_elsewhere(package)
     if importlib.util.find_spec(package.module) is None:
         return NOT_INSTALLED
     try:
@@ -57,11 +84,21 @@ def _state(package: Package) -> str:
         found = "unknown version"
     if package.adapter is None:
         return f"{found}, but there is no adapter for it"
+    if not load:
+        return found
     try:
         _adapter(package)
     except Exception as error:  # whatever a broken installation raises
         return f"{found}, but it cannot be loaded: {type(error).__name__}: {error}"
     return found
+
+
+def _state_elsewhere(package: Package) -> str:
+    from heelstrike.experiments.engines.served import version_elsewhere
+
+    return version_elsewhere(package.module) or (
+        f"{NOT_INSTALLED}: Debian has it as {package.distribution}"
+    )
 
 
 def compared(found: dict[str, str]) -> list[str]:
@@ -80,8 +117,24 @@ def compared(found: dict[str, str]) -> list[str]:
     return [
         name
         for name, state in found.items()
-        if PACKAGES[name].adapter and state != NOT_INSTALLED and ", but " not in state
+        if PACKAGES[name].adapter and not state.startswith(NOT_INSTALLED) and ", but " not in state
     ]
+
+
+def raced(found: dict[str, str]) -> list[str]:
+    """Names of the peers whose steps can be timed beside ours.
+
+    Parameters
+    ----------
+    found : dict
+        What :func:`peers` returned.
+
+    Returns
+    -------
+    list of str
+        Their names.
+    """
+    return [name for name in compared(found) if PACKAGES[name].raced]
 
 
 def simulators(names: Sequence[str] | None = None) -> dict[str, Engine]:

@@ -65,6 +65,8 @@ class Peer(ABC):
         Our position where the engine's coordinates are zero: the reference, unless it has ours.
     done : int
         Steps since the start.
+    seconds : float
+        Computing time of the steps that `record` has taken.
     """
 
     settling: ClassVar[float] = 0.0
@@ -72,6 +74,18 @@ class Peer(ABC):
 
     lacks: ClassVar[tuple[str, ...]] = ()
     """Members of a robot's model that the engine has nothing for."""
+
+    tells_friction: ClassVar[bool] = True
+    """Whether the engine says what the tangential forces of its contacts are."""
+
+    tells_means: ClassVar[bool] = True
+    """Whether the forces that it tells are means over a step, not those of the end of it."""
+
+    bounces: ClassVar[bool] = True
+    """Whether the engine takes a coefficient of restitution."""
+
+    float32: ClassVar[bool] = False
+    """Whether it computes in single precision."""
 
     def __init__(self, scenario: Scenario, step: float) -> None:
         self.scenario = scenario
@@ -81,6 +95,7 @@ class Peer(ABC):
         self.commands = _commands(scenario, step, self.steps)
         self.zero = scenario.robot.model.reference
         self.done = 0
+        self.seconds = 0.0
 
     @abstractmethod
     def place(self, q: Floats, v: Floats) -> None:
@@ -109,6 +124,52 @@ class Peer(ABC):
     @abstractmethod
     def contacts(self) -> list[tuple[float, float]]:
         """Normal force (N) and depth (m) of each contact that its solver is given."""
+
+    @abstractmethod
+    def hold(self, torque: Floats) -> None:
+        """Apply torques in all steps from now on, in a scenario without a law of control.
+
+        Parameters
+        ----------
+        torque : (nu,) float
+            Torques of the actuators (N m).
+        """
+
+    @abstractmethod
+    def forces(self) -> Floats:
+        """Forces on the contact points of the robot in the last step, (nc, 2), in N.
+
+        Upwards and forward, each the mean over the step; zero for points that do not touch.
+        """
+
+    def close(self) -> None:  # noqa: B027 - most have nothing to end
+        """End what the engine has running; nothing where it runs in this process."""
+
+    def record(self, steps: int) -> Floats:
+        """Simulate some steps one by one, and tell what happened in each.
+
+        Parameters
+        ----------
+        steps : int
+            How many.
+
+        Returns
+        -------
+        (steps, nq + nv + 2 nc) float
+            In our coordinates: position and velocity after each step, and the forces in it.
+        """
+        robot = self.scenario.robot
+        rows = np.zeros((steps, robot.nq + robot.nv + 2 * robot.nc))
+        for row in rows:
+            begin = perf_counter()
+            self.advance(1)
+            self.seconds += perf_counter() - begin
+            q, v = self.coordinates()
+            row[: robot.nq] = q
+            row[robot.nq : robot.nq + robot.nv] = v
+            row[robot.nq + robot.nv :] = self.forces().ravel()
+        rows[:, : robot.nq] += self.zero
+        return rows
 
     def restart(self) -> None:
         """Go back to `start`, at time 0."""

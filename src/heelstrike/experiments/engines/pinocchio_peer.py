@@ -35,7 +35,7 @@ class ForwardDynamics:
     def __init__(self, scenario: Scenario) -> None:
         robot = scenario.robot
         self._robot = robot
-        self._pool = pinocchio.ModelPool(_model(scenario), 1)
+        self._pool = pinocchio.ModelPool(model_of(scenario), 1)
         rng = np.random.default_rng(0)
         shape = (robot.nv, BATCH)
         self._q = np.asfortranarray(scenario.state.q[:, None] + 0.1 * rng.standard_normal(shape))
@@ -71,7 +71,14 @@ class ForwardDynamics:
         return {"acceleration_error": worst}
 
 
-def _model(scenario: Scenario) -> Any:
+def model_of(scenario: Scenario) -> Any:
+    """Return Pinocchio's model of the robot of a scenario, link by link.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is simulated.
+    """
     robot = scenario.robot
     model = pinocchio.Model()
     for i, link in enumerate(links(robot)):

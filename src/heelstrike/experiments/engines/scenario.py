@@ -18,7 +18,7 @@ NEVER = 2**62
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A robot, where it starts, and what drives it, on level ground without restitution."""
+    """A robot, where it starts, and what drives it, on level ground."""
 
     name: str
     """What tables call it."""
@@ -33,11 +33,13 @@ class Scenario:
     """Contact points that must be active throughout, if it shall stand."""
     friction: float = 0.75
     """Coefficient of the ground."""
+    restitution: float = 0.0
+    """Of the ground."""
 
     @property
     def ground(self) -> Ground:
         """The ground in heelstrike."""
-        return Ground(friction=self.friction)
+        return Ground(friction=self.friction, restitution=self.restitution)
 
     def run(self, method: Method, *, controller: Any = None, record_every: int = NEVER) -> Run:
         """Simulate it in heelstrike, under its own law of control or another controller.

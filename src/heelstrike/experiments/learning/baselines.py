@@ -1,4 +1,4 @@
-"""Lanes as Stable-Baselines3 takes them: a ``VecEnv`` without copies, whose lanes begin anew.
+"""Lanes as Stable-Baselines3 takes them: a ``VecEnv`` without copies, whose lanes start again.
 
 ::
 
@@ -78,7 +78,7 @@ class BaselinesVecEnv(VecEnv):  # type: ignore[misc]
         self._actions = actions
 
     def step_wait(self) -> tuple[Floats, Floats, NDArray[np.bool_], list[dict[str, Any]]]:
-        """Make a decision in every lane; begin anew where an episode has ended.
+        """Make a decision in every lane; start again where an episode has ended.
 
         Returns
         -------
@@ -115,7 +115,7 @@ class BaselinesVecEnv(VecEnv):  # type: ignore[misc]
                 info["cause"] = lanes.cause(lane)
         reward = lanes.reward.copy()
         lanes.begin(ended)
-        lanes.reward[:] = reward  # to begin anew is no reward
+        lanes.reward[:] = reward  # to start again is no reward
         self._return[ended], self._decisions[ended] = 0.0, 0
 
     def close(self) -> None:

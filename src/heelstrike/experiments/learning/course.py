@@ -103,7 +103,7 @@ class Course(ABC):
 
     @abstractmethod
     def begin(self, chosen: Integers) -> None:
-        """Let lanes begin anew, each with noise of its own.
+        """Let lanes start again, each with noise of its own.
 
         Parameters
         ----------

@@ -80,7 +80,7 @@ class TaskEnv(gymnasium.Env[Floats, Array]):
         self._first = np.zeros(1, dtype=np.int64)
 
     def __reduce__(self) -> Any:
-        """Copies begin anew."""
+        """Copies start again."""
         task, mode, changes = self._given
         return _made, (type(self), (task,), {"render_mode": mode, **changes})
 
@@ -176,7 +176,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
     max_episode_steps : int, optional
         Decisions after which an episode is truncated; by default those of the task.
     autoreset_mode : AutoresetMode or str
-        When a lane whose episode has ended begins anew: with the next step, with the same, or when
+        When a lane whose episode has ended starts again: with the next step, with the same, or when
         ``reset(options={"reset_mask": ...})`` says so.
     threads : int
         Threads that move them.
@@ -215,7 +215,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         self._state = "new"
 
     def __reduce__(self) -> Any:
-        """Copies begin anew."""
+        """Copies start again."""
         return _made, (type(self), (), self._given)
 
     def reset(
@@ -290,7 +290,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         except SimulationError as wrong:
             raise _refused(wrong) from None
         self._decisions += 1
-        if waits:  # what was over begins anew with this step, whatever its action
+        if waits:  # what was over starts again with this step, whatever its action
             self._begin(waiting)
             lanes.reward[waiting] = 0.0
         terminated = lanes.terminated & went
@@ -364,7 +364,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         return info
 
     def _tell_ends(self, ended: Array, terminated: Array, info: Info) -> None:
-        """Tell why episodes have ended; begin anew what does so with the same step."""
+        """Tell why episodes have ended; start again what does so with the same step."""
         lanes, fell = self._lanes, terminated.nonzero()[0].tolist()
         if fell:
             causes = np.full(self.num_envs, None, dtype=object)

@@ -22,7 +22,7 @@ PUSH_DURATION = 0.1
 
 FLAT, FACE, FACES = 0.5, 0.4, 32
 """Distance (m) from the start over which ground is level, then length of each face, and how many
-there are; the last one goes on for ever."""
+there are; the last one goes on forever."""
 
 
 @dataclass(frozen=True)

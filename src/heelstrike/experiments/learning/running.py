@@ -74,7 +74,7 @@ class RunningCourse(Course):
         self._drawn[lane] = AT_ONCE
 
     def begin(self, chosen: Integers) -> None:
-        """Let lanes begin anew, each with noise of its own.
+        """Let lanes start again, each with noise of its own.
 
         Parameters
         ----------

@@ -25,7 +25,7 @@ LIMIT = 10.0
 """Normalised observations and rewards are cut there."""
 
 BEGIN_ANEW = 10
-"""Rounds after which all lanes begin anew and everything is kept: what goes on from there is what
+"""Rounds after which all lanes start again and everything is kept: what goes on from there is what
 would have come without a break, to the last bit."""
 
 
@@ -199,7 +199,7 @@ class Trainer:
         )
 
     def keep(self, path: str | os.PathLike[str]) -> Path:
-        """Keep everything that the further course hangs on in a file.
+        """Keep everything that the further course depends on in a file.
 
         Parameters
         ----------
@@ -259,7 +259,7 @@ class Trainer:
         return [*adam.parameters, *adam.mean, *adam.square, *statistics]
 
     def _begin(self) -> None:
-        """Let all lanes begin anew, with noise that the trainer's own random numbers decide."""
+        """Let all lanes start again, with noise that the trainer's own random numbers decide."""
         for lane, seed in enumerate(self.random.integers(0, 2**63, self.recipe.lanes).tolist()):
             self.course.seed(lane, np.random.default_rng(seed))
         self.course.begin(np.arange(self.recipe.lanes))

@@ -85,7 +85,7 @@ class WalkTask:
     max_episode_steps: int = 500
     """Decisions after which an episode is truncated."""
     randomise: Ranges = Ranges()
-    """What is drawn anew for each episode."""
+    """What is drawn again for each episode."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "randomise", Ranges.of(self.randomise))

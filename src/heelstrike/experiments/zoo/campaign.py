@@ -83,7 +83,7 @@ def zoo(
         Where ``zoo.json`` is kept, with every cell that is finished, and gaits. What is there
         already is not done again; cells that are not asked for stay in the file.
     afresh : bool
-        Begin anew whatever is there.
+        Start again whatever is there.
     workers : int, optional
         Threads; by default one a processor.
     progress : callable, optional
@@ -221,7 +221,7 @@ def _begun(folder: Path | None, settings: Settings, *, afresh: bool) -> Results:
     if differing:
         raise SimulationError(
             f"{path} was made with {'; '.join(differing)}. Ask for the same to go on with it, for "
-            "another folder, or to begin anew (--afresh)."
+            "another folder, or to start again (--afresh)."
         )
     return results
 

@@ -1,6 +1,6 @@
 """What the zoo has found, cell by cell, and the file in which it is kept.
 
-The file appears anew, whole, with every cell that is finished, so that a second call goes on.
+The file appears again, whole, with every cell that is finished, so that a second call goes on.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Key = tuple[str, str, str]
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """All that the numbers hang on beside robots, controllers and disturbances."""
+    """All that the numbers depend on beside robots, controllers and disturbances."""
 
     seed: int = 0
     """Of all that chance decides."""

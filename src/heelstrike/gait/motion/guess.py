@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.dynamics import contact_positions, inverse_kinematics
-from heelstrike.errors import RobotError
+from heelstrike.errors import GaitError, RobotError
 from heelstrike.gait.motion.instant import size_of
 from heelstrike.gait.motion.program import (
     STAGES,
@@ -37,6 +37,8 @@ def guess_of(program: MotionProgram, *, lean: float = 0.0, lowered: float = LOWE
     distance = _distance(request, durations)
     if request.repeat is Repeat.NEVER and request.start is not None and request.end is not None:
         drawn: _Drawing = _Between(request, durations)
+    elif request.guess is not None:
+        drawn = _Given(request)
     else:
         drawn = _Walking(request, durations, distance, lean, lowered)
     ends = np.cumsum(durations)
@@ -99,6 +101,25 @@ class _Between(_Drawing):
         share = share**2 * (3.0 - 2.0 * share)
         first, last = self._ends
         return (1.0 - share) * first + share * last
+
+
+class _Given(_Drawing):
+    """As whoever asks knows it."""
+
+    def __init__(self, request: MotionRequest) -> None:
+        self._request = request
+
+    def at(self, time: float, phase: int) -> Floats:
+        del phase
+        request = self._request
+        assert request.guess is not None
+        found = np.asarray(request.guess(time), dtype=np.float64)
+        if found.shape != (request.robot.nv,) or not np.all(np.isfinite(found)):
+            raise GaitError(
+                f"guess must return {request.robot.nv} finite positions, of all coordinates; at "
+                f"{time:.3g} s it returned {found!r}"
+            )
+        return found
 
 
 class _Walking(_Drawing):

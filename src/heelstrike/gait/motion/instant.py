@@ -43,7 +43,8 @@ class Instants:
     path : Block
         Variables are positions and two of their derivatives by the share of a piece, (nv,) each,
         forces of all contact points, (2 nc,), places where they stand, (nc,), duration of a piece
-        (s), distance (m). The cost is its rate times the duration of a piece.
+        (s), distance (m), time since the beginning of the motion (s). The cost is its rate times
+        the duration of a piece.
     path_rows : list of Row
         What its constraints mean.
     landing : Block
@@ -90,12 +91,12 @@ class Instants:
     def _build_path(self) -> None:
         robot, model = self.robot, self.robot.model
         n, weight = robot.nv, robot.weight
-        y = casadi.SX.sym("y", 3 * (n + robot.nc) + 2)
-        places = y[-2 - robot.nc : -2]
+        y = casadi.SX.sym("y", 3 * (n + robot.nc) + 3)
+        places = y[-3 - robot.nc : -3]
         q, first, second, force = casadi.vertsplit(
-            y[: -2 - robot.nc], [0, n, 2 * n, 3 * n, 3 * n + 2 * robot.nc]
+            y[: -3 - robot.nc], [0, n, 2 * n, 3 * n, 3 * n + 2 * robot.nc]
         )
-        duration, distance = y[-2], y[-1]
+        duration, distance, time = y[-3], y[-2], y[-1]
         v, a = first / duration, symbols(second / duration**2)
         dynamics = TracedDynamics(robot, symbols(q), symbols(v))
         heights, jacobian, bias = self._points(dynamics)
@@ -127,6 +128,8 @@ class Instants:
             torque=expression(torque),
             motor_velocity=expression(dynamics.v[actuated]),
             force=expression(np.array([sum(pushes[1::2]), sum(pushes[0::2])], dtype=object)),
+            acceleration=expression(a),
+            time=time,
         )
         rate = rate_of(self.cost, now, heat_of(model), weight * self.length / self.second)
         cost = duration * rate / (casadi.fabs(distance) if self.per_metre else 1.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from os import PathLike
 
@@ -150,7 +150,7 @@ class Motion(ShownInNotebooks):
         Parameters
         ----------
         t : array_like
-            Times (s) since the beginning, of any shape. One that repeats goes on for ever, and back
+            Times (s) since the beginning, of any shape. One that repeats goes on forever, and back
             in time; one that does not rests before and after.
 
         Returns
@@ -236,22 +236,60 @@ class Motion(ShownInNotebooks):
             )
 
     @takes(GaitError)
-    def save(self, path: str | PathLike[str]) -> None:
+    def save(
+        self,
+        path: str | PathLike[str],
+        *,
+        robot: Robot | None = None,
+        rate: float = 1000.0,
+        cycles: int = 1,
+        joints: Sequence[str] | None = None,
+        degrees: bool = False,
+    ) -> None:
         """Write the motion to a readable JSON file; :func:`load_motion` reads it back unchanged.
+
+        Where the name ends in .csv or .tsv, write a table of the positions of driven joints over
+        time instead, for a robot or another program. ``heelstrike check`` and
+        :func:`~heelstrike.gait.recordings.motion.load_recorded_motion` read it, to the last bit.
 
         Parameters
         ----------
         path : str or path
             File to write.
+        robot : Robot, optional
+            The robot whose joints a table names; a table needs it.
+        rate : float
+            Rows a second of a table.
+        cycles : int
+            How often the motion is in a table; one that repeats with its mirror image is in it
+            twice as often, and one that never repeats once.
+        joints : sequence of str, optional
+            Joints of a table, in their order; all driven ones by default.
+        degrees : bool
+            Whether angles of a table are in degrees.
 
         Raises
         ------
         GaitError
-            If the file cannot be written.
+            If the file cannot be written, there is no such joint, or the robot of a table is
+            missing or another.
         """
         from heelstrike.gait.motion.file import save_motion
+        from heelstrike.gait.recordings.saving import is_table, save_joints, times_at
 
-        save_motion(self, path)
+        if not is_table(path):
+            save_motion(self, path)
+            return
+        if robot is None:
+            raise GaitError("a table of a motion names the joints: give robot, whose motion it is")
+        self.check_robot(robot)
+        often = {Repeat.MIRRORED: 2 * cycles, Repeat.SAME: cycles, Repeat.NEVER: 1}[self.repeat]
+        time = times_at(rate, often * self.duration)
+        driven = robot.model.actuator_joint
+        save_joints(
+            path, robot.actuator_names, time, self.position(time)[:, driven],
+            hinges=(robot.model.axis[driven, 0] != 0.0).tolist(), joints=joints, degrees=degrees,
+        )  # fmt: skip
 
     def __repr__(self) -> str:
         count = len(self.phases)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import casadi
 import numpy as np
+from numpy.typing import ArrayLike
 
-from heelstrike.arguments import are_numbers, takes
+from heelstrike.arguments import are_numbers, shown, takes
 from heelstrike.dynamics import contact_jacobian, contact_positions
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.cost import Cost, OwnCost, costs_of
@@ -26,6 +28,7 @@ from heelstrike.gait.motion.program import (
     endings,
     gauss_points,
     looked_at,
+    path_variables,
     phases_of,
 )
 from heelstrike.gait.motion.request import MotionRequest, Repeat
@@ -60,7 +63,12 @@ def optimize_motion(
     friction: float = 0.75,
     clearance: float = 0.03,
     slope: float = 0.0,
+    force_margin: float = 0.0,
+    landing_speed: float = 0.0,
     cost: Cost | str | Mapping[Cost | str, float] | OwnCost = "torque",
+    warm_start: Motion | None = None,
+    guess: Callable[[float], ArrayLike] | None = None,
+    refine: bool = True,
     starts: int = len(STARTS),
     progress: Callable[[float], None] | None = None,
 ) -> Motion:
@@ -96,9 +104,24 @@ def optimize_motion(
         stands on others only stay above the ground.
     slope : float
         Angle (rad) at which the ground ascends ahead; negative if it descends.
+    force_margin : float
+        Least normal force (N) at both ends of a sole that stands flat: it keeps the zero moment
+        point off its edges, so that a law that follows the motion can correct it.
+    landing_speed : float
+        Least speed towards the ground (m/s) of points that come down. What lands slowly lands late,
+        or early, by small errors.
     cost : str, mapping or function
         As for :func:`~heelstrike.gait.optimize.optimize_gait`; per metre where neither the distance
         nor speed and duration are fixed.
+    warm_start : Motion, optional
+        A motion of the robot through the same phases to start from. Others are tried only if this
+        one leads nowhere.
+    guess : callable, optional
+        Of a time (s) since the beginning, to positions of all coordinates (nv,), in m and rad: what
+        the motion may be like, to start from. Only this one is tried then.
+    refine : bool
+        Whether pieces and instants are added until nothing slips, and limits hold, between those
+        that are looked at. Without, it is a quick sketch to start others from.
     starts : int
         Starting points that are tried until one leads to an optimum; between two given states there
         is one.
@@ -127,9 +150,10 @@ def optimize_motion(
     >>> [phase.contacts for phase in motion.phases]
     [('right_tibia_0',), ()]
     """
-    request = _checked(
+    request = checked_request(
         robot, phases, repeat=repeat, distance=distance, duration=duration, speed=speed,
         start=start, end=end, friction=friction, clearance=clearance, slope=slope, cost=cost,
+        force_margin=force_margin, landing_speed=landing_speed, guess=guess,
     )  # fmt: skip
     if not 1 <= starts <= len(STARTS):
         raise GaitError(f"starts must be from 1 to {len(STARTS)}, got {starts!r}")
@@ -142,15 +166,16 @@ def optimize_motion(
         request, functions, tuple(looked_at(phase.pieces) for phase in request.phases)
     )
     report(0.1)
-    unknowns, optimal = _solved(program, starts, report)
-    program, unknowns, optimal = _refined(program, unknowns, optimal)
-    report(0.9)
-    program, unknowns, optimal = _held_between(program, unknowns, optimal)
+    unknowns, optimal = _solved(program, _known(program, warm_start), starts, report)
+    if refine:
+        program, unknowns, optimal = _refined(program, unknowns, optimal)
+        report(0.9)
+        program, unknowns, optimal = _held_between(program, unknowns, optimal)
     report(1.0)
-    return _motion(program, unknowns, optimal)
+    return motion_of(program, program.polished(unknowns), optimal)
 
 
-def _checked(
+def checked_request(
     robot: Robot, phases: Sequence[ContactPhase], *, repeat: Any, distance: Any, duration: Any,
     speed: Any, cost: Any, **others: Any,
 ) -> MotionRequest:  # fmt: skip
@@ -175,7 +200,7 @@ def _checked(
     for name, value in asked.items():
         if value is not None and not (np.isfinite(value) and value > 0.0):
             raise GaitError(f"{name} must be positive, got {value}")
-    for name in ("friction", "clearance"):
+    for name in ("friction", "clearance", "force_margin", "landing_speed"):
         if not (np.isfinite(others[name]) and others[name] >= 0.0):
             raise GaitError(f"{name} must not be negative, got {others[name]}")
     if not abs(others["slope"]) < STEEPEST:
@@ -281,16 +306,36 @@ def _distances(
     return float(bounds[0]), float(bounds[1])
 
 
+def _known(program: MotionProgram, motion: Motion | None) -> list[Floats]:
+    """Unknowns of a motion that is given to start from."""
+    if motion is None:
+        return []
+    if not isinstance(motion, Motion):
+        raise GaitError(f"warm_start must be a Motion or None, got {shown(motion)}")
+    request = program.request
+    motion.check_robot(request.robot)
+    names = request.robot.contact_names
+    asked = [tuple(names[i] for i in sorted(each.points)) for each in request.standing]
+    given = [each.contacts for each in motion.phases]
+    if asked != given or motion.repeat is not request.repeat:
+        raise GaitError(
+            f"warm_start must go through the phases that are asked for, {asked}, and repeat as "
+            f"they do; it goes through {given}"
+        )
+    return [_packed(motion.phases, motion.distance, program)]
+
+
 def _solved(
-    program: MotionProgram, starts: int, report: Callable[[float], None]
+    program: MotionProgram, known: list[Floats], starts: int, report: Callable[[float], None]
 ) -> tuple[Floats, bool]:
     """Unknowns of an optimum, or of a motion that satisfies all constraints."""
     nearest, least = np.zeros(0), np.inf
     feasible: Floats | None = None
-    if program.request.end is not None:
-        starts = 1  # the straight way from one state to the other
-    for k, (lean, lowered) in enumerate(STARTS[:starts]):
-        unknowns, _, told = program.solve(guess_of(program, lean=lean, lowered=lowered))
+    if program.request.end is not None or program.request.guess is not None:
+        starts = 1  # the straight way from one state to the other, or that which is known
+    drawn = (guess_of(program, lean=lean, lowered=lowered) for lean, lowered in STARTS[:starts])
+    for k, start in enumerate(chain(known, drawn)):
+        unknowns, _, told = program.solve(start)
         if told["return_status"] == "Solve_Succeeded":
             return unknowns, True
         missing = float(np.abs(program.violations(unknowns)).max())
@@ -360,8 +405,12 @@ def _slip(program: MotionProgram, unknowns: Floats, p: int) -> float:
 
 def _resampled(program: MotionProgram, unknowns: Floats, finer: MotionProgram) -> Floats:
     """Unknowns of a finer program for the same motion."""
-    _, impulses, distance = program.parts(casadi.DM(unknowns))
-    motion = _phases(program, unknowns)
+    _, _, distance = program.parts(casadi.DM(unknowns))
+    return _packed(_phases(program, unknowns), float(distance), finer)
+
+
+def _packed(motion: Sequence[MotionPhase], distance: float, finer: MotionProgram) -> Floats:
+    """Unknowns of a program of the phases of a motion."""
     positions, velocities, accelerations, forces = [], [], [], []
     for own, phase in zip(motion, finer.request.phases, strict=True):
         at = [
@@ -375,8 +424,8 @@ def _resampled(program: MotionProgram, unknowns: Floats, finer: MotionProgram) -
         forces.append(own.forces(at[2]).reshape(at[2].size, -1).T)
     durations = np.array([own.duration for own in motion])
     return finer.packed(
-        positions, velocities, accelerations, forces, durations, float(distance),
-        [np.array(each).ravel() for each in impulses],
+        positions, velocities, accelerations, forces, durations, distance,
+        [each.impulse.ravel() for each in motion[: len(finer.landings)]],
     )  # fmt: skip
 
 
@@ -402,12 +451,8 @@ def _rows_at(
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Cost rates (N,) and scaled constraints (rows, N) of a phase at instants."""
     phases, _, distance = program.parts(casadi.DM(unknowns))
-    own, count = phases[p], grid.share.size
-    request = program.request
-    step = casadi.DM(own.lengths[grid.piece]).T * own.duration
-    far = casadi.repmat(distance, 1, count)
-    places = casadi.repmat(own.places, 1, count)
-    y = casadi.vertcat(*own.along(grid), own.forces(grid), places, step, far)
+    count, request = grid.share.size, program.request
+    y = path_variables(phases, p, grid, distance)
     numbers = casadi.repmat(casadi.DM([request.slope, request.friction]), 1, count)
     path = (functions or program.functions).path
     cost, rows = path.value.map(count)(y, numbers)
@@ -446,7 +491,8 @@ ALLOWED = 1e-5
 """Scaled violation that a limit may have between the instants at which it is looked at."""
 
 
-def _motion(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
+def motion_of(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion:
+    """Return the motion with the given unknowns, its cost and its margins."""
     request, robot = program.request, program.request.robot
     _, _, distance = program.parts(casadi.DM(unknowns))
     effort, spent = 0.0, float(program.value(unknowns)[0])

@@ -18,7 +18,7 @@ from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.gait.motion.rows import Kind, Row
 from heelstrike.gait.polynomials import Instants as Grid
 from heelstrike.gait.polynomials import coefficients, gauss
-from heelstrike.gait.program import NEAR, SETTINGS, Ipopt
+from heelstrike.gait.program import NEAR, SETTINGS, Ipopt, satisfied
 from heelstrike.robot.model import Floats
 
 STAGES = 4
@@ -93,6 +93,16 @@ class PhaseUnknowns:
         for k in range(STAGES):
             values[STAGES * grid.piece + k, np.arange(grid.share.size)] = shares[k]
         return self.force @ casadi.sparsify(casadi.DM(values))
+
+
+def path_variables(phases: list[PhaseUnknowns], p: int, grid: Grid, distance: Any) -> Any:
+    """Variables of ``Instants.path`` at instants of a phase, (variables, N)."""
+    own, count = phases[p], grid.share.size
+    step = casadi.DM(own.lengths[grid.piece]).T * own.duration
+    places, far = (casadi.repmat(each, 1, count) for each in (own.places, distance))
+    begun = sum(each.duration for each in phases[:p])
+    time = begun + casadi.DM(phases_of(grid)).T * own.duration
+    return casadi.vertcat(*own.along(grid), own.forces(grid), places, step, far, time)
 
 
 def breakpoints(pieces: int) -> Floats:
@@ -243,12 +253,8 @@ class MotionProgram:
         numbers = np.array([request.slope, request.friction])
         copies, lower, upper, kept = [], [], [], []
         self.labels: list[tuple[Row, int, float]] = []
-        for p, (unknowns, grid) in enumerate(zip(phases, self.grids, strict=True)):
-            count = grid.share.size
-            step = casadi.DM(unknowns.lengths[grid.piece]).T * unknowns.duration
-            far = casadi.repmat(distance, 1, count)
-            places = casadi.repmat(unknowns.places, 1, count)
-            y = casadi.vertcat(*unknowns.along(grid), unknowns.forces(grid), places, step, far)
+        for p, grid in enumerate(self.grids):
+            y = path_variables(phases, p, grid, distance)
             weight = grid.weight * grid.pieces
             copies.append(Copies.of(functions.path, weight, x, y, numbers))
             low, high = self.path_bounds(p, grid)
@@ -362,6 +368,7 @@ class MotionProgram:
                 used = weighed
             elif row.kind is Kind.PUSH:
                 used = row.of[0] in stands.normal
+                lower[k] = request.force_margin_of(p, row.of[0]) / request.robot.weight
             elif row.kind is Kind.RANGE:
                 begins = (grid.piece == 0) & (grid.share == 0.0) & (p == 0)
                 used = ~(ends & ~free) & ~(begins & (request.start is not None))
@@ -405,6 +412,8 @@ class MotionProgram:
                 Kind.IMPULSE: point in landing.normal,
                 Kind.IMPULSE_FRICTION: not landing.points.isdisjoint(row.of),
             }[row.kind]
+            if row.kind is Kind.ARRIVE:
+                upper[k] = -request.landing_speed
             if not used:
                 lower[k], upper[k] = -np.inf, np.inf
         return lower, upper
@@ -429,6 +438,17 @@ class MotionProgram:
         missing: Floats = np.maximum(self._lower - values, 0.0)
         missing -= np.maximum(values - self._upper, 0.0)
         return missing
+
+    def polished(self, unknowns: Floats) -> Floats:
+        """Satisfy the equations to rounding, by the least change of all that is not given."""
+        free = np.full(self.size, True)
+        for p, phase in enumerate(self.request.phases):
+            free[self._ends[PARTS * (p + 1) - 1]] = phase.duration[0] < phase.duration[1]
+        free[-1] = self.request.distance[0] < self.request.distance[1]
+        return satisfied(
+            unknowns, lambda x: np.array(self.value(x)[1]).ravel(), self.slopes,
+            (self._lower, self._upper), free,
+        )  # fmt: skip
 
     def packed(
         self, positions: list[Floats], velocities: list[Floats], accelerations: list[Floats],

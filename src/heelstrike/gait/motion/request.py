@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
 import casadi
 import numpy as np
+from numpy.typing import ArrayLike
 
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.clearance import ClearanceProfile
@@ -45,6 +47,10 @@ class MotionRequest:
     """How high points in the air are half-way (m)."""
     slope: float
     """Angle (rad) at which the ground ascends ahead."""
+    force_margin: float
+    """Least normal force (N) at both ends of a sole that stands flat."""
+    landing_speed: float
+    """Least speed towards the ground (m/s) of points that come down."""
     cost: Any
     """What is to be least."""
     speed: float | None
@@ -57,6 +63,8 @@ class MotionRequest:
     """State at the beginning of a motion that never repeats."""
     end: State | None = None
     """State at its end."""
+    guess: Callable[[float], ArrayLike] | None = None
+    """Positions at times of the motion, to start from."""
 
     @cached_property
     def standing(self) -> list[Standing]:
@@ -106,6 +114,12 @@ class MotionRequest:
             return start
         assert self.robot.mirror is not None
         return self.robot.mirror.velocity(start)
+
+    def force_margin_of(self, p: int, point: int) -> float:
+        """Least normal force (N) of a point that stands in a phase: none where it stands alone."""
+        link = self.robot.model.contact_link
+        ends = [i for i in self.standing[p].normal if link[i] == link[point]]
+        return self.force_margin if len(ends) > 1 else 0.0
 
     def clearance_of(self, p: int, point: int, shares: Floats) -> Floats:
         """Least height (m) of a point that is in the air at shares of a phase.

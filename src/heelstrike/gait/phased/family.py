@@ -284,7 +284,13 @@ def _equal_shift(postures: Postures, slope: float, most: float, level: float) ->
     ground = Ground(slope=float(np.arctan(slope)))
 
     def missing(shift: float) -> float:
-        surface = Surface(make_invariant(postures.changed(slope, shift), ground), ground)
+        try:
+            surface = Surface(make_invariant(postures.changed(slope, shift), ground), ground)
+        except GaitError as error:
+            raise GaitError(
+                f"on a slope of {slope:.3g} with the hips held back by {shift:.3g} m: {error}; ask "
+                "for a smaller slope, or for a gait with more bent knees (joint_ranges)"
+            ) from error
         end = surface.touchdown()
         _, added = surface.motion(end)
         return float(added(end.before)) / (1.0 - end.momentum**2) - level

@@ -345,7 +345,7 @@ def _is_free(model: Any, body: int) -> bool:
 
 
 def _is_planar(model: Any, body: int) -> bool:
-    """Whether a body hangs on what MuJoCo makes of URDF's planar joint."""
+    """Whether a body depends on what MuJoCo makes of URDF's planar joint."""
     first = model.body_jntadr[body]
     names = [model.joint(first + k).name for k in range(model.body_jntnum[body])]
     return tuple(name[-3:] for name in names) == _PLANAR and len({n[:-3] for n in names}) == 1

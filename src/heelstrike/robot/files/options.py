@@ -18,6 +18,9 @@ FORWARD = {"x": 0, "y": 1, "-x": 2, "-y": 3}
 
 AVERAGE = "average"
 
+FEWEST = 6
+"""Points that a mesh has at least: its extremes along the axes."""
+
 
 class LoadOptions(TypedDict, total=False):
     """How a robot file is read; nothing is required.
@@ -45,6 +48,9 @@ class LoadOptions(TypedDict, total=False):
     mirror : {"average"}
         Make left and right equal, by the mean of their numbers, where they differ by more than
         rounding, and say by how much.
+    mesh_points : int
+        Contact points that stand for the meshes of a link of a robot in space at most, 32 by
+        default: corners of their convex hull, of which six are the least.
     xacro : bool or mapping of str to str
         Expand the macros of a xacro file, with these values of its arguments. Such a file is a
         program, which runs in a process of its own for a minute at most: expand files of people
@@ -57,6 +63,7 @@ class LoadOptions(TypedDict, total=False):
     pose: Mapping[str, float] | None
     package_path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
     mirror: str | None
+    mesh_points: int
     xacro: bool | Mapping[str, str]
 
 
@@ -76,8 +83,10 @@ class Options:
     pose: Mapping[str, float] | None = field(default_factory=dict)
     package_path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = ()
     mirror: str | None = None
+    mesh_points: int = 32
     xacro: bool | Mapping[str, str] = False
-    """floating, projected, forward, pose, package_path, mirror, xacro: See :class:`LoadOptions`."""
+    """floating, projected, forward, pose, package_path, mirror, mesh_points, xacro: See
+    :class:`LoadOptions`."""
     lenient: bool = False
     """Let masses pass that MuJoCo refuses, to look at the robot; see `inspect_robot`."""
 
@@ -91,6 +100,8 @@ class Options:
             raise RobotError(f"forward is one of {', '.join(FORWARD)}, not {self.forward!r}.")
         if self.mirror not in (None, AVERAGE):
             raise RobotError(f"mirror is {AVERAGE!r} or left out, not {self.mirror!r}.")
+        if self.mesh_points < FEWEST:
+            raise RobotError(f"mesh_points is {FEWEST} or more, not {self.mesh_points!r}.")
         for joint, value in (self.pose or {}).items():
             if not isinstance(value, int | float) or not math.isfinite(value):
                 raise RobotError(f"pose of joint {joint!r} is {value!r}, not a number.")
@@ -106,7 +117,7 @@ class Options:
         """What JSON can hold of them; macros are expanded before."""
         return {
             **{name: getattr(self, name) for name in ("floating", "projected", "forward")},
-            **{name: getattr(self, name) for name in ("mirror", "lenient")},
+            **{name: getattr(self, name) for name in ("mirror", "mesh_points", "lenient")},
             "pose": self.pose and {joint: float(value) for joint, value in self.pose.items()},
             "package_path": [str(folder.absolute()) for folder in self.packages],
         }

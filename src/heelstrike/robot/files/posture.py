@@ -66,7 +66,7 @@ def followers(model: Any) -> Iterator[tuple[int, int, Floats]]:
 
 
 def turn(model: Any, pose: Any, quarters: int) -> None:
-    """Turn everything that hangs on the world by quarters of a turn, so that it looks along x."""
+    """Turn everything that is attached to the world by quarters of a turn, to look along x."""
     import mujoco
 
     if quarters == 0:

@@ -110,7 +110,7 @@ def let_massless_links_pass(spec: Any) -> None:
 
 
 def _mend_world(root: Node) -> None:
-    """Have a link ``world`` where joints hang on it, without mass, and nowhere below others.
+    """Have a link ``world`` where joints depend on it, without mass, and nowhere below others.
 
     Parsers know the world by this name: it need not be written down, and it cannot be moved. What
     carries a free robot, and weighs nothing, is the world too.

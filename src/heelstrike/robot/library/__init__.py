@@ -72,7 +72,8 @@ def load_robot(
         and pitches in the plane stays there unless ``floating=True`` lets it move freely. (Type
         checkers take a robot for planar if no dimension is given.)
     **how : LoadOptions
-        How a file is read: floating, projected, forward, pose, package_path, mirror, xacro.
+        How a file is read: floating, projected, forward, pose, package_path, mirror, mesh_points,
+        xacro.
 
     Returns
     -------

@@ -210,7 +210,7 @@ def _differing_joints(model: Model, mirror: Mirror, names: Sequence[str]) -> Ite
     for i, j in enumerate(joint):
         expected = joint[parent[i]] if parent[i] >= 0 else -1
         if parent[j] != expected:
-            yield f"{names[i]} and {names[j]} hang on links that are not counterparts"
+            yield f"{names[i]} and {names[j]} are attached to links that are not counterparts"
     ranges = (
         np.transpose([model.lower, model.upper]),
         np.transpose(mirror.ranges(model.lower, model.upper)),

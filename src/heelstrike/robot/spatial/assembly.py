@@ -11,6 +11,9 @@ from heelstrike.robot.spatial.model import BALL, FREE, HINGE, SPATIAL_NUMBERS, S
 from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot
 from heelstrike.robot.spatial.solids import Solid
 
+LEAST = 1e-30
+"""Resistance (kg, kg m²) of a joint that is none: places that differ by rounding make less."""
+
 
 def assembled_in_space(
     name: str,
@@ -116,6 +119,17 @@ def _refuse_joints_without_inertia(
     model: SpatialModel, joint_names: tuple[str, ...], origin: Floats, axes: Floats, source: str
 ) -> None:
     """Refuse joints whose acceleration no mass resists: their equations of motion say 0 = 0."""
+    idle = idle_joints(model, origin, axes)
+    if idle:
+        raise RobotError(
+            f"{source}: joint {joint_names[idle[0]]!r} moves no mass and has no armature, so that "
+            "nothing resists it. Give the link that it moves a mass and moments of inertia, or "
+            "make it a fixed joint."
+        )
+
+
+def idle_joints(model: SpatialModel, origin: Floats, axes: Floats) -> list[int]:
+    """Joints that nothing resists, with their links in given world poses."""
     resistance = model.armature.copy()
     center = origin + np.einsum("lij,lj->li", axes, model.center_of_mass)
     for link in range(model.nl):
@@ -130,14 +144,7 @@ def _refuse_joints_without_inertia(
                     model.mass[link] * moved @ moved + turns @ tensor @ turns
                 )
             above = int(model.parent[above])
-    idle = np.flatnonzero(~(resistance > 0.0))
-    if len(idle):
-        joint = int(model.velocity_joint[idle[0]])
-        raise RobotError(
-            f"{source}: joint {joint_names[joint]!r} moves no mass and has no armature, so that "
-            "nothing resists it. Give the link that it moves a mass and moments of inertia, or "
-            "make it a fixed joint."
-        )
+    return [int(joint) for joint in np.unique(model.velocity_joint[~(resistance > LEAST)])]
 
 
 def _motions(model: SpatialModel, link: int, axes: Floats) -> list[tuple[Floats, Floats]]:

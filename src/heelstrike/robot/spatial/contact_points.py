@@ -28,9 +28,6 @@ from heelstrike.robot.warning import warn
 from heelstrike.tolerances import ONE_POINT
 from heelstrike.wording import some_of
 
-MOST_OF_A_MESH = 32
-"""Points that stand for the meshes of a link at most."""
-
 AROUND = 8
 """Points round each end of a cylinder that stands."""
 
@@ -78,13 +75,13 @@ def of_spatial_model(points: list[SpatialPoint]) -> dict[str, list[object]]:
     }
 
 
-def read_spatial_points(file: MujocoFile, links: SpatialLinks) -> list[SpatialPoint]:
+def read_spatial_points(file: MujocoFile, links: SpatialLinks, most: int) -> list[SpatialPoint]:
     """Turn the geoms that can touch the ground into contact points, link by link.
 
     A sphere is one, of its radius, or a point if that is below 1e-9 m; a capsule is the spheres of
     its two ends, a box its eight corners. A cylinder that lies is its two rims, of which the lowest
     points meet the ground wherever it rolls; one that stands is eight points round each end. Of the
-    meshes of a link it is up to 32 corners of their convex hull, which meets level ground where
+    meshes of a link it is up to `most` corners of their convex hull, which meets level ground where
     they do. Edges meet nothing between their ends, and links never each other.
 
     Raises
@@ -103,21 +100,21 @@ def read_spatial_points(file: MujocoFile, links: SpatialLinks) -> list[SpatialPo
     scales = contact_scales(file)
     touching = geoms_that_touch(file, links.of_body)
     _tell_of_self_collision(file, touching)
-    of_meshes: dict[tuple[int, float, float, float], list[Floats]] = {}
+    of_meshes: dict[tuple[int, tuple[float, ...]], list[Floats]] = {}
     for geom in touching:
         own = scales.get(file.given_name("geom", geom), {})
         if file.model.geom_type[geom] == MESH:
             link, place = _of_link(file, geom, links, mesh_corners(file, geom))
             friction = float(file.model.geom_friction[geom, 0])
-            key = link, friction, *(own.get(name, 1.0) for name in SCALES)
-            of_meshes.setdefault(key, []).append(place)
+            surface = friction, *(own.get(name, 1.0) for name in SCALES)
+            of_meshes.setdefault((link, surface), []).append(place)
             continue
         shape = list(_shape(file, geom, links))
         points += [_scaled(point, **own) for point in shape]
         if not shape:
             skipped.append(file.name("geom", geom))
-    for (link, friction, *own_scales), places in of_meshes.items():
-        corners, reach = few_corners(np.concatenate(places), MOST_OF_A_MESH)
+    for (link, (friction, *own_scales)), places in of_meshes.items():
+        corners, reach = few_corners(np.concatenate(places), most)
         if reach > SAID:
             beyond[link] = max(reach, beyond.get(link, 0.0))
         scaled = dict(zip(SCALES, own_scales, strict=True))
@@ -135,7 +132,7 @@ def read_spatial_points(file: MujocoFile, links: SpatialLinks) -> list[SpatialPo
         worst = max(beyond, key=lambda each: beyond[each])
         name = file.name("body", int(file.model.jnt_bodyid[worst]))
         warn(
-            f"{file.source}: the {MOST_OF_A_MESH} corners that stand for the meshes of a link miss "
+            f"{file.source}: the {most} corners that stand for the meshes of a link miss "
             f"their hull by more than {1e3 * SAID:g} mm on {len(beyond)} of its links, by up to "
             f"{1e3 * beyond[worst]:.2g} mm on {name!r}. Whoever wants less gives the link spheres, "
             "capsules or boxes."

@@ -50,10 +50,11 @@ _PART: dict[str, Any] = {"default": 0.0, "least": 0.0}
 class SpatialModel(Bundle):
     """A kinematic tree in space with inertia, contact points and actuators.
 
-    Every link hangs on its parent by one joint; a body with several joints becomes a chain of links
-    of which all but the last are massless. The frame of a link on a hinge or a slide is parallel to
-    its parent's when ``q`` equals `reference`; that of a free link, or of one on a ball joint, is
-    the frame that the file gives its body. Vectors are (x, y, z) in link axes, lengths in metres.
+    Every link is attached to its parent by one joint; a body with several joints becomes a chain of
+    links of which all but the last are massless. The frame of a link on a hinge or a slide is
+    parallel to its parent's when ``q`` equals `reference`; that of a free link, or of one on a ball
+    joint, is the frame that the file gives its body. Vectors are (x, y, z) in link axes, lengths in
+    metres.
 
     The velocities on the way from a link to the world are its *chain*. Rows of a Jacobian, of the
     mass matrix and of its factor are kept along chains: entry ``a`` of a row is that of velocity

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from heelstrike.robot.files.actuators import Actuators
 from heelstrike.robot.files.mjcf import model_name
 from heelstrike.robot.files.mujoco_file import MujocoFile, parse_whole
 from heelstrike.robot.files.options import Options
@@ -13,14 +16,19 @@ from heelstrike.robot.files.posture import joint_name
 from heelstrike.robot.files.unmodelled import acting_parts, tell_of_left_out
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.actuators import read_spatial_actuators
-from heelstrike.robot.spatial.assembly import assembled_in_space
-from heelstrike.robot.spatial.contact_points import of_spatial_model, read_spatial_points
+from heelstrike.robot.spatial.assembly import assembled_in_space, idle_joints
+from heelstrike.robot.spatial.contact_points import (
+    SpatialPoint,
+    of_spatial_model,
+    read_spatial_points,
+)
 from heelstrike.robot.spatial.joint_numbers import limits, read_spatial_numbers
-from heelstrike.robot.spatial.links import read_spatial_links
-from heelstrike.robot.spatial.model import SpatialModel
+from heelstrike.robot.spatial.links import SpatialLinks, read_spatial_links
+from heelstrike.robot.spatial.model import HINGE, SLIDE, SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot
-from heelstrike.robot.spatial.trunk import free_trunk
+from heelstrike.robot.spatial.trunk import free_trunk, weld
 from heelstrike.robot.spatial.visible_shapes import read_solids
+from heelstrike.robot.warning import warn
 
 
 def spatial_robot(
@@ -45,36 +53,47 @@ def spatial_robot(
         If the file cannot be read, or the robot is none that can move.
     """
     label = str(source) if isinstance(source, Path) else "XML string"
+    fixed: list[str] = []
+
+    def free(spec: Any, held: bool) -> list[str]:
+        told = weld(spec, fixed)
+        return [*told, *free_trunk(spec, held, floating=options.floating, label=label)]
+
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused in the end
-        file = parse_whole(
-            source,
-            options,
-            text,
-            lambda spec, held: free_trunk(spec, held, floating=options.floating, label=label),
-        )
-        return _robot(file, name or model_name(file, source))
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            file = parse_whole(source, options, text, free)
+        if file.is_urdf:
+            fixed += _without_mass(file)
+        if fixed:
+            file = parse_whole(source, options, text, free)
+        else:
+            for each in said:
+                warn(str(each.message))
+        return _robot(file, name or model_name(file, source), options)
 
 
-def _robot(file: MujocoFile, name: str) -> SpatialRobot:
+def _without_mass(file: MujocoFile) -> list[str]:
+    """Names of the hinges and slides of a file that nothing resists, as URDF has them."""
+    if not file.model.njnt:
+        return []
+    links = read_spatial_links(file)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # all that is said later
+        model = _model(file, links, [], read_spatial_actuators(file))
+    names = [joint_name(file.model, one) for one in idle_joints(model, links.origin, links.axes)]
+    kinds = model.joint_kind.tolist()
+    single = {joint_name(file.model, k) for k, kind in enumerate(kinds) if kind in (HINGE, SLIDE)}
+    return [each for each in names if each in single]
+
+
+def _robot(file: MujocoFile, name: str, options: Options) -> SpatialRobot:
     links = read_spatial_links(file)
     held = {"equality constraints (closed loops, coupled joints, welds)": _holds(file)}
     tell_of_left_out(file, held | acting_parts(file))
-    points = read_spatial_points(file, links)
+    points = read_spatial_points(file, links, options.mesh_points)
     actuators = read_spatial_actuators(file)
-    numbers = read_spatial_numbers(file)
-    numbers["armature"] = numbers["armature"] + actuators.armature
-    if not file.disabled("damper"):
-        numbers["damping"] = numbers["damping"] + actuators.damping
-    model = SpatialModel.made(
-        **links.numbers,
-        **numbers,
-        **of_spatial_model(points),
-        gravity=_gravity(file),
-        actuator_velocity=actuators.joint,
-        torque_lower=limits(actuators.lower),
-        torque_upper=limits(actuators.upper),
-        pivot=0,
-    )
+    model = _model(file, links, points, actuators)
     joints = range(file.model.njnt)
     return assembled_in_space(
         name,
@@ -87,6 +106,26 @@ def _robot(file: MujocoFile, name: str) -> SpatialRobot:
         origin=links.origin,
         axes=links.axes,
         solids=read_solids(file, links),
+    )
+
+
+def _model(
+    file: MujocoFile, links: SpatialLinks, points: list[SpatialPoint], actuators: Actuators
+) -> SpatialModel:
+    """Numbers of a robot with these links, contact points and actuators."""
+    numbers = read_spatial_numbers(file)
+    numbers["armature"] = numbers["armature"] + actuators.armature
+    if not file.disabled("damper"):
+        numbers["damping"] = numbers["damping"] + actuators.damping
+    return SpatialModel.made(
+        **links.numbers,
+        **numbers,
+        **of_spatial_model(points),
+        gravity=_gravity(file),
+        actuator_velocity=actuators.joint,
+        torque_lower=limits(actuators.lower),
+        torque_upper=limits(actuators.upper),
+        pivot=0,
     )
 
 

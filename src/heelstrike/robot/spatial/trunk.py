@@ -1,10 +1,16 @@
-"""The trunk of a file: which body is meant to move freely, though the file does not say so."""
+"""What moves though a file does not say so, and what does not although it does.
+
+The trunk of a URDF is meant to move freely; joints that move no mass cannot.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 from heelstrike.errors import RobotError
+from heelstrike.wording import some_of
+
+SHOWN = 6  # how many joints a message lists before it counts the rest
 
 ROOT = "root"
 """Name of the free joint that a trunk gets."""
@@ -67,7 +73,7 @@ def free_trunk(spec: Any, held: bool, *, floating: bool, label: str) -> list[str
 
 
 def _moves(body: Any) -> bool:
-    """Whether a body or one that hangs on it has a joint."""
+    """Whether a body or one that depends on it has a joint."""
     return bool(body.joints) or any(_moves(child) for child in body.bodies)
 
 
@@ -77,3 +83,33 @@ def _unused(spec: Any) -> str:
     while name in taken:
         name += "_"
     return name
+
+
+def weld(spec: Any, joints: list[str]) -> list[str]:
+    """Take joints out of a parsed file, and what makes them follow others.
+
+    Parameters
+    ----------
+    spec : mujoco.MjSpec
+        The parsed file, which is changed.
+    joints : list of str
+        Names of the joints.
+
+    Returns
+    -------
+    list of str
+        What the user should know.
+    """
+    for one in list(spec.equalities):
+        if one.name1 in joints or one.name2 in joints:
+            spec.delete(one)
+    for joint in list(spec.joints):
+        if joint.name in joints:
+            spec.delete(joint)
+    if not joints:
+        return []
+    number = f"{len(joints)} joints move" if len(joints) > 1 else "1 joint moves"
+    return [
+        f"{number} no mass, so that nothing resists: {some_of(joints, SHOWN)}. They are taken for "
+        "fixed ones; whoever wants them to move gives their links mass and moments of inertia."
+    ]

@@ -343,7 +343,7 @@ class Batch:
             early &= (self._outcome == WENT_ON) & (self.time < self._until)
 
     def reset(self, mask: ArrayLike | None = None, state: State | None = None) -> None:
-        """Let lanes begin anew at t = 0, those that have ended too.
+        """Let lanes start again at t = 0, those that have ended too.
 
         Their ground, pushes and parameters stay as they are now; memory of laws, contact modes and
         counts are as at first. For other ground, pushes, parameters or robots see :meth:`lay`.
@@ -368,7 +368,7 @@ class Batch:
             self._begin_anew(chosen, q, v)
 
     def _begin_anew(self, chosen: Integers, q: Floats, v: Floats) -> None:
-        """Let lanes begin anew in states that are good."""
+        """Let lanes start again in states that are good."""
         lanes = self._lanes
         lanes.put_back(chosen, (q, v), (self._q, self._v))
         if self._lent or self._any_special or self._has_ended:
@@ -381,7 +381,7 @@ class Batch:
     def _renew(
         self, index: int, *, pushes: Sequence[Push] | None = None, ground: Ground | None = None
     ) -> None:
-        """Give a lane that is about to begin anew other pushes, as many as it has, or ground.
+        """Give a lane that is about to start again other pushes, as many as it has, or ground.
 
         That is some thirty times as quick as :meth:`lay`: nothing else of the lane is looked at.
         """
@@ -411,7 +411,7 @@ class Batch:
         latched: Sequence[str | int] | None = None,
         braked: Sequence[str | int] | None = None,
     ) -> None:
-        """Let a lane be another, which begins anew; what is left out stays as it was laid before.
+        """Let a lane be another, which starts again; what is left out stays as it was laid before.
 
         Parameters
         ----------
@@ -469,7 +469,7 @@ class Batch:
         self._tell_apart()
 
     def snapshot(self) -> tuple[Snapshot, ...]:
-        """Return everything that the further course of each lane hangs on, (n,)."""
+        """Return everything that the further course of each lane depends on, (n,)."""
         self._command_all()
         return tuple(lane.snapshot() for lane in self._lanes.lanes)
 

@@ -113,7 +113,7 @@ class Lane(Simulation):
         ]  # fmt: skip
 
     def changing(self) -> list[tuple[str, NDArray[Any]]]:
-        """Name what changes as it moves, and is not written anew before it is read.
+        """Name what changes as it moves, and is not written again before it is read.
 
         Pushes are left out: their number may differ from lane to lane.
         """
@@ -136,7 +136,7 @@ class Lane(Simulation):
     def renew(self, setting: Setting) -> None:
         """Take ground and pushes, as many as before, of another setting.
 
-        It has to begin anew before it moves.
+        It has to start again before it moves.
         """
         if setting.pushes is not self._pushes and setting.pushes:
             mine, its = self._memory.pushes, pushes_on(self.robot, setting.pushes)
@@ -192,4 +192,4 @@ _NOT_KEPT = (
     "memory.solver.combinations.", "memory.solver.trial.", "memory.solver.yardstick.",
     "memory.jacobian", "memory.half", "control.parameters",
 )  # fmt: skip
-"""Scratch, which is written anew before it is read; parameters, which are the user's."""
+"""Scratch, which is written again before it is read; parameters, which are the user's."""

@@ -152,7 +152,7 @@ class Lanes:
         )
         kept = self._images.setdefault(image.tobytes(), image)
         self._image_at[index] = address_of_array(kept)
-        if len(self._images) > 2 * len(self.lanes):  # those of lanes that were laid anew since
+        if len(self._images) > 2 * len(self.lanes):  # those of lanes that were laid again since
             used = set(self._image_at.tolist())
             images = self._images.items()
             self._images = {k: each for k, each in images if address_of_array(each) in used}

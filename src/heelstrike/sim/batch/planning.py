@@ -161,7 +161,7 @@ def _listed(value: Any) -> Sequence[Any]:
 def _states(state: State | Snapshot | Sequence[State]) -> Sequence[State]:
     if any(isinstance(each, Snapshot) for each in _listed(state)):
         raise SimulationError(
-            "a batch begins anew, from states: simulate(state=snapshot) goes on where a snapshot "
+            "a batch starts again, from states: simulate(state=snapshot) goes on where a snapshot "
             "was taken"
         )
     if isinstance(state, Sequence):

@@ -470,11 +470,11 @@ class Law:
             ) from error
 
     def reset(self) -> None:
-        """Forget what :meth:`torque` has been asked; runs begin anew by themselves."""
+        """Forget what :meth:`torque` has been asked; runs start again by themselves."""
         self._asked = None
 
     def torque(self, t: float, state: State, contacts: Contacts | None) -> NDArray[np.float64]:
-        """Return the joint torques; at t = 0 it begins anew.
+        """Return the joint torques; at t = 0 it starts again.
 
         Parameters
         ----------

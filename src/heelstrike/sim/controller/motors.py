@@ -19,7 +19,7 @@ V² = R τ₀ ω₀, and the amperes, I² = τ² ω₀ / (τ₀ R). Under a cons
 damping d, and nothing else, comes to the speed ω = τ₀ u / (D + d).
 
 While a command is held, ω changes. So commands and torques are two arrays, and torques are found
-anew of the velocity at which they act: at the beginning of a time step, at every stage of an
+again of the velocity at which they act: at the beginning of a time step, at every stage of an
 integration, before an impact.
 """
 

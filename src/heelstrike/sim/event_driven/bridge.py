@@ -189,7 +189,7 @@ def made_energy(count: int, assembly: Assembly, added: Floats) -> bool:
 
 @kernel
 def lend_faces(count: int, candidate: Integers, rows: Rows, modes: Modes, lent: Integers) -> None:
-    """Keep the second faces of candidates, which open ones would look for anew wherever they are.
+    """Keep the second faces of candidates, which open ones would look for again wherever they are.
 
     Those that are lent so are marked.
     """

@@ -198,7 +198,7 @@ class EventDriven(Method):
         clock.begun = 0
 
     def reconsider(self, work: Motion) -> None:
-        """Decide contact modes anew: what they hang on has been changed."""
+        """Decide contact modes again: what they depend on has been changed."""
         work.decision.undecided = 1
 
     def rows_in(self, duration: float, record_every: int) -> int:

@@ -81,7 +81,7 @@ def show_who_carries(
 ) -> None:
     """Let the answer be the forces that the motion follows, where others would lead to another.
 
-    That is where equations leave open who carries what and something slides: friction hangs on it.
+    That is where equations leave open who carries what and something slides: friction needs it.
     """
     if not slides(count, friction, slide, assembly.candidate):
         return

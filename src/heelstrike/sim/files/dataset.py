@@ -50,7 +50,7 @@ EVENTS = {
 }
 GROUND = {
     "ground_corner": Variable(
-        ("corner", "axis"), "m", "corners of the ground; its end segments go on for ever"
+        ("corner", "axis"), "m", "corners of the ground; its end segments go on forever"
     ),
     "ground_friction": Variable(
         ("segment",), "1", "friction coefficient of the segments of the ground"

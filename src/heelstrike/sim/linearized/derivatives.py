@@ -42,7 +42,7 @@ AT_ONCE = 1e-6
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StepDerivatives:
-    """Derivatives of the state (q, v) after some time by what it hangs on, to first order."""
+    """Derivatives of the state (q, v) after some time by what it depends on, to first order."""
 
     begin: float
     end: float
@@ -88,7 +88,7 @@ class StepDerivatives:
         return np.asarray(change)
 
     def adjoint(self, gradient: ArrayLike) -> Gradient:
-        """Return the gradient of a function of the state at the end by all that it hangs on.
+        """Return the gradient of a function of the state at the end by all that it depends on.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ class RunDerivatives:
         return np.array(changes)
 
     def adjoint(self, gradient: ArrayLike) -> Gradient:
-        """Return the gradient of a function of the run's states by all that they hang on.
+        """Return the gradient of a function of the run's states by all that they depend on.
 
         Parameters
         ----------

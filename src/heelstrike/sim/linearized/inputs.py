@@ -1,4 +1,4 @@
-"""What a motion hangs on besides the state in which it begins, as columns of its derivative."""
+"""What a motion depends on besides the state in which it begins, as columns of its derivative."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ them: small, as laws have kinks."""
 
 PRESSED = 1e-3
 """Change of a number that a law remembers, and of forces as a part of them, by which is seen
-whether torques hang on them."""
+whether torques depend on them."""
 
 
 def numbers_in(bundle: Bundle) -> Iterator[tuple[str, Floats, tuple[int, ...]]]:
@@ -219,7 +219,7 @@ class AskedAlong:
             if any(each[label] != held for each in seen) and self._acts_on(label, then):
                 raise SimulationError(
                     f"the controller's memory.{label} keeps something of the state in which the "
-                    "step begins and its torques hang on it, which is not linearised here. "
+                    "step begins and its torques depend on it, which is not linearised here. "
                     "hs.find_limit_cycle takes differences instead"
                 )
 
@@ -234,7 +234,7 @@ class AskedAlong:
             if self._acts_on(label, instant):
                 raise SimulationError(
                     f"the controller's memory.{label} changes within a step and its torques "
-                    "hang on it: it is a state of its own, which is not linearised here. "
+                    "depend on it: it is a state of its own, which is not linearised here. "
                     "hs.floquet_multipliers takes differences of whole steps instead"
                 )
 
@@ -244,8 +244,8 @@ class AskedAlong:
         pressed = replace(instant, seen=Contacts(**seen))
         if not np.array_equal(pressed.torque(), instant.torque()):
             raise SimulationError(
-                "the controller's torques hang on forces of the contacts, which is not linearised "
-                "here. hs.find_limit_cycle takes differences of whole steps instead"
+                "the controller's torques depend on forces of the contacts, which is not "
+                "linearised here. hs.find_limit_cycle takes differences of whole steps instead"
             )
 
     def _remembered(self) -> dict[str, float]:
@@ -254,7 +254,7 @@ class AskedAlong:
         return {label: float(values[place]) for label, values, place in numbers_in(memory)}
 
     def _acts_on(self, wanted: str, instant: Instant) -> bool:
-        """Whether torques hang on a number of the memory at an instant."""
+        """Whether torques depend on a number of the memory at an instant."""
         usual = instant.torque()
         instant.asked.restore(instant.numbers)
         for label, values, place in numbers_in(self._asked.numbers.memory):

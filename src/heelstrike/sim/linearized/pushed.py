@@ -1,4 +1,4 @@
-"""What pushes do to a robot at a time, and how that hangs on where it is."""
+"""What pushes do to a robot at a time, and how that depends on where it is."""
 
 from __future__ import annotations
 

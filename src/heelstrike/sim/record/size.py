@@ -165,7 +165,7 @@ def room() -> int:
 def machine_memory() -> int:
     """Bytes of memory that this machine, or the container on it, has.
 
-    All of it, used or not: whether a run may begin shall not hang on what else is running. Where
+    All of it, used or not: whether a run may begin shall not depend on what else is running. Where
     nobody tells, as much as can be addressed.
     """
     sizes = [sys.maxsize]

@@ -8,7 +8,7 @@ from heelstrike.sim.spatial.run import (
     SpatialRun,
     SpatialSolverCount,
 )
-from heelstrike.sim.spatial.simulation import SpatialSimulation
+from heelstrike.sim.spatial.simulation import SpatialSimulation, SpatialSnapshot
 
 __all__ = [
     "SpatialCertificates",
@@ -18,5 +18,6 @@ __all__ = [
     "SpatialEventKind",
     "SpatialRun",
     "SpatialSimulation",
+    "SpatialSnapshot",
     "SpatialSolverCount",
 ]

@@ -140,6 +140,13 @@ def entry_speed(
 
 
 @kernel
+def is_far(step: float, entry: int, table: BlockTable) -> bool:
+    """Whether something is too far away to be looked at: 100 m/s would not bring it there."""
+    closing = CLOSING if table.kind[entry] == POINT else CLOSING_TURN
+    return table.gap[entry] > FAR * closing * step
+
+
+@kernel
 def could_act(
     model: SpatialModel, step: float, tree: SpatialWorkspace, entry: int, table: BlockTable,
     feet: SpatialFeet, q: Floats, v: Floats,
@@ -148,10 +155,9 @@ def could_act(
     if table.kind[entry] == DRY_JOINT or table.called[entry] == 1:
         return True
     gap = table.gap[entry]
-    near = step * (CLOSING if table.kind[entry] == POINT else CLOSING_TURN)
-    if gap <= near:
+    if gap <= step * (CLOSING if table.kind[entry] == POINT else CLOSING_TURN):
         return True
-    if gap > FAR * near:
+    if is_far(step, entry, table):
         return False
     return gap + 2.0 * step * entry_speed(model, tree, entry, table, feet, q, v) < 0.0
 

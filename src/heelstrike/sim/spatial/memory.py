@@ -23,7 +23,7 @@ KNOWN_SPEED = 1e-12
 """Velocity times the root of a mass (m/s kg^(1/2)) below which nothing is known of free velocities:
 rounding of gravity over a step."""
 
-MOST_ITERATIONS = 150
+MOST_ITERATIONS = 400
 """Iterations of a contact problem in a step."""
 
 

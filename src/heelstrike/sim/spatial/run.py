@@ -79,8 +79,8 @@ class SpatialCertificates:
     penetration: float
     """Deepest penetration of a contact point, in metres."""
     residual: float
-    """Largest residual of a contact problem (natural map, relative to its data), halved steps
-    included."""
+    """Largest residual of a contact problem that a step went on with (natural map, relative to its
+    data)."""
     uncertified: int
     """Steps that went on with a residual above 1e-9, and none above 1e-6."""
     halved: int

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import time as clock_time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.spatial.ground import SpatialGround
 from heelstrike.errors import ControllerError, SimulationError
+from heelstrike.field_texts import dataclass
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.spatial.robot import SpatialRobot, checked_state
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import OnError, RunStatus, Scheme
-from heelstrike.sim.controller.interface import Contacts, Controller, read_only
+from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
 from heelstrike.sim.controller.law import Law, law_of, no_torque
 from heelstrike.sim.controller.raised import EndOfRun, tell
 from heelstrike.sim.frame import Outcome
@@ -23,7 +27,7 @@ from heelstrike.sim.method import Method, whole_steps
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Timing
 from heelstrike.sim.setting import FALL_FRACTION, checked_on_error
-from heelstrike.sim.spatial.controlled import ReadySpatialLaw, words_in_space
+from heelstrike.sim.spatial.controlled import GOES_ON, ReadySpatialLaw, words_in_space
 from heelstrike.sim.spatial.loop import SpatialClock, height_of_mass, spatial_loop
 from heelstrike.sim.spatial.memory import allocate_spatial_memory
 from heelstrike.sim.spatial.pushes import spatial_pushes
@@ -86,6 +90,22 @@ def spatial_ground(ground: Ground | SpatialGround | None) -> SpatialGround:
     raise SimulationError(
         f"ground must be a SpatialGround or a Ground, got {type(ground).__name__}"
     )
+
+
+@dataclass(frozen=True, eq=False)
+class SpatialSnapshot:
+    """A simulation in space at some instant, to be taken up again in the same process."""
+
+    time: float
+    """Simulated time (s)."""
+    robot: SpatialRobot
+    """The robot."""
+    controller: Controller | None = field(repr=False)
+    """What decided its torques."""
+    arrays: Mapping[str, NDArray[Any]] = field(repr=False)
+    """All numbers of the simulation, by name."""
+    numbers: NDArray[Any] | None = field(default=None, repr=False)
+    """The memory of a controller in Python."""
 
 
 class SpatialSimulation:
@@ -249,6 +269,75 @@ class SpatialSimulation:
     @property
     def _now(self) -> str:
         return f"t = {self.time:.6g} s"
+
+    def _kept(self) -> dict[str, Bundle]:
+        """All that its further course hangs on, beside a controller in Python."""
+        law = self._law
+        return {
+            "memory.": self._memory, "clock.": self._clock, "parameters.": law.parameters,
+            "law.": law.memory, "log.": law.log,
+        }  # fmt: skip
+
+    def snapshot(self) -> SpatialSnapshot:
+        """Return everything that the further course hangs on, in this process.
+
+        Raises
+        ------
+        ControllerError
+            If a controller in Python does not take part: it needs methods ``snapshot()``, which
+            returns an array of numbers, and ``restore(numbers)``.
+        """
+        numbers = None if self._python is None else np.array(self._partaking().snapshot())
+        arrays = {
+            name: values.copy()
+            for prefix, bundle in self._kept().items()
+            for name, values in bundle.storage(prefix)
+        }
+        return SpatialSnapshot(self.time, self.robot, self._controller, arrays, numbers)
+
+    def restore(self, snapshot: SpatialSnapshot) -> None:
+        """Be again as a simulation was; the record begins anew.
+
+        Parameters
+        ----------
+        snapshot : SpatialSnapshot
+            Of this simulation, or of one of the same robot and controller.
+
+        Raises
+        ------
+        SimulationError, ControllerError
+            If it is one of another robot, controller or pushes.
+        """
+        if not isinstance(snapshot, SpatialSnapshot):
+            raise SimulationError(f"restore takes a SpatialSnapshot, got {type(snapshot).__name__}")
+        same = snapshot.robot is self.robot and snapshot.controller is self._controller
+        mine = {
+            name: values
+            for prefix, bundle in self._kept().items()
+            for name, values in bundle.storage(prefix)
+        }
+        alike = mine.keys() == snapshot.arrays.keys() and all(
+            values.shape == snapshot.arrays[name].shape for name, values in mine.items()
+        )
+        if not (same and alike):
+            raise SimulationError("the snapshot is one of another robot, controller or pushes")
+        if self._python is not None and snapshot.numbers is not None:
+            self._partaking().restore(snapshot.numbers.copy())
+        for name, values in mine.items():
+            values[...] = snapshot.arrays[name]
+        self._control.robot.ending = GOES_ON
+        self._records.clear()
+        self.status, self.message = RunStatus.COMPLETED, f"restored at {self._now}"
+        self.error = None
+
+    def _partaking(self) -> Partaking:
+        python: Any = self._python
+        if not isinstance(python, Partaking):
+            raise ControllerError(
+                f"{self._name} takes no part in snapshots: give its class methods snapshot(), "
+                "which returns an array of numbers, and restore(numbers)"
+            )
+        return python
 
     def step(self) -> RunStatus:
         """Take one step; return how the simulation goes.

@@ -22,7 +22,12 @@ from heelstrike.dynamics.spatial.equations import (
     solve_factorized,
     state_equations,
 )
-from heelstrike.dynamics.spatial.kinematics import place_of, point_position
+from heelstrike.dynamics.spatial.kinematics import (
+    link_velocities,
+    place_of,
+    point_position,
+    point_velocity,
+)
 from heelstrike.dynamics.spatial.rows import velocity_change
 from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
 from heelstrike.robot.model import Floats, Integers
@@ -32,6 +37,7 @@ from heelstrike.sim.spatial.candidates import (
     NO_ANGLE,
     assemble,
     entry_speed,
+    is_far,
     list_candidates,
     locate_ends,
     locate_points,
@@ -145,7 +151,7 @@ def call_what_is_missed(
         taking_part = table.called[entry] == 1
         for place in range(count):
             taking_part = taking_part or candidate[place] == entry
-        if taking_part:
+        if taking_part or is_far(step, entry, table):
             continue
         speed = entry_speed(model, tree, entry, table, feet, q, v)
         if table.gap[entry] + step * speed < -CLOSED_GAP:
@@ -242,7 +248,6 @@ def solve_step_of(
             steps = memory.tally.steps
             if solve_positions(step, steps, table, memory.solver, assembly, impact) != SOLVED:
                 worst = assembly.answer.residual
-            memory.tally.residual = max(memory.tally.residual, assembly.answer.residual)
             add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
             for row in range(assembly.problem.first[assembly.count]):
                 impact.impulse[row] = assembly.answer.impulse[row]
@@ -251,7 +256,6 @@ def solve_step_of(
                 status = solve_impact_of(step, before, table, memory.solver, assembly, impact)
                 if status != SOLVED:
                     worst = impact.answer.residual
-                memory.tally.residual = max(memory.tally.residual, impact.answer.residual)
                 add_impulses(model, impact.impulse, equations, assembly, next_v)
             else:
                 for k in range(model.nv):
@@ -317,22 +321,21 @@ def share_forces(
 
 
 @kernel
-def find_slip(model: SpatialModel, tree: SpatialWorkspace, v: Floats, feet: SpatialFeet) -> None:
-    """Write the tangential velocity of every contact point at the end of the step."""
+def find_slip(
+    model: SpatialModel, v: Floats, feet: SpatialFeet, tree: SpatialWorkspace, slip: Floats
+) -> None:
+    """Write the tangential velocity of every contact point at the end of the step.
+
+    The links of the tree have the velocities of then, afterwards.
+    """
+    link_velocities(model, v, tree)
     for contact in range(model.nc):
         foot = feet.foot[contact, 0], feet.foot[contact, 1], feet.foot[contact, 2]
-        place = place_of(tree, foot)
-        last = model.last_velocity[model.contact_link[contact]]
-        first = second = 0.0
+        speed = point_velocity(tree, model.contact_link[contact], foot)
         one = feet.frame[contact, 3], feet.frame[contact, 4], feet.frame[contact, 5]
         two = feet.frame[contact, 6], feet.frame[contact, 7], feet.frame[contact, 8]
-        for a in range(model.depth[last] + 1):
-            k = model.chain[last, a]
-            column = velocity_at(spatial(tree.motion, k), place)
-            first += dot(one, column) * v[k]
-            second += dot(two, column) * v[k]
-        feet.slip[contact, 0] = first
-        feet.slip[contact, 1] = second
+        slip[contact, 0] = dot(one, speed)
+        slip[contact, 1] = dot(two, speed)
 
 
 @kernel
@@ -380,9 +383,15 @@ def take_step(
             step, length, memory.tally.steps, memory.impact.impulse, memory.assembly, memory.blocks
         )  # fmt: skip
         gain += memory.impact.gain
+        if memory.assembly.count > 0:
+            memory.tally.residual = max(memory.tally.residual, memory.assembly.answer.residual)
+        if memory.impact.happens == 1:
+            memory.tally.residual = max(memory.tally.residual, memory.impact.answer.residual)
         memory.tally.relaxed += memory.impact.relaxed
         if done + 1 == parts:
-            find_slip(model, memory.equations.tree, memory.next_v, memory.feet)
+            find_slip(
+                model, memory.next_v, memory.feet, memory.equations.tree, memory.feet.slip
+            )  # fmt: skip
         integrate(model, memory.q, memory.impact.arriving, step, memory.q)
         for k in range(model.nv):
             memory.v[k] = memory.next_v[k]

@@ -5,7 +5,7 @@ Where a scheme takes springs and dampers as at the beginning of a step, a spring
 of A⁻¹ (h² K / 4 + h D / 2), as it moves freely: what the ground or loops hold can only swing more
 slowly (Rayleigh).
 
-Below that a spring makes no energy for ever, but the step swings with the energy of another one::
+Below that a spring makes no energy forever, but the step swings with the energy of another one::
 
     v²/2 + ω² q²/2 − h ω² q v/2    stays, so that the true energy is up to (1 + s) / (1 − s) times
                                    what it was, with s = h ω / 2

@@ -1,4 +1,4 @@
-"""A simulation seen and touched while it runs: a page in the browser, and its server."""
+"""A simulation live viewer while it runs: a page in the browser, and its server."""
 
 from heelstrike.view.live.viewer import Viewer, watch
 

@@ -197,7 +197,7 @@ class Session:
         on = bool(command["on"])
         if on and self._at_end and (self.live is None or not self.live.can_go_on):
             if self.live is not None:
-                over = f"{self.live.message}. Begin anew, or go on from an earlier time"
+                over = f"{self.live.message}. Start again, or go on from an earlier time"
                 raise RefusedError(over)
             self._move(self.history.time[0])
         self.playing = on
@@ -275,7 +275,7 @@ class Session:
         if not self._at_end:
             self._go_on_from_cursor()
         if not live.can_go_on:
-            raise RefusedError(f"{live.message}. Begin anew, or move it at an earlier time")
+            raise RefusedError(f"{live.message}. Start again, or move it at an earlier time")
         live.move(joint, position)
         self.history.take(_seen(live))
         assert self._layout is not None

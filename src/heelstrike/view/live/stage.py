@@ -1,4 +1,4 @@
-"""What can be set of a live simulation, and who makes it anew when it is."""
+"""What can be set of a live simulation, and who makes it again when it is."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Control:
     """low, high, step: Bounds of a number and the distance between two that a slider offers."""
     unit: str = ""
     at_once: bool = False
-    """Whether it acts at once; otherwise the simulation begins anew."""
+    """Whether it acts at once; otherwise the simulation starts again."""
     resets: tuple[str, ...] = ()
     """Controls that have their first values again when this one is set."""
 
@@ -93,7 +93,7 @@ class Stage(ABC):
         return None
 
     def found(self, values: Mapping[str, Any], simulation: Simulation) -> dict[str, Any]:
-        """Values as they are in a simulation that has begun anew, or was taken back.
+        """Values as they are in a simulation that has started again, or was taken back.
 
         What was set at once and later than that is forgotten with all else that came later.
         """

@@ -134,7 +134,7 @@ def watch(
     """Look at a simulation while it goes on, or at a run, in a browser.
 
     A simulation goes on as long as somebody looks: it can be halted, stepped, taken back, pushed
-    with the mouse. The view has it to itself until it is closed, and begins its record anew again
+    with the mouse. The view has it to itself until it is closed, and begins its record again again
     and again. An error in its controller ends it with a warning. The server listens on 127.0.0.1
     only, and lets in who has the token in the address.
 

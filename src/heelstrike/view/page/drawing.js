@@ -9,7 +9,7 @@
                 two corners are a bone `width` points wide, more are an outline; foot -1: of none
      contacts   [{foot, name}]; feet: [{name}]
      size       of the robot (m); weight (N), whose arrow is WEIGHT_LENGTH of the size
-     ground     [x, z, …] corners (m); the first and last segment go on for ever
+     ground     [x, z, …] corners (m); the first and last segment go on forever
    frame: one instant; lists or typed arrays of numbers, NaN (or null) for what there is not
      time       s
      pose       [x, z, angle] a link (m, m, rad about +y: positive leans towards +x)

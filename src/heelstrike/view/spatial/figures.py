@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from heelstrike.analysis.spatial.support import pressure_in_space
+from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
 from heelstrike.robot.model import Floats
@@ -55,9 +55,9 @@ def _forces(run: SpatialRun) -> tuple[str, list[Panel]]:
 
 def _zero_moment_point(run: SpatialRun) -> tuple[str, list[Panel]]:
     """Zero moment point in the world, and how far inside the support polygon it is."""
-    found = pressure_in_space(run)
+    found = spatial_zero_moment_point(run)
     panels = [
-        Panel("m", [Curve(found.point[:, k])], title=f"zero moment point along {AXES[k]}")
+        Panel("m", [Curve(found.total[:, k])], title=f"zero moment point along {AXES[k]}")
         for k in range(2)
     ]
     panels.append(

@@ -10,8 +10,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from heelstrike.analysis.spatial.motion import motion_in_space
-from heelstrike.analysis.spatial.support import pressure_in_space
+from heelstrike.analysis.spatial.links import link_motion
+from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.spatial.run import SpatialRun
@@ -61,8 +61,8 @@ class SpatialFilm:
         axes.set_axis_off()
         scale = min(size) / 540.0
         self._stage = Stage(axes, run.robot, run.ground, width=scale)
-        self._motion = motion_in_space(run, rows)
-        self._support = pressure_in_space(run, rows).polygon
+        self._motion = link_motion(run, rows)
+        self._support = spatial_zero_moment_point(run, rows).polygon
         self._forces = shown_forces(run, rows, since=True)
         self._pressure = middle_of_pressure(self._forces, run.robot.weight)
         self._cameras = self._follow(interval)

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.analysis.spatial.motion import motion_in_space
-from heelstrike.analysis.spatial.support import capture_point_in_space, pressure_in_space
+from heelstrike.analysis.spatial.links import link_motion
+from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 from heelstrike.contact.spatial.ground import SpatialGround
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.robot import SpatialRobot, quaternion_places
@@ -104,18 +104,16 @@ def _solids(body: SpatialBody, links: int) -> list[dict[str, Any]]:
 
 def moving_columns(run: SpatialRun, rows: Rows) -> dict[str, Floats]:
     """Return what ``space.js`` draws in each row shown, by the names that it has there."""
-    motion = motion_in_space(run, rows)
+    motion, found = link_motion(run, rows), spatial_zero_moment_point(run, rows)
     forces = shown_forces(run, rows)
     floor = 1e-6 * max(run.robot.weight, 1e-300)
     pressed = forces.normal > floor
     columns = {
         "position": _continuous(run, rows),
         "center": motion.center_of_mass,
-        "capture": capture_point_in_space(
-            run, motion.center_of_mass, motion.center_of_mass_velocity
-        ),
+        "capture": found.capture_point,
         "pressure": middle_of_pressure(forces, run.robot.weight),
-        "support": _polygons(pressure_in_space(run, rows).polygon),
+        "support": _polygons(found.polygon),
     }
     for i, group in enumerate(force_groups(run.robot)):
         ever = pressed[:, i]
@@ -167,7 +165,7 @@ def _feet(run: SpatialRun, rows: Rows) -> list[Plot]:
         traces.append(Trace(total, in_words(foot.name), i, i and DASHED))
     if not feet:
         traces.append(Trace(forces.normal.sum(axis=1), "robot"))
-    found = pressure_in_space(run, rows)
+    found = spatial_zero_moment_point(run, rows)
     usual = np.concatenate([each.values for each in traces if each.values is not None])
     top = max(1.3 * robot.weight, 1.15 * float(np.quantile(usual, 0.97)))
     return [
@@ -183,7 +181,7 @@ def _feet(run: SpatialRun, rows: Rows) -> list[Plot]:
 
 
 def _center(run: SpatialRun, rows: Rows) -> list[Plot]:
-    motion = motion_in_space(run, rows)
+    motion = link_motion(run, rows)
     axes = ("x", "y", "z")
     return [
         Plot(

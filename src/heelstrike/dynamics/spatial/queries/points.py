@@ -93,6 +93,23 @@ def contact_jacobian(at: SpatialEvaluation, contacts: Iterable[int | str] | None
     return result
 
 
+@of_state("(k, 3) float: Normal (up) and tangential (x, y), in m/s².")
+def contact_bias_acceleration(
+    at: SpatialEvaluation, contacts: Iterable[int | str] | None = None
+) -> Floats:
+    """J̇v of :func:`contact_jacobian`.
+
+    It belongs to the gap and to the sliding velocity of each sphere or rim: a sphere that rolls on
+    the ground has neither.
+    """
+    found = spatial_contacts(at.robot, contacts)
+    result = at.zeros(len(found), 3)
+    for row, contact in zip(result, found, strict=True):
+        x, y, z = at.run(rows.contact_bias, at.model, at.work, contact, UP)
+        row[:] = z, x, y
+    return result
+
+
 def _rows(at: SpatialEvaluation, link: int, position: Vector, frame: Matrix) -> Any:
     """Rows (3, nv) of the Jacobian of a point, in the axes of a frame."""
     along = at.zeros(3, at.model.longest)

@@ -37,7 +37,7 @@ def sdf(robot: Robot) -> Element:
     """Return a robot as an SDF document; warn of what the format cannot hold.
 
     A link frame is that of the model; the zero of a coordinate is where the links are drawn. A
-    floating base hangs on the world by its three joints, with massless links between them.
+    floating base is attached to the world by its three joints, with massless links between them.
     """
     model = robot.model
     held = tuple(name for name in PROPERTIES if name not in LOST)

@@ -37,7 +37,7 @@ def urdf(robot: Robot) -> Element:
     """Return a robot as a URDF document; warn of what the format cannot hold.
 
     A link frame is that of the model; the zero of a coordinate is URDF's own. A floating base
-    hangs on the link ``world`` by its three joints, with massless links between them.
+    depends on the link ``world`` by its three joints, with massless links between them.
     """
     model = robot.model
     idle = np.setdiff1d(joints_with(robot, "armature"), model.actuator_joint)

@@ -84,7 +84,7 @@ def _make_local(body: Element, above: Floats, label: str) -> None:
 
 
 def _place_of(body: Element, above: Floats, label: str) -> Floats:
-    """Place of a body; nothing hangs on it here, so files with none that can be read were used."""
+    """Place of a body; nothing depends on it here, so files that have none were used."""
     if body.get("pos") is None:
         return above
     try:

@@ -164,8 +164,8 @@ def check_urdf_tree(root: Element, label: str) -> None:
             way.append(link)
             if len(way) > len(parents):
                 raise RobotError(
-                    f"{label}: link {link!r} hangs on itself, through a circle of joints. Links of "
-                    "a URDF make a tree: remove one of these joints."
+                    f"{label}: link {link!r} is attached to itself, through a circle of joints. "
+                    "Links of a URDF make a tree: remove one of these joints."
                 )
             link = parents[link]
         depth = depths[link]

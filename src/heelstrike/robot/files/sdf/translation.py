@@ -191,8 +191,9 @@ def _write_tree(model: _Model, element: Element, joints: list[Element], world: N
         way = []
         while name not in bodies and name != WORLD:
             if name in way:
-                raise error(links[name], model.label, f"link {name!r} hangs on itself, through a "
-                            "circle of joints. Links make a tree: remove one.")  # fmt: skip
+                raise error(links[name], model.label, f"link {name!r} is attached to itself, "
+                            "through a circle of joints. Links make a tree: remove "
+                            "one.")  # fmt: skip
             way.append(name)
             name = above[name][1] if name in above else WORLD
         for link in reversed(way):
@@ -212,7 +213,7 @@ def _write_tree(model: _Model, element: Element, joints: list[Element], world: N
 
 
 def _below(model: _Model, link: str, joint: Element | None, parent: str) -> Floats:
-    """Pose of a link in the link (or world) that it hangs on."""
+    """Pose of a link in the link (or world) that it depends on."""
     pose, asking = model.frames.pose, model.frames.given[link][0]
     above = inverse(pose(parent, asking))
     if joint is not None and joint.get("type") == PLANAR:

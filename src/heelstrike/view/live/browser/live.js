@@ -267,7 +267,7 @@
   const WAYS = [["drag a part", "push it there"], ["drag the ground, wheel", "move, zoom"],
     ["double click, 0", "the usual view"], ["space", "play, pause"],
     ["← →", "one step back, forth"], ["shift ← →", "event before, next event"],
-    ["+ −", "zoom"], ["g", "go on from the time that is looked at"], ["r", "begin anew"],
+    ["+ −", "zoom"], ["g", "go on from the time that is looked at"], ["r", "start again"],
     ["p", "random push"], ["i, v", "save the picture; record a film"], ["l", "copy a link"],
     ["d", "light or dark"]];
   at("key-list").append(...WAYS.flatMap(([key, what]) => {

@@ -78,7 +78,7 @@ var HeelstrikeSettings = (view) => {
       sets.set(control.name, one.set);
       line = one.line;
     }
-    line.title = control.at_once ? "acts at once" : "begins anew with it";
+    line.title = control.at_once ? "acts at once" : "starts again with it";
     return line;
   }
 

@@ -9,7 +9,7 @@ import pytest
 import walking
 
 from heelstrike.errors import GaitError
-from heelstrike.gait.motion_files import load_recorded_motion
+from heelstrike.gait.recordings.motion import load_recorded_motion
 
 NAMES = walking.bravo7().actuator_names
 ROWS = np.linspace(-0.5, 0.5, 60).reshape(10, 6)
@@ -58,8 +58,9 @@ def test_a_rate_and_a_unit_that_the_file_does_not_say(tmp_path: Path) -> None:
         (",".join(["time", "t", *NAMES]), np.hstack((ROWS, ROWS[:, :2])), "two columns"),
         (",".join(["time", *NAMES]), np.hstack((ROWS[::-1, :1], ROWS)), "time does not go on"),
         (",".join(["time", *NAMES]), np.hstack((ROWS[:, :1], np.full((10, 6), np.nan))),
-         "row 2: 7 finite numbers"),
-        (",".join(["time", *NAMES]), ROWS, "row 2: 7 finite numbers"),
+         "line 2: 7 finite numbers"),
+        (",".join(["time", *NAMES]), ROWS, "line 2: 7 finite numbers"),
+        ("# of a robot\n\n" + ",".join(["time", *NAMES]), ROWS, "line 4: 7 finite numbers"),
         (",".join(["time", *NAMES]), np.hstack((ROWS[:, :1], ROWS))[:3], "at least 8 rows"),
     ],
 )  # fmt: skip

@@ -1,0 +1,221 @@
+"""``heelstrike compare --engines``: the same walk in other engines."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from heelstrike.cli.terminal import output, stage, tell, wrote
+
+if TYPE_CHECKING:
+    from heelstrike.experiments.engine_comparison import EngineComparison
+    from heelstrike.experiments.walk import Beginning, Case
+
+QUICK_STEPS, QUICK_SIZES = 4, (1e-3,)
+"""Walking steps and step sizes (s) of a quick comparison."""
+
+
+@dataclass(frozen=True)
+class InEngines:
+    """Which engines a walk is compared in, and how."""
+
+    engines: Annotated[
+        str | None,
+        typer.Option(
+            metavar="all|NAME,...",
+            help="Walk in other engines instead, by their names with commas between.",
+        ),
+    ] = None
+    settings: Annotated[
+        str, typer.Option(help="Settings of the engines: defaults, best, or both with a comma.")
+    ] = "defaults,best"
+    sizes: Annotated[
+        str | None,
+        typer.Option(
+            help="Steps of the engines in s, with commas between.",
+            show_default="2e-3,1e-3,5e-4,2e-4",
+        ),
+    ] = None
+    period: Annotated[
+        float, typer.Option(help="Seconds between two calls of the law, in engines.")
+    ] = 2e-3
+    search: Annotated[
+        bool,
+        typer.Option("--search", help="Search for the best settings of the engines instead."),
+    ] = False
+    scenes: Annotated[
+        bool,
+        typer.Option(
+            "--scenes", help="Ask engines for scenes with closed forms, too, and for guards."
+        ),
+    ] = False
+    page: Annotated[
+        Path | None,
+        typer.Option(
+            dir_okay=False, help="Write a page of what engines made of walks and scenes in --out."
+        ),
+    ] = None
+    films: Annotated[
+        bool, typer.Option("--films", help="Write films of the walks in engines that fall.")
+    ] = False
+    quick: Annotated[
+        bool, typer.Option("--quick", help="In engines: four steps at 1 ms, for a try.")
+    ] = False
+
+
+def compare_in_engines(
+    case: Case, start: Beginning, asked: InEngines, steps: int, out: Path, *, as_json: bool
+) -> None:
+    """Walk a case in other engines; tell, write and draw what came of it."""
+    from heelstrike.experiments.engine_comparison import compare_engines
+    from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD, STEP_SIZES
+    from heelstrike.view.style import save_figure
+    from heelstrike.whole_file import write_whole
+
+    assert asked.engines is not None
+    assert start.controller is not None
+    _check(case)
+    assert case.followed is not None
+    if asked.search:
+        _search(case, start, asked, out)
+        return
+    sizes: tuple[float, ...] = QUICK_SIZES if asked.quick else STEP_SIZES
+    if asked.sizes is not None:
+        sizes = tuple(float(each) for each in asked.sizes.split(","))
+    names = asked.engines.split(",")
+    with stage("walking in engines") as show:
+        comparison = compare_engines(
+            case.robot,
+            start.controller,
+            case.followed,
+            engines="all" if names == ["all"] else names,
+            steps=QUICK_STEPS if asked.quick else steps,
+            step_sizes=sizes,
+            settings=asked.settings.split(","),
+            control_period=asked.period,
+            friction=_friction(case),
+            folder=out / "engines",
+            films=asked.films,
+            progress=show.doing,
+        )
+    out.mkdir(parents=True, exist_ok=True)
+    law = type(start.controller).__name__
+    if asked.period != CONTROL_PERIOD:
+        law += f"-every-{1e3 * asked.period:g}-ms"
+    text = json.dumps(comparison.to_dict(), indent=2, ensure_ascii=False)
+    wrote(write_whole(out / f"engines-{law}.json", text + "\n"))
+    if as_json:
+        typer.echo(text)
+    else:
+        output().print(comparison)
+    save_figure(comparison.plot(), out / "engines.png")
+    tell(f"in {out}: engines-{law}.json, engines.png")
+    if asked.scenes:
+        _scenes(case, names, out, as_json=as_json)
+    if asked.page is not None:
+        _write_page(comparison, out, asked.page)
+
+
+def _scenes(case: Case, names: list[str], out: Path, *, as_json: bool) -> None:
+    """Ask engines for scenes whose ends are known, and whether they have the robot at all."""
+    from dataclasses import asdict
+
+    from heelstrike.experiments.engine_comparison import compare_scenes, guard
+    from heelstrike.experiments.engine_comparison.entries import entries_called
+    from heelstrike.experiments.engines import InvalidRunError
+    from heelstrike.whole_file import write_whole
+
+    engines: str | list[str] = "all" if names == ["all"] else names
+    with stage("simulating scenes with closed forms") as show:
+        table = compare_scenes(engines=engines, progress=show.doing)
+    guards: dict[str, dict[str, object]] = {}
+    with stage("asking whether engines have the robot") as show:
+        for name, entry in entries_called(engines).items():
+            show.doing(f"asking whether {entry.title} has the robot", 0.0)
+            try:
+                found = guard(entry, case.robot, entry.given)
+            except InvalidRunError as error:
+                guards[name] = {"reason": str(error)}
+            else:
+                guards[name] = asdict(found) | {"holds": found.holds}
+    told = {**table.to_dict(), "guards": guards}
+    text = json.dumps(told, indent=2, ensure_ascii=False)
+    wrote(write_whole(out / "scenes.json", text + "\n"))
+    if not as_json:
+        output().print(table)
+    tell(f"in {out}: scenes.json")
+
+
+def _write_page(comparison: EngineComparison, out: Path, page: Path) -> None:
+    """Write the page of all that lies in a folder, and its figure beside it."""
+    from heelstrike.experiments.engine_comparison.page import engines_page
+    from heelstrike.view.style import save_figure
+    from heelstrike.whole_file import write_whole
+
+    images = page.parent / "images"
+    images.mkdir(parents=True, exist_ok=True)
+    figure = images / f"{page.stem}.png"
+    wrote(write_whole(page, engines_page(out, f"images/{figure.name}")))
+    save_figure(comparison.plot(), figure)
+    tell(f"{page}, {figure}")
+
+
+def _check(case: Case) -> None:
+    """Refuse what engines are not asked for."""
+    from heelstrike.errors import SimulationError
+
+    ground = case.ground.model()
+    level = case.ground.shape is None and not ground.vertices[:, 1].any()
+    if not level or case.pushes or ground.restitution.any():
+        raise SimulationError(
+            "engines are compared on level ground without restitution or pushes: leave --ground, "
+            "--restitution and --push out"
+        )
+    if case.followed is None:
+        raise SimulationError("engines are compared by a walk under a gait, which this one is not")
+
+
+def _friction(case: Case) -> float:
+    return float(case.ground.model().friction.min())
+
+
+def _search(case: Case, start: Beginning, asked: InEngines, out: Path) -> None:
+    """Search for the best settings, and write them with what made them."""
+    from dataclasses import asdict
+
+    from heelstrike.experiments.engine_comparison import search
+    from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
+    from heelstrike.experiments.engine_comparison.entries import entries_called
+    from heelstrike.experiments.engine_comparison.walk import Walk
+    from heelstrike.experiments.engines import InvalidRunError
+    from heelstrike.experiments.engines.packages import peers
+    from heelstrike.whole_file import write_whole
+
+    assert asked.engines is not None
+    assert case.followed is not None
+    assert start.controller is not None
+    walk = Walk(
+        case.robot, start.controller, case.followed, search.STEPS, CONTROL_PERIOD,
+        _friction(case), 60.0,
+    )  # fmt: skip
+    versions = peers(load=False)
+    file = out / "best_settings.json"
+    out.mkdir(parents=True, exist_ok=True)
+    found = json.loads(file.read_text()) if file.exists() else {}
+    for name, entry in entries_called(asked.engines.split(",")).items():
+        with stage(f"searching for the best settings of {entry.title}") as show:
+            try:
+                best = search.search_settings(
+                    name, entry, walk, versions, lambda text: show.doing(text, 0.0)
+                )
+            except InvalidRunError as error:
+                tell(f"{entry.title}: {error}")
+                continue
+        found[name] = asdict(best)
+        write_whole(file, json.dumps(found, indent=2) + "\n")
+        tell(f"{entry.title}: {dict(best.settings) or 'the defaults'}, {best.error:.2g}")
+    wrote(file)

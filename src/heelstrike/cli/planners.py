@@ -1,0 +1,65 @@
+"""``heelstrike planners``: the cart table against the optimal gait."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from heelstrike.cli.options import AsJson, Friction, Reading, RobotName
+from heelstrike.cli.terminal import FAILED, output, spoken, stage, tell, wrote
+from heelstrike.cli.values import numbers_called
+
+
+# As many arguments as the command has options: a person's, none of which is handed on one by one.
+@spoken
+def planners(
+    robot: RobotName = "bravo7",
+    *,
+    speeds: Annotated[
+        str, typer.Option(metavar="V,V,...", help="Speeds in m/s, with commas between.")
+    ] = "0.2,0.3,0.4,0.5,0.6",
+    step_duration: Annotated[float, typer.Option(help="Duration of a step in s.")] = 0.7,
+    friction: Friction = 0.75,
+    steps: Annotated[int, typer.Option(min=2, help="Steps of each walk.")] = 10,
+    how: Reading,
+    out: Annotated[
+        Path, typer.Option(file_okay=False, help="Directory for the table and the figure.")
+    ] = Path("planners"),
+    as_json: AsJson = False,
+) -> None:
+    """Compare walks planned by the cart-table model with the optimal gait.
+
+    The zero moment point is planned first, by preview control or by the capture point, and the
+    joints follow by inverse kinematics; the optimal gait needs the least torque. All are walked
+    event-driven. The exit status is 1 if one of them falls or cannot be planned.
+    """
+    with stage("loading"):
+        from heelstrike.experiments.planners import compare_planners
+        from heelstrike.robot import builtin_robots, load_robot
+        from heelstrike.view.planner_figure import draw_planners
+        from heelstrike.view.style import save_figure
+        from heelstrike.whole_file import write_whole
+
+        built_in = robot in builtin_robots()
+        machine = load_robot(robot) if built_in else load_robot(robot, **how.keywords())
+        asked = numbers_called(speeds, "--speeds")
+    with stage("walking") as doing:
+        found = compare_planners(
+            machine, speeds=asked, step_duration=step_duration, friction=friction, steps=steps,
+            progress=lambda what: doing.doing(what, 0.0),
+        )  # fmt: skip
+    out.mkdir(parents=True, exist_ok=True)
+    told = found.to_dict()
+    text = json.dumps(told, indent=2)
+    wrote(write_whole(out / "planners.json", text + "\n"))
+    if as_json:
+        typer.echo(text)
+    else:
+        output().print(found)
+    save_figure(draw_planners(machine, told["walks"]), out / "planners.png")
+    tell(f"in {out}: planners.json, planners.png")
+    if not all(each.walks for each in found.walks):
+        raise typer.Exit(FAILED)

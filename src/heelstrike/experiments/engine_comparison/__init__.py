@@ -1,0 +1,25 @@
+"""The same robot, gait and law of control in other engines, and what each gets right."""
+
+from heelstrike.experiments.engine_comparison.comparison import EngineComparison, compare_engines
+from heelstrike.experiments.engine_comparison.figures import WalkFigures
+from heelstrike.experiments.engine_comparison.guards import Guards, guard
+from heelstrike.experiments.engine_comparison.rows import EngineRow
+from heelstrike.experiments.engine_comparison.scene_table import (
+    SceneRow,
+    SceneTable,
+    compare_scenes,
+)
+from heelstrike.experiments.engine_comparison.walking import walk_in
+
+__all__ = [
+    "EngineComparison",
+    "EngineRow",
+    "Guards",
+    "SceneRow",
+    "SceneTable",
+    "WalkFigures",
+    "compare_engines",
+    "compare_scenes",
+    "guard",
+    "walk_in",
+]

@@ -1,0 +1,207 @@
+"""The same gait walked in every engine: what is simulated, kept, and told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Group
+
+from heelstrike.analysis.summary import plain
+from heelstrike.arguments import takes
+from heelstrike.errors import SimulationError
+from heelstrike.experiments.engine_comparison.entries import ABSENT, entries_called
+from heelstrike.experiments.engine_comparison.figures import WalkFigures, walk_figures
+from heelstrike.experiments.engine_comparison.kept import KeptRows
+from heelstrike.experiments.engine_comparison.rows import EngineRow
+from heelstrike.experiments.engine_comparison.settings import (
+    BEST,
+    DEFAULTS,
+    best_settings,
+    settings_of,
+)
+from heelstrike.experiments.engine_comparison.tables import walk_table
+from heelstrike.experiments.engine_comparison.walk import TRUTH, Walk
+from heelstrike.experiments.engines.packages import peers
+from heelstrike.field_texts import dataclass
+from heelstrike.gait import Gait
+from heelstrike.robot import Robot
+from heelstrike.sim import Controller, TimeStepping
+from heelstrike.sim.controller.law import Law
+from heelstrike.sim.method import Method
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+STEP_SIZES = (2e-3, 1e-3, 5e-4, 2e-4)
+"""Steps (s) of the engines, unless somebody asks for others."""
+
+CONTROL_PERIOD = 2e-3
+"""Seconds between two calls of the controller, the same in all engines: the longest step."""
+
+OURS: Mapping[str, Callable[[float], Method]] = {
+    "heelstrike": lambda step: TimeStepping(step=step),
+}
+"""Our own rows, by the names of commands: a method of a step."""
+
+
+@dataclass(frozen=True, eq=False)
+class EngineComparison:
+    """A gait walked in every engine."""
+
+    robot: str
+    """Name of the robot."""
+    steps: int
+    """Steps that were to be taken."""
+    control_period_s: float
+    """Seconds between two calls of the controller."""
+    truth: WalkFigures
+    """Figures of the run that the others are held against."""
+    versions: Mapping[str, str]
+    """Engines and their versions, or why they are not there."""
+    rows: tuple[EngineRow, ...]
+    """Walks, engine by engine."""
+    absent: Mapping[str, str]
+    """Simulators that are not run here, and why."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain numbers and texts, NaN as None."""
+        found: dict[str, Any] = plain(
+            {
+                "robot": self.robot,
+                "steps": self.steps,
+                "control_period_s": self.control_period_s,
+                "truth": asdict(self.truth),
+                "versions": dict(self.versions),
+                "rows": [asdict(row) for row in self.rows],
+                "absent": dict(self.absent),
+            }
+        )
+        return found
+
+    def plot(self) -> Figure:
+        """Draw the error over the computing time of every engine."""
+        from heelstrike.view.engines_figure import draw_engines
+
+        return draw_engines(
+            [
+                (row.title, row.settings, row.step_s, asdict(row.figures))
+                for row in self.rows
+                if row.figures is not None
+            ]
+        )
+
+    def __rich__(self) -> Group:
+        return walk_table(self)
+
+
+@takes(SimulationError)
+def compare_engines(
+    robot: Robot,
+    controller: Law | Controller,
+    gait: Gait,
+    *,
+    engines: Sequence[str] | str = "all",
+    steps: int = 20,
+    step_sizes: Sequence[float] = STEP_SIZES,
+    settings: Sequence[str] = (DEFAULTS, BEST),
+    control_period: float = CONTROL_PERIOD,
+    friction: float = 0.75,
+    patience: float = 60.0,
+    folder: Path | str | None = None,
+    films: bool = False,
+    progress: Callable[[str, float], None] | None = None,
+) -> EngineComparison:
+    """Walk a gait under a controller in other engines, and say what each gets right.
+
+    Each engine has the robot link by link and its contact points; the controller, which is called
+    with the engine's state and forces, is the same compiled law. Every walk runs in a process of
+    its own: an engine that is missing, aborts or hangs has a row that says so.
+
+    Parameters
+    ----------
+    robot : Robot
+        A planar robot that floats.
+    controller : law or controller
+        What moves it. One in Python is copied for each walk.
+    gait : Gait
+        What it follows, and where it begins.
+    engines : sequence of str or str
+        Names of `ENTRIES`; ``"all"`` is all of them.
+    steps : int
+        Steps to walk.
+    step_sizes : sequence of float
+        Steps of the engines in s.
+    settings : sequence of str
+        ``"defaults"``: as the engine comes; ``"best"``: as the search found them.
+    control_period : float
+        Seconds between two calls of the controller.
+    friction : float
+        Coefficient of the ground.
+    patience : float
+        Seconds that an engine may take for one control period before it counts as hung.
+    folder : path, optional
+        Where walks are kept as they come. What is there already, of the same robot, gait,
+        controller and program, is not walked again.
+    films : bool
+        Whether to write a film (.mp4) of each walk that falls into the folder.
+    progress : callable, optional
+        Called before each walk with a text, and the share of walks that is done.
+
+    Returns
+    -------
+    EngineComparison
+        A row each engine, settings and step.
+
+    Raises
+    ------
+    SimulationError
+        If there is no engine of a name, or the walk is none.
+    """
+    entries = entries_called(engines)
+    if steps < 1:
+        raise SimulationError(f"a walk has at least one step, got {steps}")
+    walk = Walk(robot, controller, gait, steps, control_period, friction, patience)
+    say = progress or (lambda text, share: None)  # noqa: ARG005
+    say("the truth, event by event", 0.0)
+    truth = walk.ours(TRUTH)
+    versions = peers(load=False)
+    kept = KeptRows(folder, walk.entries())
+    asked = [("heelstrike", "heelstrike", DEFAULTS, step) for step in step_sizes]
+    for name, entry in entries.items():
+        for which in settings:
+            if which == BEST and not best_settings().get(name, {}).get("settings"):
+                continue  # none is better than the defaults
+            asked += [(name, entry.title, which, step) for step in step_sizes]
+    rows = []
+    try:
+        for k, (name, title, which, step) in enumerate(asked):
+            say(f"{title}, {which}, {1e3 * step:g} ms", k / len(asked))
+            row = EngineRow(
+                name, title, which, step, None, "",
+                f"heelstrike compare {robot.name} --engines {name} --settings {which} "
+                f"--sizes {step:g} --steps {steps}",
+            )  # fmt: skip
+            if name in OURS:
+                rows.append(kept.row(row, {}, partial(walk.by, OURS[name](step), truth)))
+                continue
+            entry = entries[name]
+            given = settings_of(name, entry, which)
+            told = {"given": given, "version": versions[entry.package]}
+            film = Path(folder) / f"{name}-{which}-{step:g}.mp4" if films and folder else None
+            make = partial(walk.in_engine, entry, step, given, truth, versions, film)
+            rows.append(kept.row(row, told, make))
+    finally:
+        walk.close()
+    return EngineComparison(
+        robot=robot.name,
+        steps=steps,
+        control_period_s=control_period,
+        truth=walk_figures(truth, truth, gait, steps),
+        versions={e.package: versions[e.package] for e in entries.values()},
+        rows=tuple(rows),
+        absent=ABSENT if engines == "all" else {},
+    )

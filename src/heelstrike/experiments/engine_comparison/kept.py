@@ -1,0 +1,81 @@
+"""Rows that are kept as they come: an interrupted comparison goes on where it was.
+
+A row has a file of its own, named by a digest of all that it follows from: robot, gait, law, the
+engine's version and settings, and the text of the rooms that simulate and measure.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from heelstrike.analysis.summary import plain
+from heelstrike.errors import SimulationError
+from heelstrike.experiments.engine_comparison.figures import WalkFigures
+from heelstrike.experiments.engine_comparison.rows import EngineRow
+from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.kept_files import program_digest
+from heelstrike.whole_file import write_whole
+
+ROOMS = ("experiments/engines", "experiments/engine_comparison", "analysis", "sim", "control")
+"""Rooms of this package whose text is in the digest."""
+
+
+class KeptRows:
+    """Rows in a folder.
+
+    Parameters
+    ----------
+    folder : path or None
+        Where they are; None keeps nothing.
+    walk : mapping
+        All that a walk follows from but the engine, as JSON has it.
+    """
+
+    def __init__(self, folder: Path | str | None, walk: Mapping[str, Any]) -> None:
+        self._folder = None if folder is None else Path(folder)
+        self._begun = json.dumps(walk, sort_keys=True).encode()
+        self._begun += program_digest(ROOMS, "numba")
+        if self._folder is not None:
+            self._folder.mkdir(parents=True, exist_ok=True)
+
+    def row(
+        self, row: EngineRow, told: Mapping[str, Any], make: Callable[[], WalkFigures]
+    ) -> EngineRow:
+        """Return a row with its figures, from the folder if they are there.
+
+        Parameters
+        ----------
+        row : EngineRow
+            The row without figures.
+        told : mapping
+            What else they follow from: settings and version of the engine.
+        make : callable
+            Returns the figures, or raises why there are none.
+        """
+        file = None
+        if self._folder is not None:
+            own = json.dumps([row.engine, row.step_s, dict(told)], sort_keys=True)
+            digest = hashlib.sha256(self._begun + own.encode()).hexdigest()[:16]
+            file = self._folder / f"{row.engine}-{row.settings}-{row.step_s:g}-{digest}.json"
+            if file.exists():
+                return replace(row, figures=_figures(json.loads(file.read_text())))
+        try:
+            found = replace(row, figures=make())
+        except (InvalidRunError, SimulationError) as error:
+            return replace(row, reason=str(error))  # the next comparison asks again
+        if file is not None and found.figures is not None:
+            write_whole(file, json.dumps(plain(asdict(found.figures)), indent=1))
+        return found
+
+
+def _figures(entries: Mapping[str, Any]) -> WalkFigures:
+    numbers: dict[str, Any] = {
+        name: math.nan if each is None else each for name, each in entries.items()
+    }
+    return WalkFigures(**numbers)

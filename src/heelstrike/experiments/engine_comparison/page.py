@@ -1,0 +1,324 @@
+"""The page of the comparison: Table 1 of the paper, renewed, and what was measured."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from heelstrike.errors import SimulationError
+from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
+from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
+from heelstrike.experiments.engine_comparison.facts import FACTS
+from heelstrike.experiments.engine_comparison.settings import best_settings
+from heelstrike.experiments.engine_comparison.tables import BY_ITSELF, WALKING, short
+
+SHOWN = 1e-3
+"""Step (s) whose walks the page shows in full."""
+
+Rows = Sequence[Sequence[str]]
+
+
+def engines_page(folder: Path, figure: str) -> str:
+    """Write the page of what lies in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Where ``heelstrike compare --engines`` has left ``engines-LAW.json`` and ``scenes.json``.
+    figure : str
+        Link to the figure.
+
+    Returns
+    -------
+    str
+        Markdown.
+
+    Raises
+    ------
+    SimulationError
+        If it has not.
+    """
+    walks = {
+        file.stem.removeprefix("engines-").replace("-", " "): json.loads(
+            file.read_text(encoding="utf-8")
+        )
+        for file in sorted(folder.glob("engines-*.json"))
+    }
+    scenes_file = folder / "scenes.json"
+    if not walks or not scenes_file.exists():
+        raise SimulationError(
+            f"there is nothing to write a page of in {folder}: heelstrike compare --engines all "
+            "--scenes comes first"
+        )
+    scenes = json.loads(scenes_file.read_text(encoding="utf-8"))
+    parts = [
+        _INTRODUCTION,
+        _table_1(walks, scenes),
+        _best(),
+        *(_walks(law, found) for law, found in walks.items()),
+        f"![Error over computing time]({figure})\n",
+        _peaks(walks),
+        _scenes(scenes),
+        _guards(scenes["guards"]),
+    ]
+    return "\n".join(parts)
+
+
+_INTRODUCTION = """# Other engines
+
+The paper's Table 1 compares simulators by what their pages say. Here the same robot walks the same
+gait under the same law of control in each of their engines, and what each makes of it is held
+against an event-driven run at a tolerance of 1e-9. `heelstrike compare bravo7 --engines all` makes
+these tables; with `--scenes --page docs/engines.md` it writes this page. One engine is
+`--engines mujoco`, a try `--quick`; `--films` shows the walks that fall. How to add one:
+CONTRIBUTING.
+
+Each engine has the robot link by link, and touches the ground by our contact points. It runs in a
+process of its own, is given torques, and tells its state and its contact forces. The law is the
+compiled one of heelstrike, called every 2 ms with the engine's state and forces, whatever the
+engine's step. Times are those of the engine's steps alone, with the calls from Python that a step
+takes, and ours with the law; they were taken beside other work, so that a factor of two means
+little.
+"""
+
+
+def _table(headings: Sequence[str], rows: Rows) -> str:
+    lines = ["| " + " | ".join(headings) + " |", "|" + "---|" * len(headings)]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def _title(name: str) -> str:
+    return "heelstrike" if name == "heelstrike" else ENTRIES[name].title
+
+
+def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
+    versions = next(iter(walks.values()))["versions"]
+    theirs = [
+        [
+            _title(name), "" if name == "heelstrike" else versions[ENTRIES[name].package],
+            f.languages, f.engine, f.graphics, f.licence, f.systems, f.open_source,
+            f.documentation,
+        ]
+        for name, f in FACTS.items()
+    ]  # fmt: skip
+    absent = [[name, "", why, "", "", "", "", "", ""] for name, why in ABSENT.items()]
+    ours = []
+    for name, f in FACTS.items():
+        row = [
+            _title(name),
+            f.contact,
+            f.friction,
+            f.restitution,
+            f.certificate,
+            _creep(scenes, name),
+        ]
+        for found in walks.values():
+            row += [_walks_at(found, name, which) for which in _settings(found)]
+        ours.append(row)
+    headings = ["simulator", "contact", "Coulomb's law", "restitution", "certificate", "creep mm/s"]
+    for law, found in walks.items():
+        headings += [f"{law}, {which}" for which in _settings(found)]
+    return (
+        f"## Table 1, renewed\n\nOf {date.today().isoformat()}, in the paper's columns:\n\n"
+        + _table(
+            ["simulator", "version", "languages", "engine", "graphics", "licence", "systems",
+             "open source", "documented"],
+            [*theirs, *absent],
+        )
+        + "\nIn ours. Creep is how fast a cube slides on a slope that is 0.05 rad less steep than "
+        "its angle of friction, at defaults and a step of 1 ms. The last columns have the steps of "
+        "the engine, in ms, at which bravo7 takes all its steps under a law.\n\n"
+        + _table(headings, ours)
+    )  # fmt: skip
+
+
+def _settings(found: Mapping[str, Any]) -> list[str]:
+    """Settings that a comparison has rows of."""
+    return list(dict.fromkeys(row["settings"] for row in found["rows"]))
+
+
+def _creep(scenes: Mapping[str, Any], name: str) -> str:
+    engine = "event-driven" if name == "heelstrike" else name
+    for row in scenes["rows"]:
+        if row["engine"] == engine and "below" in row["scene"] and row["error"] is not None:
+            return short(abs(1e3 * row["error"]))  # of a scene of one second
+    return "–"
+
+
+def _walks_at(found: Mapping[str, Any], name: str, which: str) -> str:
+    rows = [r for r in found["rows"] if r["engine"] == name and r["settings"] == which]
+    if not rows:
+        return (
+            "as it comes"
+            if which == "best" and not best_settings().get(name, {}).get("settings")
+            else "–"
+        )
+    told = [f"{1e3 * r['step_s']:g}" for r in rows if r["figures"] and r["figures"]["walks"]]
+    return ", ".join(told) or "none"
+
+
+def _best() -> str:
+    rows = [
+        [
+            _title(name),
+            ", ".join(f"{k}={v}" for k, v in found["settings"].items()) or "the defaults",
+            short(1e3 * found["default_error"]) if found["default_error"] < math.inf else "falls",
+            short(1e3 * found["error"]),
+            str(found["tried"]),
+            found["version"],
+            found["date"],
+            f"`{found['command']}`",
+        ]
+        for name, found in best_settings().items()
+    ]
+    advice = [f"- {entry.title}: {entry.advice}." for entry in ENTRIES.values() if entry.advice]
+    return (
+        "## Settings\n\nThe best settings are those of one search, the same for all engines: three "
+        "steps at 1 ms; from the defaults on each setting is tried in its turn, and kept if the "
+        "distance from the truth falls by 2 %. It is one pass, and finds what is good, not proven "
+        "to be the best. Distances in mm and mrad.\n\n"
+        + _table(
+            ["engine", "best", "off, defaults", "off, best", "walks tried", "version", "date",
+             "command"],
+            rows,
+        )
+        + "\nWhat is tried follows the advice of the maintainers:\n\n" + "\n".join(advice) + "\n"
+    )  # fmt: skip
+
+
+def _figure(row: Mapping[str, Any], name: str, factor: float, walks: bool) -> str:
+    value = row["figures"][name]
+    if value is None or (name in WALKING and not walks):
+        return "–"
+    return short(factor * value)
+
+
+def _walks(law: str, found: Mapping[str, Any]) -> str:
+    columns = {**WALKING, **BY_ITSELF}
+    rows = []
+    reasons = []
+    sizes = {row["step_s"] for row in found["rows"]}
+    shown = SHOWN if SHOWN in sizes else max(sizes)
+    name, *_ = law.partition(" ")
+    period = found["control_period_s"]
+    often = "" if period == CONTROL_PERIOD else f" --period {period:g}"
+    for row in found["rows"]:
+        if row["step_s"] != shown:
+            continue
+        title = _title(row["engine"])
+        if row["figures"] is None:
+            reasons.append(f"- {title}, {row['settings']}: {row['reason']}.")
+            continue
+        walks = row["figures"]["walks"]
+        rows.append(
+            [title, row["settings"], "yes" if walks else f"no, {row['figures']['steps']}"]
+            + [_figure(row, name, factor, walks) for name, (_, factor) in columns.items()]
+        )
+        if not walks:
+            reasons.append(f"- {title}, {row['settings']}: {row['figures']['ending']}.")
+    headings = ["engine", "settings", "walks", *(heading for heading, _ in columns.values())]
+    said = "\nWhy they did not walk:\n\n" + "\n".join(reasons) + "\n" if reasons else ""
+    return (
+        f"## {found['steps']} steps under {law}\n\nAt a step of {1e3 * shown:g} ms. *off* is the "
+        "root mean square distance of all coordinates from the truth over the walk; *lands* the "
+        "largest difference of a landing's time, in which errors of every step add up; *noise* "
+        "what the ground's force differs by from its mean over 10 ms in single support, in "
+        "percent of the weight; *energy* what came or went that no work explains, where all forces "
+        "are told as means over steps; *peak* the largest force on a foot over a step, in weights. "
+        f"Each row is `heelstrike compare {found['robot']} --controller {name} --engines NAME "
+        f"--settings SETTINGS --sizes {shown:g} --steps {found['steps']}{often}`.\n\n"
+        + _table(headings, rows) + said
+    )  # fmt: skip
+
+
+def _peaks(walks: Mapping[str, Any]) -> str:
+    law, found = next(
+        ((law, found) for law, found in walks.items() if law == "FootstepFeedback"),
+        next(iter(walks.items())),
+    )
+    sizes = sorted({row["step_s"] for row in found["rows"]}, reverse=True)
+    names = dict.fromkeys((row["engine"], row["settings"]) for row in found["rows"])
+    rows = []
+    for name, which in names:
+        own = {
+            row["step_s"]: row["figures"]
+            for row in found["rows"]
+            if (row["engine"], row["settings"]) == (name, which) and row["figures"]
+        }
+        rows.append(
+            [_title(name), which]
+            + [short(own[h]["peak"]) if h in own else "–" for h in sizes]
+            + [short(own[h]["computing_s"]) if h in own else "–" for h in sizes]
+        )
+    headings = ["engine", "settings"]
+    headings += [f"peak, {1e3 * h:g} ms" for h in sizes]
+    headings += [f"s, {1e3 * h:g} ms" for h in sizes]
+    return (
+        "## Foot force over step size\n\nThe largest force on a foot over a step, in weights, of "
+        f"the same walk under {law}, and the computing time of the walk in s. Where contact is "
+        "hard a landing is an impulse within one step, and its force grows as the step shrinks; "
+        "where it is soft the force stays, and is that of the spring.\n\n"
+        + _table(headings, rows)
+    )  # fmt: skip
+
+
+def _scenes(found: Mapping[str, Any]) -> str:
+    names = list(dict.fromkeys((row["engine"], row["title"]) for row in found["rows"]))
+    headings = ["engine", *(str(k + 1) for k in range(len(found["scenes"])))]
+    rows = []
+    for engine, title in names:
+        told = [title]
+        for name, *_ in found["scenes"]:
+            row = next(r for r in found["rows"] if (r["engine"], r["scene"]) == (engine, name))
+            told.append("–" if row["error"] is None else short(row["error"]))
+        rows.append(told)
+    listed = [
+        f"{k + 1}. {name}: {exact:.6g} {unit}; {words}."
+        for k, (name, exact, unit, words) in enumerate(found["scenes"])
+    ]
+    why = dict.fromkeys(
+        f"- {row['title']}, {row['scene']}: {row['reason']}."
+        for row in found["rows"]
+        if row["error"] is None and "restitution" not in row["reason"]
+    )
+    return (
+        f"## Scenes with closed forms\n\nErrors at a step of {1e3 * found['step_s']:g} ms and "
+        f"{found['settings']}, in the units of:\n\n" + "\n".join(listed) + "\n\n"
+        + _table(headings, rows)
+        + "\nA dash among the bouncing balls is an engine that takes no coefficient of "
+        "restitution."
+        + ("\n\n" + "\n".join(why) if why else "")
+        + "\n"
+    )  # fmt: skip
+
+
+def _guards(found: Mapping[str, Any]) -> str:
+    rows = []
+    for name, guards in found.items():
+        if "reason" in guards:
+            rows.append([_title(name), guards["reason"], "", "", "", "", "no"])
+            continue
+        rows.append(
+            [
+                _title(name), "single" if guards["float32"] else "double",
+                short(guards["flight"]), f"{guards['order']:.2f}" if guards["order"] else "–",
+                short(guards["extrapolated"]), f"{guards['weight']:.4f}",
+                "yes" if guards["holds"] else "no",
+            ]
+        )  # fmt: skip
+    return (
+        "## Guards\n\nThat an engine has our robot is told by two things: a flight of 0.1 s, "
+        "turning in all joints, whose difference from ours at steps of 1, 0.5 and 0.25 ms is "
+        "extrapolated to no step (at most 1e-6, in single precision 1e-3), and the forces on the "
+        "robot at rest (its weight to 1 %).\n\n"
+        + _table(
+            ["engine", "precision", "flight, 0.25 ms", "order", "extrapolated", "weight",
+             "holds"],
+            rows,
+        )
+    )  # fmt: skip

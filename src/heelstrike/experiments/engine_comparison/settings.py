@@ -1,0 +1,55 @@
+"""Settings of the engines: their defaults, and the best that the search found."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from heelstrike.errors import SimulationError
+from heelstrike.experiments.engine_comparison.entries import Entry
+
+DEFAULTS, BEST = "defaults", "best"
+
+FILE = Path(__file__).with_name("best_settings.json")
+"""What the search found, with the command that made it, versions and dates."""
+
+
+@cache
+def best_settings() -> dict[str, Any]:
+    """Return what the search found, by the names of rows; empty if it has not been made."""
+    if not FILE.exists():
+        return {}
+    found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    return found
+
+
+def settings_of(name: str, entry: Entry, which: str) -> dict[str, Any]:
+    """Return settings of a row's adapter.
+
+    Parameters
+    ----------
+    name : str
+        Name of the row.
+    entry : Entry
+        The row.
+    which : str
+        ``"defaults"`` or ``"best"``.
+
+    Returns
+    -------
+    dict
+        What is handed to its adapter.
+
+    Raises
+    ------
+    SimulationError
+        If it is neither.
+    """
+    if which not in (DEFAULTS, BEST):
+        raise SimulationError(f"settings are {DEFAULTS!r} or {BEST!r}, got {which!r}")
+    found = dict(entry.given)
+    if which == BEST:
+        found |= best_settings().get(name, {}).get("settings", {})
+    return found

@@ -1,0 +1,178 @@
+"""What is walked, by whatever moves the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+from heelstrike.contact.ground import Ground
+from heelstrike.experiments.engine_comparison.entries import Entry
+from heelstrike.experiments.engine_comparison.figures import WalkFigures, walk_figures
+from heelstrike.experiments.engine_comparison.walking import walk_in
+from heelstrike.experiments.engines.packages import PACKAGES, compared
+from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.experiments.engines.scenario import Scenario
+from heelstrike.experiments.engines.served import engine_process, served
+from heelstrike.experiments.walk import LAST_STEP
+from heelstrike.field_texts import dataclass
+from heelstrike.gait import Gait
+from heelstrike.gait.file import entries_of
+from heelstrike.reader_process import ReaderProcess
+from heelstrike.robot import Robot
+from heelstrike.robot.files.robot_json import robot_entries
+from heelstrike.sim import Controller, EventDriven, Run, simulate
+from heelstrike.sim.controller.in_python import AskedLaw
+from heelstrike.sim.controller.law import Law
+from heelstrike.sim.method import Method
+from heelstrike.sim.whole_run import whole
+
+TRUTH = EventDriven(rtol=1e-9, atol=1e-11, output_period=1e-3)
+"""What the engines are held against."""
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """What is walked, whatever moves the robot."""
+
+    robot: Robot
+    controller: Law | Controller
+    gait: Gait
+    steps: int
+    control_period: float
+    friction: float
+    patience: float
+    """robot, controller, gait, steps, control_period, friction, patience: As of
+    :func:`compare_engines`."""
+    processes: dict[str, ReaderProcess] = field(default_factory=dict)
+    """Processes of the engines that have walked, by their names."""
+
+    def close(self) -> None:
+        """End the processes of the engines."""
+        for process in self.processes.values():
+            process.end()
+
+    def entries(self) -> dict[str, Any]:
+        """Return all that a walk follows from but the engine, as JSON has it."""
+        law = self.controller
+        asked: Any = AskedLaw(self.robot, law, compiled=True) if isinstance(law, Law) else law
+        begins = asked.snapshot().tolist() if hasattr(asked, "snapshot") else repr(type(law))
+        return {
+            "robot": robot_entries(self.robot),
+            "controller": [str(getattr(asked, "name", type(law).__name__)), begins],
+            "gait": entries_of(self.gait),
+            "steps": self.steps,
+            "control_period": self.control_period,
+            "friction": self.friction,
+        }
+
+    @property
+    def scenario(self) -> Scenario:
+        """What the engines simulate."""
+        duration = (self.steps + LAST_STEP) * self.gait.step_duration
+        return Scenario(
+            "walk", self.robot, self.gait.initial_state, duration, friction=self.friction
+        )
+
+    def ours(self, method: Method) -> Run:
+        """Walk by a method of ours.
+
+        Parameters
+        ----------
+        method : Method
+            Which.
+        """
+        scenario = self.scenario
+        return whole(
+            simulate(
+                self.robot,
+                self.controller,
+                state=scenario.state,
+                duration=scenario.duration,
+                method=method,
+                ground=Ground(friction=self.friction),
+                control_period=self.control_period,
+            )
+        )
+
+    def by(self, method: Method, truth: Run) -> WalkFigures:
+        """Walk by a method of ours, and measure it.
+
+        Parameters
+        ----------
+        method : Method
+            Which.
+        truth : Run
+            What is held for true.
+        """
+        return walk_figures(self.ours(method), truth, self.gait, self.steps)
+
+    def in_engine(
+        self, entry: Entry, step: float, given: Mapping[str, Any], truth: Run,
+        versions: Mapping[str, str], film: Path | None = None,
+    ) -> WalkFigures:  # fmt: skip
+        """Walk in an engine, and measure it.
+
+        Parameters
+        ----------
+        entry : Entry
+            Its row.
+        step : float
+            Seconds.
+        given : mapping
+            Its settings.
+        truth : Run
+            What is held for true.
+        versions : mapping
+            What :func:`~heelstrike.experiments.engines.peers` says of the engines.
+        film : Path, optional
+            File to show the walk in, if the robot does not walk.
+
+        Raises
+        ------
+        InvalidRunError
+            If the engine is missing, ends, hangs or refuses.
+        """
+        run, told = self.run_in(entry, step, given, versions)
+        found = walk_figures(run, truth, self.gait, self.steps, forces_told=told)
+        if film is not None and not found.walks:
+            run.animate(film)
+        return found
+
+    def run_in(
+        self, entry: Entry, step: float, given: Mapping[str, Any], versions: Mapping[str, str]
+    ) -> tuple[Run, bool]:
+        """Walk in an engine; return the run, and whether all forces are told, as means over steps.
+
+        Parameters
+        ----------
+        entry : Entry
+            Its row.
+        step : float
+            Seconds.
+        given : mapping
+            Its settings.
+        versions : mapping
+            What :func:`~heelstrike.experiments.engines.peers` says of the engines.
+
+        Raises
+        ------
+        InvalidRunError
+            If the engine is missing, ends, hangs or refuses.
+        """
+        state = versions[entry.package]
+        if not compared({entry.package: state}):
+            raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
+        if entry.package not in self.processes:
+            self.processes[entry.package] = engine_process(entry.package)
+        peer = served(
+            entry.package, self.scenario, step, patience=self.patience,
+            process=self.processes[entry.package], **given,
+        )  # fmt: skip
+        controller = self.controller
+        if not isinstance(controller, Law):
+            controller = deepcopy(controller)
+        run = walk_in(peer, controller, control_period=self.control_period, name=entry.title)
+        return run, bool(peer.facts["tells_friction"] and peer.facts["tells_means"])

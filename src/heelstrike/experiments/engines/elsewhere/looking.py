@@ -1,0 +1,31 @@
+"""Whether another Python has a module. It imports nothing of this package."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+from contextlib import suppress
+
+DEBIAN = {"ode": "python3-pyode", "siconos": "python3-siconos"}
+"""Modules that do not know their version, and the packages of Debian they come in."""
+
+
+def version(order: bytes) -> bytes:
+    """Return the version of a module that can be imported; nothing if it cannot.
+
+    Parameters
+    ----------
+    order : bytes
+        Name of the module.
+    """
+    name = order.decode()
+    try:
+        module = importlib.import_module(name)
+    except ImportError:
+        return b""
+    found = getattr(module, "__version__", None)
+    if name in DEBIAN:
+        asked = ["dpkg-query", "-W", "-f", "${Version}", DEBIAN[name]]
+        with suppress(OSError, subprocess.CalledProcessError):  # it is not Debian's
+            found = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
+    return str(found or "unknown version").encode()

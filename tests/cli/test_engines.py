@@ -1,0 +1,77 @@
+"""heelstrike compare --engines: what is asked for is compared, told and written."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import walking
+from experiments.engine_comparison.synthetic import made_up
+from typer.testing import CliRunner
+
+from heelstrike.cli.main import app
+from heelstrike.experiments import engine_comparison
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """What the comparison is asked for, of which a made up one comes."""
+    calls: list[dict[str, Any]] = []
+
+    def compare_engines(robot: Any, controller: Any, gait: Any, **options: Any) -> Any:
+        calls.append({"robot": robot.name, "law": type(controller).__name__, **options})
+        return made_up()
+
+    monkeypatch.setattr(engine_comparison, "compare_engines", compare_engines)
+    return calls
+
+
+def invoke(tmp_path: Path, *options: str) -> Any:
+    gait = tmp_path / "gait.json"
+    walking.gait().save(gait)
+    arguments = ["compare", "bravo7", "--gait", str(gait), "--out", str(tmp_path / "out"), *options]
+    return CliRunner().invoke(app, arguments)
+
+
+def test_engines_are_compared_as_asked(tmp_path: Path, asked: list[dict[str, Any]]) -> None:
+    result = invoke(
+        tmp_path, "--engines", "mujoco,ode", "--sizes", "1e-3,5e-4", "--settings", "best",
+        "--steps", "5", "--controller", "JointPD", "--friction", "0.8",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.stderr
+    (call,) = asked
+    assert call["law"] == "JointPD"
+    assert call["engines"] == ["mujoco", "ode"]
+    assert call["step_sizes"] == (1e-3, 5e-4)
+    assert call["settings"] == ["best"]
+    assert call["control_period"] == 2e-3
+    assert (call["steps"], call["friction"]) == (5, 0.8)
+    written = sorted(file.name for file in (tmp_path / "out").iterdir())
+    assert written == ["engines-JointPD.json", "engines.png"]
+    told = json.loads((tmp_path / "out" / "engines-JointPD.json").read_text())
+    assert [row["engine"] for row in told["rows"]][:2] == ["heelstrike", "mujoco"]
+    assert "ODE is not installed" in " ".join(result.stdout.split())
+
+
+def test_a_quick_comparison_takes_few_steps(tmp_path: Path, asked: list[dict[str, Any]]) -> None:
+    result = invoke(tmp_path, "--engines", "all", "--quick", "--json")
+    assert result.exit_code == 0, result.stderr
+    assert asked[0]["engines"] == "all"
+    assert (asked[0]["steps"], asked[0]["step_sizes"]) == (4, (1e-3,))
+    assert json.loads(result.stdout)["robot"] == "bravo7"
+
+
+def test_what_engines_are_not_asked_for_is_refused(
+    tmp_path: Path, asked: list[dict[str, Any]]
+) -> None:
+    for options in (
+        ["--ground", "slope:-3"],
+        ["--push", "trunk:50:1:0.1"],
+        ["--restitution", "0.5"],
+    ):
+        result = invoke(tmp_path, "--engines", "mujoco", *options)
+        assert result.exit_code == 2
+        assert "on level ground without restitution or pushes" in " ".join(result.stderr.split())
+    assert not asked

@@ -1,0 +1,26 @@
+"""``heelstrike inspect`` of a humanoid file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from heelstrike.cli.main import app
+
+ROBOT = """
+<mujoco model="one"><worldbody><body name="trunk" pos="0 0 1"><freejoint name="base"/>
+<geom type="box" size="0.1 0.2 0.3" mass="3"/></body></worldbody></mujoco>"""
+
+
+def test_words_data_and_no_picture(tmp_path: Path) -> None:
+    path = tmp_path / "one.xml"
+    path.write_text(ROBOT, encoding="utf-8")
+    said = CliRunner().invoke(app, ["inspect", str(path)])
+    assert "one: 3 kg, in space, 7 positions, 6 velocities" in said.output
+    found = json.loads(CliRunner().invoke(app, ["inspect", str(path), "--json"]).stdout)
+    assert found["dimension"] == 3
+    drawn = CliRunner().invoke(app, ["inspect", str(path), "--out", str(tmp_path / "one.png")])
+    assert drawn.exit_code != 0
+    assert not (tmp_path / "one.png").exists()

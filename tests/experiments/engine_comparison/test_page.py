@@ -1,0 +1,92 @@
+"""The page says what the files say, and has every simulator of Table 1."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from experiments.engine_comparison.synthetic import made_up
+
+from heelstrike.errors import SimulationError
+from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
+from heelstrike.experiments.engine_comparison.facts import FACTS
+from heelstrike.experiments.engine_comparison.page import engines_page
+
+BELOW, BALL = "cube below the angle of friction", "ball bouncing, e = 0.9"
+DULL, OURS = "takes no coefficient of restitution", "heelstrike, event-driven"
+SCENES = {
+    "scenes": [[BELOW, 0.0, "m", "it stays"],
+               [BALL, 0.2, "m", "parabolas"]],
+    "settings": "defaults",
+    "step_s": 1e-3,
+    "rows": [
+        {"scene": scene, "engine": engine, "title": title, "error": error, "reason": reason}
+        for scene, engine, title, error, reason in (
+            (BELOW, "event-driven", OURS, 0.0, ""),
+            (BALL, "event-driven", OURS, 1e-16, ""),
+            (BELOW, "mujoco", "MuJoCo", 0.0123, ""),
+            (BALL, "mujoco", "MuJoCo", None, DULL),
+        )
+    ],
+    "guards": {
+        "mujoco": {"flight": 1e-4, "order": 1.0, "extrapolated": 3e-11, "weight": 0.9999,
+                   "sunk_m": 1e-3, "float32": False, "holds": True},
+        "ode": {"reason": "ODE is not installed"},
+    },
+}  # fmt: skip
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> str:
+    told = json.dumps(made_up().to_dict())
+    for law in ("ComputedTorque", "FootstepFeedback"):
+        (tmp_path / f"engines-{law}.json").write_text(told)
+    (tmp_path / "scenes.json").write_text(json.dumps(SCENES))
+    return engines_page(tmp_path, "images/engines.png")
+
+
+def row(page: str, section: str, name: str) -> list[str]:
+    """Cells of the first row of a section that begins with a name."""
+    text = page[page.index(section) :]
+    line = next(line for line in text.splitlines() if line.startswith(f"| {name} |"))
+    return [cell.strip() for cell in line.strip("|").split("|")]
+
+
+def test_every_simulator_of_the_paper_has_its_row(page: str) -> None:
+    assert set(FACTS) == {"heelstrike", *ENTRIES}
+    for name in [entry.title for entry in ENTRIES.values()] + list(ABSENT):
+        assert row(page, "## Table 1, renewed", name)
+    assert row(page, "## Table 1, renewed", "MuJoCo")[1] == "1.2.3"
+    assert row(page, "## Table 1, renewed", "Vortex")[2] == ABSENT["Vortex"]
+
+
+def test_it_says_at_which_steps_a_robot_walks_and_how_it_creeps(page: str) -> None:
+    cells = row(page, "In ours.", "MuJoCo")
+    assert cells[5] == "12"  # mm/s: 12.3 mm in a second
+    assert cells[6] == "1"  # ms, at defaults under the first law; at 2 ms it falls
+    assert row(page, "In ours.", "Bullet")[6] == "none"
+    assert row(page, "In ours.", "heelstrike")[6] == "2, 1"
+
+
+def test_it_shows_figures_of_walks_and_why_others_fell(page: str) -> None:
+    section = "## 3 steps under ComputedTorque"
+    cells = row(page, section, "MuJoCo")
+    assert cells[:3] == ["MuJoCo", "defaults", "yes"]
+    assert cells[3:8] == ["1", "2", "1", "0.5", "5"]  # mrad, mm, ms, N s, mm
+    fallen = row(page, section, "Bullet")
+    assert fallen[2] == "no, 1"  # after a step
+    assert fallen[3:8] == ["–"] * 5  # differences of a fall mean nothing
+    assert "- Bullet, defaults: fell: slipped at 0.100 s." in page
+    assert "- ODE, defaults: ODE is not installed." in page
+
+
+def test_scenes_and_guards_are_in_their_tables(page: str) -> None:
+    assert row(page, "## Scenes with closed forms", "MuJoCo") == ["MuJoCo", "0.012", "–"]
+    assert row(page, "## Guards", "MuJoCo")[-1] == "yes"
+    assert row(page, "## Guards", "ODE")[1] == "ODE is not installed"
+
+
+def test_without_files_there_is_no_page(tmp_path: Path) -> None:
+    with pytest.raises(SimulationError, match="heelstrike compare --engines all --scenes"):
+        engines_page(tmp_path, "figure.png")

@@ -1,0 +1,45 @@
+"""Scenes with closed forms: our event-driven runs have them to rounding, so both are right.
+
+The forms are computed without the simulator. Event-driven runs integrate with tolerances of 1e-11
+and locate events to rounding; 1e-8 is what is promised.
+"""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from heelstrike.experiments.engine_comparison import scene_table
+from heelstrike.experiments.engine_comparison.scene_table import EXACT
+from heelstrike.experiments.engine_comparison.scenes import Scene, our_scene_error, scenes
+
+SCENES = scenes()
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+def test_an_event_driven_run_has_the_closed_form(scene: Scene) -> None:
+    assert abs(our_scene_error(scene, EXACT)) <= 1e-8
+
+
+def test_the_scenes_are_not_all_at_rest() -> None:
+    moving = [scene.exact for scene in SCENES if scene.exact]
+    assert len(moving) >= 7
+    assert math.isclose(moving[1], 6.0**2 / (2.0 * 0.75 * 9.81))
+
+
+def test_the_table_says_how_far_off_and_who_does_not_bounce(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stays, bounces = SCENES[0], SCENES[4]
+    monkeypatch.setattr(scene_table, "scenes", lambda: (stays, bounces))
+    table = scene_table.compare_scenes(engines=["mujoco"])
+    found = {(row.scene, row.engine): row for row in table.rows}
+    assert len(found) == 6
+    creeps = found[stays.name, "mujoco"].error
+    assert creeps is not None
+    assert 1e-4 < abs(creeps) < 0.1
+    refused = found[bounces.name, "mujoco"]
+    assert refused.error is None
+    assert refused.reason == "takes no coefficient of restitution"
+    assert found[stays.name, "event-driven"].error == pytest.approx(0.0, abs=1e-12)

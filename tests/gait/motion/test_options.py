@@ -1,0 +1,92 @@
+"""What may be asked of a motion beside its phases: margins, landings, costs over time, a start."""
+
+from __future__ import annotations
+
+import casadi
+import numpy as np
+import pytest
+
+import heelstrike as hs
+from heelstrike import dynamics
+from heelstrike.errors import GaitError
+from heelstrike.gait.cost import Instant
+
+FASTER = 0.5
+"""Speed at which points come down, in m/s."""
+
+
+def asked(**more: object) -> dict:
+    return {"distance": 0.25, "friction": 0.75, "starts": 1, "refine": False, **more}
+
+
+@pytest.fixture(scope="module")
+def flat(bravo7: hs.Robot) -> hs.Motion:
+    return hs.optimize_motion(bravo7, step(), **asked())
+
+
+def step() -> list[hs.ContactPhase]:
+    return [hs.ContactPhase("right_foot", duration=0.7, pieces=4)]
+
+
+def test_soles_bear_a_margin_at_both_ends(bravo7: hs.Robot, flat: hs.Motion) -> None:
+    margin = 0.15 * bravo7.weight
+    motion = hs.optimize_motion(bravo7, step(), **asked(force_margin=margin))
+    ends = list(bravo7.feet[0].contacts)
+    assert motion.phases[0].force[:, :, ends, 0].min() > margin - 1e-3
+    assert flat.phases[0].force[:, :, ends, 0].min() < margin
+    assert motion.cost >= flat.cost
+
+
+def test_points_come_down_at_a_least_speed(bravo7: hs.Robot, flat: hs.Motion) -> None:
+    motion = hs.optimize_motion(bravo7, step(), **asked(landing_speed=FASTER))
+
+    def slowest(found: hs.Motion) -> float:
+        last = found.phases[-1]
+        q, v = (last.coordinates(last.duration, order=order) for order in range(2))
+        landing = list(bravo7.feet[1].contacts)
+        rows = dynamics.contact_jacobian(bravo7, q, landing)[:, 0]
+        return float(-(rows @ v).max())
+
+    assert slowest(motion) > FASTER - 1e-3
+    assert slowest(flat) < FASTER
+
+
+def test_a_cost_that_knows_the_time(bravo7: hs.Robot, flat: hs.Motion) -> None:
+    """The swing knee follows a curve over time, as nearly as its limits let it."""
+    knee = bravo7.joint_names.index("left_knee")
+
+    def wanted(t: object, lib: object) -> object:
+        return 0.5 + 0.4 * lib.sin(2.0 * np.pi * t / 1.4)  # type: ignore[attr-defined]
+
+    def far(now: Instant) -> casadi.SX:
+        away = now.position[knee] - wanted(now.time, casadi)
+        return away**2 + 1e-7 * casadi.sumsqr(now.torque) + 1e-9 * casadi.sumsqr(now.acceleration)
+
+    near = hs.optimize_motion(bravo7, step(), **asked(cost=far, warm_start=flat))
+    time = np.linspace(0.05, 0.65, 50)
+    away, before = (
+        np.abs(each.position(time)[:, knee] - wanted(time, np)).max() for each in (near, flat)
+    )
+    assert away < 0.1 * before
+
+
+def test_equations_hold_to_rounding(bravo7: hs.Robot, flat: hs.Motion) -> None:
+    from heelstrike.experiments.people.nearest import residual_of
+
+    assert residual_of(bravo7, flat) < 1e-9
+
+
+def test_a_start_and_what_is_none(bravo7: hs.Robot, flat: hs.Motion) -> None:
+    again = hs.optimize_motion(bravo7, step(), **asked(warm_start=flat))
+    assert again.cost == pytest.approx(flat.cost, rel=1e-4)
+    drawn = hs.optimize_motion(bravo7, step(), **asked(guess=flat.position))
+    assert drawn.cost == pytest.approx(flat.cost, rel=1e-4)
+    other = [hs.ContactPhase("right_foot_toe", duration=0.7)]
+    with pytest.raises(GaitError, match="must go through the phases"):
+        hs.optimize_motion(bravo7, other, **asked(warm_start=flat))
+    with pytest.raises(GaitError, match="warm_start must be a Motion"):
+        hs.optimize_motion(bravo7, step(), **asked(warm_start="flat.json"))
+    with pytest.raises(GaitError, match="guess must return 9 finite positions"):
+        hs.optimize_motion(bravo7, step(), **asked(guess=lambda t: [t]))
+    with pytest.raises(GaitError, match="landing_speed must not be negative"):
+        hs.optimize_motion(bravo7, step(), **asked(landing_speed=-1.0))

@@ -1,0 +1,58 @@
+"""Steps that no solve certifies: halved, gone on with and told, or the end of the run in words."""
+
+from __future__ import annotations
+
+import numpy as np
+from spatial_robots import Maker
+
+import heelstrike as hs
+from heelstrike.sim.spatial.record import SpatialEventKind
+
+BLOCK = (
+    "<body name='block' pos='0 0 0.1'><freejoint/><geom type='box' size='0.2 0.15 0.1' mass='2'/>"
+    "</body>"
+)
+
+
+def sliding(made: Maker) -> hs.Simulation:
+    robot = made(BLOCK)
+    state = hs.State(robot.reference_state().q, np.array([1.0, 0.7, 0.0, 0.0, 0.0, 0.3]))
+    return hs.Simulation(robot, state=state)
+
+
+def test_a_step_that_is_nearly_solved_is_halved_and_then_goes_on_and_is_told(made: Maker) -> None:
+    """With a tolerance that no rounding meets nothing is certified; the motion is as ever."""
+    strict, usual = sliding(made), sliding(made)
+    strict._memory.solver.settings.tolerance = 1e-25
+    strict.advance(0.01)
+    usual.advance(0.01)
+    record = strict.record
+    told = [event for event in record.events if event.kind is SpatialEventKind.UNCERTIFIED]
+    assert strict.status is hs.RunStatus.COMPLETED
+    assert 0 < len(told) == record.certificates.uncertified <= 10
+    assert record.certificates.halved >= len(told)
+    assert record.steps >= 8 * len(told)  # eighths of each step
+    assert 0.0 < record.certificates.residual <= 1e-6
+    assert np.max(np.abs(strict.state.q - usual.state.q)) <= 1e-4
+
+
+def test_a_step_that_nothing_solves_ends_the_run_in_words(made: Maker) -> None:
+    simulation = sliding(made)
+    simulation.advance(0.005)
+    before = simulation.state
+    simulation._memory.solver.settings.ways = 0
+    assert simulation.advance(0.01) is hs.RunStatus.SOLVER_FAILED
+    assert "no contact impulses could be certified at t = 0.005 s" in simulation.message
+    assert np.array_equal(simulation.state.q, before.q)
+    assert simulation.record.certificates.uncertified == 0
+
+
+def test_stairs_are_as_high_and_deep_as_they_say(made: Maker) -> None:
+    """A ball dropped on each tread comes to rest on it."""
+    robot = made("<body name='ball'><freejoint/><geom type='sphere' size='0.05' mass='1'/></body>")
+    ground = hs.SpatialGround.stairs(rise=0.15, tread=0.3, count=3, start=0.2)
+    for x, height in ((0.0, 0.0), (0.35, 0.15), (0.65, 0.3), (0.95, 0.45)):
+        q = np.array([x, 0.1, height + 0.2, 1.0, 0.0, 0.0, 0.0])
+        run = hs.simulate(robot, state=hs.State(q, np.zeros(6)), duration=0.5, ground=ground)
+        assert abs(run.position[-1, 2] - height - 0.05) <= 1e-9
+        assert np.max(np.abs(run.position[-1, :2] - q[:2])) <= 1e-9
