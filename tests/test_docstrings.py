@@ -198,6 +198,10 @@ def calls() -> dict[str, Callable[..., Any]]:
     robot = synthetic_runs.box()
     in_space = heelstrike.load_robot("bravo7", dimension=3)
     run = synthetic_runs.make_run(robot, np.linspace(0.0, 0.1, 3))
+
+    def in_space_run() -> Any:
+        return heelstrike.simulate(in_space, state=in_space.reference_state(), duration=0.002)
+
     based = heelstrike.RobotBuilder("made up")
     trunk = based.floating_base("trunk", mass=1.0, inertia=1.0)
     bare = heelstrike.RobotBuilder("nothing yet")
@@ -222,6 +226,13 @@ def calls() -> dict[str, Callable[..., Any]]:
         "heelstrike.Run.save_html": partial(run.save_html, "run.html"),
         "heelstrike.Run.save_report": partial(run.save_report, "run.html"),
         "heelstrike.Run.summary": run.summary,
+        "heelstrike.sim.spatial.SpatialRun.plot": lambda **how: in_space_run().plot("gap", **how),
+        "heelstrike.sim.spatial.SpatialRun.animate": (
+            lambda **how: in_space_run().animate("film.gif", **how)
+        ),
+        "heelstrike.sim.spatial.SpatialRun.save_html": (
+            lambda **how: in_space_run().save_html("run.html", **how)
+        ),
         "heelstrike.RobotBuilder.floating_base": partial(bare.floating_base, "trunk"),
         "heelstrike.RobotBuilder.hinge": partial(based.hinge, "hip", trunk),
         "heelstrike.RobotBuilder.slide": partial(based.slide, "leg", trunk, direction=(0, -1)),

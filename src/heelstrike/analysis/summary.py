@@ -223,10 +223,11 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-class _Words(string.Formatter):
+class Words(string.Formatter):
     """Significant digits, and a dash for what does not exist."""
 
     def format_field(self, value: Any, spec: str) -> str:
+        """Write a value after a format; a dash for a number that does not exist."""
         if not isinstance(value, float):
             return str(value)
         return f"{value:{spec}g}" if math.isfinite(value) else "–"
@@ -261,7 +262,7 @@ OF_A_GAIN = "energy made by impacts"
 
 def lines(s: Summary) -> list[tuple[str, str]]:
     """Label and value of every line of the table a person reads."""
-    write = _Words().format
+    write = Words().format
     return [
         (label, write(line, s=s))
         for label, line in LINES.items()

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from heelstrike.robot.inspection import Inspection
     from heelstrike.sim.push import Push
 
+SPACE = 3
+"""Dimension of a robot that leaves the plane."""
+
 FOUND = 1
 """Exit code when something looks wrong, so that a script can tell."""
 
@@ -37,12 +40,16 @@ def inspect(
     ] = None,
     ground: OnGround = "flat",
     push: Pushed = None,
+    dimension: Annotated[
+        int, typer.Option(min=2, max=3, help="Look at it in the plane, or in space.")
+    ] = 2,
     how: Reading,
     as_json: AsJson = False,
 ) -> None:
     """Look at a robot: tree, masses, limits, contact points, and what looks wrong.
 
-    Ground and pushes are those of the picture. Ends with exit code 1 if something looks wrong.
+    In space it tells what there is, and not what looks wrong. Ground and pushes are those of the
+    picture. Ends with exit code 1 if something looks wrong.
     """
     from heelstrike.robot.inspection import inspect_robot
 
@@ -52,10 +59,33 @@ def inspect(
         raise typer.BadParameter(
             "ground and pushes are drawn: say into which file", param_hint="--out"
         )
+    if dimension == SPACE:
+        if surface is not None or pushes:
+            raise typer.BadParameter(
+                "ground and pushes are drawn in the plane only", param_hint="--dimension"
+            )
+        look_in_space(robot, picture, how, as_json=as_json)
+        return
     inspection = inspect_robot(robot, **how.keywords())
     look_at(inspection, picture, as_json=as_json, ground=surface, pushes=pushes)
     if not inspection.sound:
         raise typer.Exit(FOUND)
+
+
+def look_in_space(robot: str, picture: Path | None, how: Reading, *, as_json: bool) -> None:
+    """Print what a robot in space consists of, and draw it into a file."""
+    from heelstrike.robot.library import load_robot
+    from heelstrike.robot.spatial.inspection import spatial_description, spatial_facts
+    from heelstrike.view.drawing import robot_picture
+
+    found = load_robot(robot, dimension=3, **how.keywords())
+    if as_json:
+        typer.echo(json.dumps(spatial_facts(found), indent=2))
+    else:
+        output().print(Text(spatial_description(found)), soft_wrap=True)
+    if picture is not None:
+        robot_picture(found, picture)
+        tell(f"drawn into {picture}")
 
 
 def look_at(

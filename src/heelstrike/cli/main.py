@@ -16,6 +16,7 @@ from heelstrike.cli.paper import paper
 from heelstrike.cli.planners import planners
 from heelstrike.cli.report import report
 from heelstrike.cli.robots import robots
+from heelstrike.cli.simulate import simulate
 from heelstrike.cli.train import train
 from heelstrike.cli.transfer import transfer
 from heelstrike.cli.walk import walk
@@ -32,6 +33,7 @@ app = typer.Typer(
 )
 for command in (
     walk,
+    simulate,
     watch,
     report,
     train,

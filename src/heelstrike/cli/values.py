@@ -113,6 +113,32 @@ def pushes_called(several: Sequence[str] | None) -> tuple[Push, ...]:
     return tuple(found)
 
 
+def spatial_pushes_called(several: Sequence[str] | None) -> tuple[Push, ...]:
+    """Make pushes in space of ``LINK:X,Y,Z:START:DURATION``, in N and s.
+
+    Raises
+    ------
+    SimulationError
+        If one is written otherwise, or a number is none.
+    """
+    from heelstrike.sim.push import Push
+
+    found = []
+    for words in several or ():
+        link, *rest = words.rsplit(":", 3)
+        force = rest[0].split(",") if len(rest) == 3 else []
+        if not link or len(force) != 3:
+            raise SimulationError(
+                f"--push {words}: write LINK:X,Y,Z:START:DURATION, as trunk:0,60,0:1:0.1 for 60 N "
+                "to the left on the trunk, from 1 s on for 0.1 s."
+            )
+        x, y, z, start, duration = (
+            _number(word, f"--push {words}", SimulationError) for word in (*force, *rest[1:])
+        )
+        found.append(Push(link, force=(x, y, z), start=start, duration=duration))
+    return tuple(found)
+
+
 def range_called(words: str, where: str) -> tuple[float, float]:
     """Make a range of ``LOW:HIGH``.
 

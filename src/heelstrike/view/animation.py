@@ -11,8 +11,10 @@ import numpy as np
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
+from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.view.film import Film
 from heelstrike.view.mp4 import write_mp4
+from heelstrike.view.spatial.film import SpatialFilm
 from heelstrike.view.style import styled, view_errors
 from heelstrike.whole_file import check_target, whole_file
 
@@ -21,7 +23,7 @@ GIF_COLORS = 64
 
 @takes(ViewError)
 def animate(
-    run: Run,
+    run: Run | SpatialRun,
     path: str | os.PathLike[str],
     *,
     fps: float = 30.0,
@@ -35,7 +37,7 @@ def animate(
 
     Parameters
     ----------
-    run : Run
+    run : Run or SpatialRun
         The run.
     path : str or path
         File to write, .mp4 or .gif.
@@ -74,7 +76,11 @@ def animate(
     if kind == ".gif":
         fps = 100.0 / max(2, round(100.0 / fps))  # the format counts hundredths of a second
     with styled(), view_errors():
-        film = Film(run, (width, height), fps, speed)
+        film: Film | SpatialFilm
+        if isinstance(run, SpatialRun):
+            film = SpatialFilm(run, (width, height), fps, speed)
+        else:
+            film = Film(run, (width, height), fps, speed)
         with whole_file(target) as beside:
             if kind == ".mp4":
                 write_mp4(map(film.draw, range(len(film))), film.size, fps, beside)
@@ -83,7 +89,7 @@ def animate(
     return target
 
 
-def _write_gif(film: Film, path: Path, fps: float) -> None:
+def _write_gif(film: Film | SpatialFilm, path: Path, fps: float) -> None:
     from PIL import Image
 
     def picture(index: int) -> Image.Image:

@@ -23,10 +23,12 @@ from matplotlib.collections import LineCollection, PolyCollection
 from heelstrike.analysis.motion import in_world
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import LinkPoses, link_poses
+from heelstrike.errors import ViewError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import are_around
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.push import Push
 from heelstrike.tolerances import NO_BONE
 from heelstrike.view.bars import bars
@@ -315,7 +317,7 @@ def _says_left(robot: Robot, link: int) -> bool:
 
 
 def robot_picture(
-    robot: Robot,
+    robot: Robot | SpatialRobot,
     path: str | os.PathLike[str],
     *,
     ground: Ground | None = None,
@@ -325,8 +327,8 @@ def robot_picture(
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
+    robot : Robot or SpatialRobot
+        The robot. One in space stands as in its file, without pushes, on level ground.
     path : str or path
         Picture to write: .png, .pdf or .svg.
     ground : Ground, optional
@@ -342,12 +344,18 @@ def robot_picture(
     Raises
     ------
     ViewError
-        If the file cannot be written.
+        If the file cannot be written, or a robot in space has a ground or pushes.
     RobotError
         If there is a ground, and the robot cannot stand on any.
     SimulationError
         If the robot has no such link as is pushed.
     """
+    if isinstance(robot, SpatialRobot):
+        from heelstrike.view.spatial.portrait import portrait_in_space
+
+        if ground is not None or pushes:
+            raise ViewError("ground and pushes are drawn with robots in the plane only")
+        return portrait_in_space(robot, path)
     model = robot.model
     q = legs_apart(robot) if ground is None else robot.standing(ground).q
     poses = link_poses(robot, q)

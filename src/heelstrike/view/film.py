@@ -88,6 +88,15 @@ def frames(run: Run, interval: float) -> Frames:
     )
 
 
+def evened(place: Floats, interval: float) -> Floats:
+    """Even out a coordinate (nf,) of what a camera follows, `interval` (s) from frame to frame."""
+    reach = min(round(FOLLOWS_WITHIN / interval), len(place) - 1)
+    # Straight continuation at both ends, so that the camera neither lags nor stops early.
+    padded = np.pad(place, reach, mode="reflect", reflect_type="odd")
+    window = np.hanning(2 * reach + 3)[1:-1]
+    return np.convolve(padded, window / window.sum(), mode="valid")
+
+
 class Film:
     """A canvas that shows one frame after the other.
 
@@ -180,12 +189,7 @@ class Film:
 
     def _follow(self, interval: float) -> Floats:
         """Place of the camera in the world, (nf, 2): on the ground, ahead with the robot."""
-        center = self.frames.center[:, 0]
-        reach = min(round(FOLLOWS_WITHIN / interval), len(center) - 1)
-        # Straight continuation at both ends, so that the camera neither lags nor stops early.
-        padded = np.pad(center, reach, mode="reflect", reflect_type="odd")
-        window = np.hanning(2 * reach + 3)[1:-1]
-        x = np.convolve(padded, window / window.sum(), mode="valid")
+        x = evened(self.frames.center[:, 0], interval)
         return np.column_stack((x, np.asarray(self._ground.height(x))))
 
     def _frame_view(self, size: tuple[int, int]) -> None:

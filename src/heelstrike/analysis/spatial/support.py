@@ -70,10 +70,19 @@ def margin(corners: Floats, place: Floats) -> float:
     return distance if np.all(side >= 0.0) or np.all(side <= 0.0) else -distance
 
 
+def pushing_in_space(run: SpatialRun) -> NDArray[np.bool_]:
+    """Tell which contact points push in each row, (nt, nc)."""
+    return np.asarray(run.contact_force[..., 0] > NOTHING * run.robot.weight)
+
+
+def on_ground(run: SpatialRun) -> Floats:
+    """Project the contact points onto the ground, (nt, nc, 3), in m."""
+    return np.asarray(run.contact_point - run.gap[..., None] * run.contact_normal)
+
+
 def carrying(run: SpatialRun) -> NDArray[np.bool_]:
     """Tell which contact points touch the ground or push on it in each row, (nt, nc)."""
-    pushes = run.contact_force[..., 0] > NOTHING * run.robot.weight
-    return np.asarray((run.gap <= STANDING_GAP) | pushes)
+    return np.asarray((run.gap <= STANDING_GAP) | pushing_in_space(run))
 
 
 def plane_of(run: SpatialRun, row: int, touching: NDArray[np.bool_]) -> tuple[Floats, Floats]:
@@ -103,7 +112,11 @@ def support_polygon(run: SpatialRun, row: int) -> SupportPolygon:
     SupportPolygon
         Without corners where nothing touches.
     """
-    touching = carrying(run)[row]
+    return polygon_of(run, row, carrying(run)[row])
+
+
+def polygon_of(run: SpatialRun, row: int, touching: NDArray[np.bool_]) -> SupportPolygon:
+    """Find the polygon round some contact points in a row."""
     if not touching.any():
         return SupportPolygon(np.zeros(3), np.roll(np.eye(3), 1, axis=0), np.zeros((0, 2)))
     origin, axes = plane_of(run, row, touching)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.analysis.spatial.motion import centroidal_motion
-from heelstrike.analysis.spatial.support import carrying, plane_of, support_polygon
+from heelstrike.analysis.spatial.support import carrying, plane_of, polygon_of
 from heelstrike.analysis.support import NOTHING
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
@@ -38,31 +38,44 @@ class SpatialZeroMomentPoint:
     capture_point: Floats
     """(nt, 3) Where the robot, as a pendulum of the length that its centre of mass is above the
     ground, would have to step to come to rest, on that plane (m)."""
+    polygon: tuple[Floats, ...]
+    """(k, 3) Corners of the support polygon of each row, in the world (m); of one or two points
+    these, of none nothing."""
 
 
-def spatial_zero_moment_point(run: SpatialRun) -> SpatialZeroMomentPoint:
-    """Locate the zero moment points of a run in space; see :func:`zero_moment_point`."""
-    rows, feet = len(run.time), run.robot.feet
-    foot = np.full((rows, len(feet), 3), np.nan)
-    total, capture = np.full((rows, 3), np.nan), np.full((rows, 3), np.nan)
-    margin = np.full(rows, np.nan)
+def spatial_zero_moment_point(
+    run: SpatialRun, rows: Integers | None = None
+) -> SpatialZeroMomentPoint:
+    """Locate the zero moment points of a run in space, or of some of its rows.
+
+    See :func:`~heelstrike.analysis.zero_moment_point`.
+    """
+    chosen = np.arange(len(run.time)) if rows is None else rows
+    count, feet = len(chosen), run.robot.feet
+    foot = np.full((count, len(feet), 3), np.nan)
+    total, capture = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
+    margin = np.full(count, np.nan)
     force, least = run.world_force, NOTHING * run.robot.weight
     motion = centroidal_motion(run)
     velocity = motion.momentum[:, :3] / run.robot.total_mass
     gravity = float(np.linalg.norm(run.robot.model.gravity))
-    for row, touching in enumerate(carrying(run)):
+    polygons: list[Floats] = [np.zeros((0, 3))] * count
+    carried = carrying(run)
+    for at, row in enumerate(chosen.tolist()):
+        touching = carried[row]
         if not touching.any():
             continue
         origin, axes = plane_of(run, row, touching)
         every = np.arange(run.robot.nc)
-        total[row] = _place(run, row, every, force, origin, axes[0], least)
-        margin[row] = support_polygon(run, row).margin(total[row])
-        capture[row] = _capture(motion.center_of_mass[row], velocity[row], gravity, origin, axes[0])
+        total[at] = _place(run, row, every, force, origin, axes[0], least)
+        polygon = polygon_of(run, row, touching)
+        polygons[at], margin[at] = polygon.world, polygon.margin(total[at])
+        capture[at] = _capture(motion.center_of_mass[row], velocity[row], gravity, origin, axes[0])
         for i, each in enumerate(feet):
             own = np.array(each.contacts)
             if touching[own].any():
-                foot[row, i] = _place(run, row, own, force, origin, axes[0], least)
-    return SpatialZeroMomentPoint(foot, total, margin, capture)
+                foot[at, i] = _place(run, row, own, force, origin, axes[0], least)
+    return SpatialZeroMomentPoint(foot, total, margin, capture, tuple(polygons))
 
 
 def _place(

@@ -14,6 +14,7 @@ from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot
+from heelstrike.robot.spatial.solids import Solid
 
 _PLAIN = (
     *("name", "joint_names", "link_names", "actuator_names", "contact_names"),
@@ -32,6 +33,7 @@ def robot_entries(robot: Robot | SpatialRobot) -> dict[str, Any]:
                 "dimension": 3,
                 "model": robot.model.members(),
                 "feet": [asdict(foot) for foot in robot.feet],
+                "solids": [asdict(solid) for solid in robot.solids],
             }
         )
     parts = {
@@ -56,6 +58,7 @@ def robot_of_entries(entries: dict[str, Any]) -> Robot | SpatialRobot:
             **{name: _tuples(entries[name]) for name in _IN_SPACE},
             model=SpatialModel(**_arrays(entries["model"])),
             feet=tuple(SpatialFoot(**_each_tuple(foot)) for foot in entries["feet"]),
+            solids=tuple(Solid(**_arrays(solid)) for solid in entries["solids"]),
         )
     plain = {name: _tuples(entries[name]) for name in _PLAIN}
     return Robot(

@@ -2,5 +2,6 @@
 
 from heelstrike.robot.spatial.model import JointKind, SpatialModel
 from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot
+from heelstrike.robot.spatial.solids import Solid
 
-__all__ = ["JointKind", "SpatialFoot", "SpatialModel", "SpatialRobot"]
+__all__ = ["JointKind", "Solid", "SpatialFoot", "SpatialModel", "SpatialRobot"]

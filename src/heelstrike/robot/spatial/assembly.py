@@ -9,6 +9,7 @@ from heelstrike.robot.assembly import LARGEST_NUMBER
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import BALL, FREE, HINGE, SPATIAL_NUMBERS, SpatialModel
 from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot
+from heelstrike.robot.spatial.solids import Solid
 
 LEAST = 1e-30
 """Resistance (kg, kg m²) of a joint that is none: places that differ by rounding make less."""
@@ -25,6 +26,7 @@ def assembled_in_space(
     source: str,
     origin: Floats,
     axes: Floats,
+    solids: tuple[Solid, ...] = (),
 ) -> SpatialRobot:
     """Make a robot in space of its numbers and names.
 
@@ -42,6 +44,8 @@ def assembled_in_space(
         What to call the robot in messages.
     origin, axes : (nl, 3) and (nl, 3, 3) float
         World poses of its links in the reference configuration.
+    solids : tuple of Solid
+        What its links look like.
 
     Raises
     ------
@@ -60,6 +64,7 @@ def assembled_in_space(
         feet=_find_feet(model, link_names, origin, axes),
         contact_friction=friction,
         source=source,
+        solids=solids,
     )
 
 

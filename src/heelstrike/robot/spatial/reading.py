@@ -27,6 +27,7 @@ from heelstrike.robot.spatial.links import SpatialLinks, read_spatial_links
 from heelstrike.robot.spatial.model import HINGE, SLIDE, SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.spatial.trunk import free_trunk, weld
+from heelstrike.robot.spatial.visible_shapes import read_solids
 from heelstrike.robot.warning import warn
 
 
@@ -104,6 +105,7 @@ def _robot(file: MujocoFile, name: str, options: Options) -> SpatialRobot:
         source=file.source,
         origin=links.origin,
         axes=links.axes,
+        solids=read_solids(file, links),
     )
 
 

@@ -12,6 +12,7 @@ from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import BALL, FREE, JointKind, SpatialModel
+from heelstrike.robot.spatial.solids import Solid
 from heelstrike.robot.state import State
 from heelstrike.wording import meant
 
@@ -62,6 +63,8 @@ class SpatialRobot:
     from its `Ground`."""
     source: str = field(default="", repr=False)
     """File the robot came from, for error messages."""
+    solids: tuple[Solid, ...] = field(default=(), repr=False)
+    """What its links look like, by the shapes of its file."""
 
     @property
     def nl(self) -> int:

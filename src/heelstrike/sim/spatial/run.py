@@ -23,6 +23,9 @@ from heelstrike.sim.spatial.record import SpatialEventKind, SpatialRecord
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
+
+    from heelstrike.analysis.spatial.summary import SpatialSummary
 
 
 class Recorded(NamedTuple):
@@ -178,6 +181,75 @@ class SpatialRun:
         force = self.contact_force
         total: Floats = force[..., :1] * normal + force[..., 1:2] * first + force[..., 2:] * second
         return total
+
+    def summary(self) -> SpatialSummary:
+        """Summarise the run; see :func:`heelstrike.analysis.spatial.summary.summarize_in_space`.
+
+        Returns
+        -------
+        SpatialSummary
+            Figures with units in their names.
+        """
+        from heelstrike.analysis.spatial.summary import summarize_in_space
+
+        return summarize_in_space(self)
+
+    def plot(self, what: str, **options: Any) -> Figure:
+        """Draw a figure of the run; see :func:`heelstrike.view.spatial.figures.plot_in_space`.
+
+        Parameters
+        ----------
+        what : str
+            Name of the figure.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Figure
+            Matplotlib's figure.
+        """
+        from heelstrike.view.spatial.figures import plot_in_space
+
+        return plot_in_space(self, what, **options)
+
+    def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write an animation of the run; see :func:`heelstrike.view.animation.animate`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.animation import animate
+
+        return animate(self, path, **options)
+
+    def save_html(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write the run as one HTML file; see :func:`heelstrike.view.spatial.page.save_html`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.spatial.page import save_html
+
+        return save_html(self, path, **options)
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the run as a labelled dataset with units.

@@ -107,7 +107,7 @@ def page(run: Run, gait: Gait | None = None, *, command: str = "") -> str:
         "certificates": table(certificates(run), "Certificates: worst values over all steps"),
         "provenance": table(provenance(run, gait, command=command), "Where this comes from"),
     }
-    for name, part in parts.items():
+    for name, part in (parts | {"camera": ""}).items():
         body = body.replace(f"<!--{name}-->", part)
     body += data_block("run", contents(run, gait))
     script = "".join(map(shipped, ("drawing.js", "recording.js", "player.js")))

@@ -4,7 +4,9 @@
 (() => {
   const { before, fit } = HeelstrikeRecording;
   const at = (name) => document.getElementById(name);
-  const run = HeelstrikeRecording.read(JSON.parse(at("run").textContent));
+  const reader = typeof HeelstrikeSpace === "undefined" ? HeelstrikeRecording : HeelstrikeSpace;
+  const run = reader.read(JSON.parse(at("run").textContent));
+  const pressed = run.pressed || HeelstrikeDrawing.pressed;
   const { scene, plots, events, phases, time, count, start, end } = run;
   plots.forEach((panel, i) => panel.curves.forEach((curve, k) => {
     curve.values = run.curve(`curve ${i} ${k}`);
@@ -88,7 +90,7 @@
     const near = events.filter((event) => Math.abs(event.time - state.now) < 1e-3);
     const normal = scene.feet.map((foot, i) => {
       const sum = scene.contacts.reduce((total, contact, k) => contact.foot === i
-        ? total + HeelstrikeDrawing.pressed(frame, k).normal : total, 0);
+        ? total + pressed(frame, k).normal : total, 0);
       return `${foot.name} ${words(Math.abs(sum) < 1e-6 * scene.weight ? 0 : sum)} N`;
     }).join(", ");
     const told = near.map(inWords).join("; ");
@@ -146,8 +148,9 @@
   }
 
   at("time").addEventListener("input", (happened) => {
+    const share = Number(happened.target.value) / SLIDER; // which pausing takes back
     play(false);
-    go(start + (Number(happened.target.value) / SLIDER) * (end - start));
+    go(start + share * (end - start));
   });
   at("play").addEventListener("click", () => play(!state.playing));
   at("start").addEventListener("click", () => { play(false); go(start); });
@@ -176,6 +179,7 @@
       document.documentElement.className = state.dark ? "dark" : "light";
       all();
     },
+    ...run.keys,
   };
   document.addEventListener("keydown", (happened) => {
     const own = happened.target.tagName;
@@ -187,7 +191,9 @@
     happened.preventDefault();
     act(happened.shiftKey);
   });
-  at("plane").addEventListener("click", () => play(!state.playing));
+  at("plane").addEventListener("click", () => {
+    if (!run.dragged || !run.dragged()) play(!state.playing);
+  });
 
   const pointed = (canvas, happened) => {
     const { left, right } = kept.get(canvases.indexOf(canvas))?.sides || sides;
@@ -211,7 +217,7 @@
     });
   }
 
-  const DRAWN = { forces: "contact forces", cones: "friction cones", pressure: "zero moment point",
+  const DRAWN = run.drawn || { forces: "contact forces", cones: "friction cones", pressure: "zero moment point",
     support: "support interval", center: "centre of mass", capture: "capture point",
     traces: "foot traces" };
   for (const [name, label] of Object.entries(DRAWN)) {
@@ -253,6 +259,8 @@
     + "beside events and about impacts among them; times are exact, other numbers are those of the "
     + `record to ${run.tolerance.toExponential(1)} of the range of their curve. Between rows places `
     + "are drawn on straight lines; forces are means from each row to the next.";
+
+  if (run.whenMoved) run.whenMoved(() => { if (!state.playing) drawPlane(); });
 
   function all() {
     kept.clear();

@@ -177,5 +177,5 @@ var HeelstrikeRecording = (() => {
       reach: Math.max(1.05 * reach, 1e-3) };
   }
 
-  return { read, before, fit };
+  return { read, before, fit, unpacked, bytes };
 })();

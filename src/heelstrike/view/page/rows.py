@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from heelstrike.analysis.intervals import mean_over_intervals
@@ -30,20 +32,27 @@ def shown_rows(run: Run) -> Rows:
     sides of every event. Where that is more than `MOST_ROWS`, rows between events are fewer first,
     then events.
     """
-    count = len(run.time)
+    impacts = [event.time for event in run.events if event.kind in IMPACTS]
+    return rows_about(run.time, [event.time for event in run.events], impacts)
+
+
+def rows_about(
+    time: Floats, events: Sequence[float], impacts: Sequence[float], *, most: int = MOST_ROWS
+) -> Rows:
+    """Choose rows by the times of all rows (nt,), of events and of the impacts among them (s)."""
+    count = len(time)
     if count <= 2:
         return np.arange(count)
     ends = np.array([0, count - 1])
-    duration = float(run.time[-1] - run.time[0])
-    at_events = _beside(run.time, np.array([event.time for event in run.events]))
-    at_events = at_events[:: -(-len(at_events) // (MOST_ROWS // 2)) or 1]
-    impacts = np.unique([event.time for event in run.events if event.kind in IMPACTS])
+    duration = float(time[-1] - time[0])
+    at_events = _beside(time, np.array(events, dtype=np.float64))
+    at_events = at_events[:: -(-len(at_events) // (most // 2)) or 1]
     about = np.arange(-BEFORE, AFTER, CLOSE)
-    close = _nearest(run.time, (impacts[:, None] + about).ravel())
-    interval = max(INTERVAL, 2.0 * duration / MOST_ROWS)
-    usual = _nearest(run.time, np.arange(run.time[0], run.time[-1], interval))
+    close = _nearest(time, (np.unique(np.array(impacts))[:, None] + about).ravel())
+    interval = max(INTERVAL, 2.0 * duration / most)
+    usual = _nearest(time, np.arange(time[0], time[-1], interval))
     rows = np.unique(np.concatenate((ends, at_events, usual, close)))
-    return rows if len(rows) <= MOST_ROWS else np.unique(np.concatenate((ends, at_events, usual)))
+    return rows if len(rows) <= most else np.unique(np.concatenate((ends, at_events, usual)))
 
 
 def _nearest(time: Floats, instants: Floats) -> Rows:

@@ -1,0 +1,255 @@
+"""The figures of a run in space on one page, for a person and for a program."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from heelstrike.analysis.spatial.links import link_motion
+from heelstrike.analysis.spatial.support import pushing_in_space
+from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
+from heelstrike.analysis.summary import UNKNOWN, Words, plain
+from heelstrike.field_texts import dataclass
+from heelstrike.notebook import ShownInNotebooks
+from heelstrike.robot.model import Floats
+from heelstrike.sim.closed_sets import RunStatus
+from heelstrike.sim.spatial.record import SpatialEventKind
+from heelstrike.sim.spatial.run import SpatialRun, SpatialSolverCount
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+SHORTEST_WAY = 1e-3
+"""Distance (m) below which energy a distance means nothing."""
+
+MOST_LOOKED_AT = 2000
+"""Rows of a run in which the zero moment point is looked for, evenly spread."""
+
+
+@dataclass(frozen=True)
+class SpatialSummary(ShownInNotebooks):
+    """Figures of a run in space. Those that do not exist for it are NaN (null in JSON)."""
+
+    robot: str
+    """Name of the robot."""
+    status: str
+    message: str
+    """status, message: How the run ended."""
+    duration_s: float
+    """Time simulated."""
+    forward_m: float
+    left_m: float
+    """forward_m, left_m: How far the centre of mass moved along x and y."""
+    distance_m: float
+    """The same as one distance, from the first place to the last, along the ground."""
+    speed_m_s: float
+    """That distance over the time."""
+    turn_rad: float
+    """How far the robot turned about the vertical, whole turns counted; NaN if it does not
+    float."""
+    touchdowns: int
+    """Contact points that met the ground."""
+    zmp_margin_min_m: float
+    """Least distance of the zero moment point to the edges of the support polygon."""
+    friction_use_max: float
+    """Largest |f_t| / (μ f_n) of all contact points together on the plane of the ground; NaN where
+    boxes have a friction of their own."""
+    slip_max_m: float
+    """Largest distance that a contact point slid while pressed, over the whole run."""
+    penetration_max_m: float
+    residual_max: float
+    """penetration_max_m, residual_max: Worst values over all steps, from the certificates; the
+    latter is relative."""
+    uncertified: int
+    halved: int
+    """uncertified, halved: Steps that went on with a residual above 1e-9; steps taken in parts."""
+    solver: SpatialSolverCount
+    """How the contact problems were solved."""
+    torque_cost_N2m2s: float  # noqa: N815 - units keep their capitals
+    """∫ ΓᵀΓ dt over the whole run."""
+    cost_of_transport: float
+    cost_of_transport_positive: float
+    """cost_of_transport, cost_of_transport_positive: ∫ Σ |τ ω| dt / (m g d), and the same of
+    positive work only."""
+    saturations: int
+    """Times that a torque was clipped to its limit."""
+    compile_s: float
+    wall_s: float
+    """compile_s, wall_s: Time spent on compilation, and on the simulation."""
+    real_time_factor: float
+    """Time simulated over time spent on the simulation."""
+    energy_gain_J: float = 0.0  # noqa: N815 - units keep their capitals
+    """Kinetic energy that restitution with friction made in impacts."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain dictionaries, lists and numbers, with None for what does not exist."""
+        found: dict[str, Any] = plain(asdict(self))
+        return found
+
+    def to_json(self, *, indent: int | None = 2) -> str:
+        """Return the summary as JSON text.
+
+        Parameters
+        ----------
+        indent : int or None
+            Spaces of indentation; None for one line.
+
+        Returns
+        -------
+        str
+            What :meth:`to_dict` returns, as JSON.
+        """
+        return json.dumps(self.to_dict(), indent=indent, allow_nan=False, ensure_ascii=False)
+
+    def __str__(self) -> str:
+        rows = spatial_lines(self)
+        width = max(len(label) for label, _ in rows)
+        return "\n".join([self._title(), *(f"{label:<{width}}  {value}" for label, value in rows)])
+
+    def __rich__(self) -> Table:
+        from rich.table import Table
+
+        good = self.status == RunStatus.COMPLETED.value
+        table = Table(
+            title=self._title(), title_style="bold green" if good else "bold red", show_header=False
+        )
+        table.add_column(style="cyan", no_wrap=True)
+        table.add_column()
+        for label, value in spatial_lines(self):
+            table.add_row(label, value)
+        return table
+
+    def _title(self) -> str:
+        return f"{self.robot}: {self.message}"
+
+
+def summarize_in_space(run: SpatialRun) -> SpatialSummary:
+    """Compute the figures of a run in space.
+
+    Parameters
+    ----------
+    run : SpatialRun
+        The run.
+
+    Returns
+    -------
+    SpatialSummary
+        Figures with units in their names.
+    """
+    count = len(run.time)
+    duration = float(run.time[-1] - run.time[0]) if count else 0.0
+    ends = np.array([0, count - 1]) if count else np.zeros(0, dtype=np.int64)
+    center = link_motion(run, ends).center_of_mass
+    moved = center[-1] - center[0] if count else np.zeros(3)
+    distance = float(np.hypot(moved[0], moved[1]))
+    every = max(1, -(-count // MOST_LOOKED_AT))
+    margin = spatial_zero_moment_point(run, np.arange(0, count, every)).margin
+    held = np.diff(run.time)
+    power = run.torque[:-1] * _mean_speed(run)
+    scale = run.robot.weight * distance
+    if not (run.robot.weight > 0.0 and distance > SHORTEST_WAY):
+        scale = UNKNOWN
+    wall = run.timing.wall_s
+    return SpatialSummary(
+        robot=run.robot.name,
+        status=run.status.value,
+        message=run.message,
+        duration_s=duration,
+        forward_m=float(moved[0]),
+        left_m=float(moved[1]),
+        distance_m=distance,
+        speed_m_s=distance / duration if duration > 0.0 else UNKNOWN,
+        turn_rad=_turn(run),
+        touchdowns=sum(event.kind is SpatialEventKind.TOUCHDOWN for event in run.events),
+        zmp_margin_min_m=round(float(np.fmin.reduce(margin, initial=UNKNOWN)), 12) + 0.0,
+        friction_use_max=_friction_use(run),
+        slip_max_m=_slip(run),
+        penetration_max_m=run.certificates.penetration,
+        residual_max=run.certificates.residual,
+        uncertified=run.certificates.uncertified,
+        halved=run.certificates.halved,
+        solver=run.solver,
+        torque_cost_N2m2s=float(((run.torque[:-1] ** 2).sum(axis=1) * held).sum()),
+        cost_of_transport=float((np.abs(power).sum(axis=1) * held).sum() / scale),
+        cost_of_transport_positive=float((np.maximum(power, 0.0).sum(axis=1) * held).sum() / scale),
+        saturations=run.saturations,
+        compile_s=run.timing.compile_s,
+        wall_s=wall,
+        real_time_factor=duration / wall if wall > 0.0 else UNKNOWN,
+        energy_gain_J=run.certificates.energy_gain,
+    )
+
+
+def _mean_speed(run: SpatialRun) -> Floats:
+    """Mean velocity of what each actuator drives from each row to the next, (nt − 1, nu)."""
+    speed = run.velocity[:, run.robot.model.actuator_velocity]
+    return np.asarray(0.5 * (speed[:-1] + speed[1:]))
+
+
+def _turn(run: SpatialRun) -> float:
+    """Angle about the vertical by which the x axis of a floating base has turned."""
+    if not (run.robot.floating and len(run.time)):
+        return UNKNOWN
+    w, x, y, z = run.position[:, 3:7].T
+    heading = np.unwrap(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
+    return float(heading[-1] - heading[0])
+
+
+def _slip(run: SpatialRun) -> float:
+    """Largest distance that a contact point slid while it pushed."""
+    if len(run.time) < 2 or not run.robot.nc:
+        return 0.0
+    speed = np.where(pushing_in_space(run), np.linalg.norm(run.slip, axis=-1), 0.0)
+    return float((speed[:-1] * np.diff(run.time)[:, None]).sum(axis=0).max())
+
+
+def _friction_use(run: SpatialRun) -> float:
+    """Largest share of the friction that all points together had."""
+    if any(box.friction is not None for box in run.ground.boxes) or not run.robot.nc:
+        return UNKNOWN
+    allowed = run.contact_force[..., 0] * run.robot.model.friction_scale * run.ground.friction
+    total = allowed.sum(axis=1)
+    sideways = np.linalg.norm(run.contact_force[..., 1:].sum(axis=1), axis=-1)
+    pressed = pushing_in_space(run).any(axis=1) & (total > 0.0)
+    return (
+        float((sideways[pressed] / total[pressed]).max(initial=0.0)) if pressed.any() else UNKNOWN
+    )
+
+
+# What a person reads, in letters that the consoles of Windows have.
+LINES = {
+    "status": "{s.status}",
+    "distance": "{s.distance_m:.4} m in {s.duration_s:.4} s ({s.speed_m_s:.3} m/s): "
+    "{s.forward_m:.3} m along x, {s.left_m:.3} m along y",
+    "turn": "{s.turn_rad:.3} rad about the vertical",
+    "touchdowns": "{s.touchdowns} of contact points",
+    "zero moment point": "{s.zmp_margin_min_m:.3} m inside the support polygon at least",
+    "friction use": "{s.friction_use_max:.3} of the cone",
+    "slip": "{s.slip_max_m:.2} m",
+    "penetration": "{s.penetration_max_m:.2} m",
+    "contact problems": "{s.solver.solves} solved, {s.solver.shortcuts} by known modes, "
+    "{s.solver.fallbacks} by another way, {s.solver.failures} failed; residual {s.residual_max:.2}",
+    "steps not certified": "{s.uncertified} to 1e-9; {s.halved} halved",
+    "energy made by impacts": "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
+    "torque cost": "{s.torque_cost_N2m2s:.4} N²m²s",
+    "cost of transport": "{s.cost_of_transport:.3} "
+    "({s.cost_of_transport_positive:.3} positive work)",
+    "torques at their limit": "{s.saturations}",
+    "computing time": "{s.wall_s:.3} s ({s.real_time_factor:.3} × real time), "
+    "compilation {s.compile_s:.3} s",
+}
+
+
+def spatial_lines(s: SpatialSummary) -> list[tuple[str, str]]:
+    """Label and value of every line of the table a person reads."""
+    write = Words().format
+    needless = {
+        "energy made by impacts": not s.energy_gain_J > 0.0,
+        "turn": not np.isfinite(s.turn_rad),
+    }
+    return [
+        (label, write(line, s=s)) for label, line in LINES.items() if not needless.get(label, False)
+    ]

@@ -1,0 +1,91 @@
+"""From the shapes of a file, as they are there to be seen, to the solids of a robot in space."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heelstrike.robot.files.mujoco_file import MujocoFile
+from heelstrike.robot.files.shapes import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    ELLIPSOID,
+    FARTHEST,
+    MESH,
+    MOST_SHAPES,
+    SPHERE,
+    mesh_corners,
+)
+from heelstrike.robot.shapes.solids import few_corners
+from heelstrike.robot.spatial.links import SpatialLinks
+from heelstrike.robot.spatial.solids import Solid, ball
+
+MOST_CORNERS = 28
+"""Corners by which a mesh is drawn at most."""
+
+AROUND = 16
+"""Corners round each end of a cylinder that is drawn."""
+
+DIGITS = 6
+"""Digits behind the point of places of solids: micrometres."""
+
+
+def read_solids(file: MujocoFile, links: SpatialLinks) -> tuple[Solid, ...]:
+    """Return what the links of a robot look like.
+
+    Of every body of the file the shapes that do not collide, which are there to be seen, or the
+    others if there are none. A mesh is the hull of some of its corners.
+    """
+    model = file.model
+    shown = (model.geom_contype | model.geom_conaffinity) == 0
+    found: list[Solid] = []
+    for body in range(1, model.nbody):
+        link = int(links.of_body[body])
+        geoms = np.flatnonzero(np.asarray(model.geom_bodyid) == body)
+        if link < 0 or len(geoms) > MOST_SHAPES:
+            continue
+        for only_seen in (True, False):
+            solids = [
+                solid
+                for geom in geoms.tolist()
+                if shown[geom] == only_seen
+                and (solid := _solid(file, geom, link, links)) is not None
+            ]
+            if solids:
+                found += solids
+                break
+    return tuple(found)
+
+
+def _solid(file: MujocoFile, geom: int, link: int, links: SpatialLinks) -> Solid | None:
+    """Return the solid of a geom; none of one that has no shape, or no size."""
+    model, pose = file.model, file.pose
+    kind, size = int(model.geom_type[geom]), np.asarray(model.geom_size[geom])
+    radius = float(size[0]) if kind in (SPHERE, CAPSULE) else 0.0
+    if kind == SPHERE:
+        local = np.zeros((1, 3))
+    elif kind == CAPSULE:
+        local = np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]])
+    elif kind == ELLIPSOID:
+        local = size * ball()
+    elif kind == BOX:
+        local = size * np.array(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij")).reshape(3, -1).T
+    elif kind == CYLINDER:
+        angle = np.arange(AROUND) * (2.0 * np.pi / AROUND)
+        around = size[0] * np.column_stack((np.cos(angle), np.sin(angle)))
+        ends = [np.column_stack((around, np.full(AROUND, end))) for end in (-size[1], size[1])]
+        local = np.concatenate(ends)
+    elif kind == MESH:
+        local = mesh_corners(file, geom)
+    else:
+        return None
+    world = pose.geom_xpos[geom] + local @ pose.geom_xmat[geom].reshape(3, 3).T
+    place = np.asarray((world - links.origin[link]) @ links.axes[link])
+    if not (len(place) and np.all(np.abs(place) < FARTHEST) and radius < FARTHEST):
+        return None
+    if kind == MESH:
+        try:
+            place, _ = few_corners(place, MOST_CORNERS)
+        except (ArithmeticError, RuntimeError, ValueError, np.linalg.LinAlgError):
+            return None  # corners of which no hull can be made
+    return Solid(link, np.round(place, DIGITS), radius)

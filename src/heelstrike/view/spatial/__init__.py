@@ -1,0 +1,1 @@
+"""Pictures of robots and runs in space: figures, portraits, animations, pages."""

@@ -1,0 +1,206 @@
+"""save_html(): a run in space as one HTML file."""
+
+from __future__ import annotations
+
+import os
+from importlib.resources import files
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from heelstrike.analysis.spatial.summary import spatial_lines, summarize_in_space
+from heelstrike.arguments import takes
+from heelstrike.errors import ViewError
+from heelstrike.sim.spatial.record import SpatialEventKind
+from heelstrike.sim.spatial.run import SpatialEvent, SpatialRun
+from heelstrike.view.page.columns import TOLERANCE, packed
+from heelstrike.view.page.markup import data_block, document, escaped, shipped, table
+from heelstrike.view.page.page import MOST_EVENTS, MOST_PHASES, check_page
+from heelstrike.view.page.provenance import versions
+from heelstrike.view.page.rows import MOST_ROWS, Rows, rows_about
+from heelstrike.view.spatial.scene import moving_columns, scene_in_space, spatial_plots
+from heelstrike.view.style import in_words, view_errors
+from heelstrike.whole_file import write_whole
+
+LARGEST = 1_400_000
+"""Bytes of a page above which it has fewer rows."""
+
+FEWEST_ROWS = 100
+
+IMPACTS = (SpatialEventKind.TOUCHDOWN, SpatialEventKind.JOINT_STOP)
+
+CAMERA = (
+    " Dragging turns the picture, with Shift it moves; the wheel, + and − come nearer and go away; "
+    "f follows the robot or stays; r takes the camera back; 1 to 4 look from aslant, the right, "
+    "ahead and behind."
+)
+
+
+@takes(ViewError)
+def save_html(run: SpatialRun, path: str | os.PathLike[str], *, command: str = "") -> Path:
+    """Write a run in space as one HTML file: animation, events, curves, figures, provenance.
+
+    The file needs nothing else and asks for nothing: it opens from a disk or a mail, without a
+    network, in any browser of the last years. It holds at most 1.5 MB: a long run has fewer rows.
+
+    Parameters
+    ----------
+    run : SpatialRun
+        The run.
+    path : str or path
+        File to write, .html or .htm.
+    command : str
+        The command that made the run, for its provenance.
+
+    Returns
+    -------
+    Path
+        The file. It appears whole or not at all.
+
+    Raises
+    ------
+    ViewError
+        If the run is empty, or the file cannot be written.
+    """
+    target = check_page(path)
+    text = page_in_space(run, command=command)
+    with view_errors():
+        return write_whole(target, text)
+
+
+def page_in_space(run: SpatialRun, *, command: str = "") -> str:
+    """Write the page of a run; see :func:`save_html`."""
+    if not len(run.time):
+        raise ViewError(f"there is nothing to show: the run has no rows ({run.message})")
+    summary = summarize_in_space(run)
+    parts = {
+        "title": escaped(run.robot.name),
+        "headline": escaped(run.message),
+        "summary": table(dict(spatial_lines(summary)), "Summary"),
+        "certificates": table(_certificates(run), "Certificates: worst values over all steps"),
+        "provenance": table(_provenance(run, command), "Where this comes from"),
+        "camera": escaped(CAMERA),
+    }
+    body = shipped("player.html")
+    for name, part in parts.items():
+        body = body.replace(f"<!--{name}-->", part)
+    scripts = map(shipped, ("drawing.js", "recording.js"))
+    own = files(__package__).joinpath("space.js").read_text(encoding="utf-8")
+    script = "".join((*scripts, own, shipped("player.js")))
+    title = f"{run.robot.name}: {run.message}"
+    most = MOST_ROWS
+    while True:
+        block = data_block("run", contents(run, most=most))
+        if len(block) <= LARGEST - len(script) or most <= FEWEST_ROWS:
+            break
+        most = max(FEWEST_ROWS, int(0.6 * most))
+    return document(title, body + block, style=shipped("page.css"), script=script)
+
+
+def contents(run: SpatialRun, *, most: int = MOST_ROWS) -> dict[str, Any]:
+    """Return what the script of a page shows, as JSON has it, of at most so many rows."""
+    rows = _shown_rows(run, most)
+    panels = spatial_plots(run, rows)
+    columns = moving_columns(run, rows)
+    for i, panel in enumerate(panels):
+        for k, trace in enumerate(panel.traces):
+            assert trace.values is not None
+            columns[f"curve {i} {k}"] = trace.values
+    events = run.events[:MOST_EVENTS]
+    return {
+        "scene": scene_in_space(run.robot, run.ground),
+        "data": packed(run.time[rows], columns),
+        "plots": [panel.described() for panel in panels],
+        "events": [_described(event, run) for event in events],
+        "phases": _phases(run),
+        "left_out": len(run.events) - len(events),
+        "recorded": len(run.time),
+        "tolerance": TOLERANCE,
+    }
+
+
+def _shown_rows(run: SpatialRun, most: int) -> Rows:
+    impacts = [event.time for event in run.events if event.kind in IMPACTS]
+    rows = rows_about(run.time, [event.time for event in run.events], impacts, most=most)
+    if len(rows) <= most:
+        return rows
+    return np.unique(rows[np.linspace(0, len(rows) - 1, most).round().astype(np.int64)])
+
+
+def _phases(run: SpatialRun) -> list[list[float]]:
+    """Spans of time in which the same feet press: begin, end, feet."""
+    pressed = run.contact_force[..., 0] > 1e-9 * run.robot.weight
+    feet = [pressed[:, list(foot.contacts)].any(axis=1) for foot in run.robot.feet]
+    if not feet or len(run.time) < 2:
+        return []
+    table_of_feet = np.stack(feet, axis=1)
+    changes = np.flatnonzero((table_of_feet[1:] != table_of_feet[:-1]).any(axis=1)) + 1
+    edges = [0, *changes.tolist(), len(run.time) - 1]
+    return [
+        [float(run.time[a]), float(run.time[b]), *np.flatnonzero(table_of_feet[a]).tolist()]
+        for a, b in pairwise(edges)
+        if b > a
+    ][:MOST_PHASES]
+
+
+OF_POINTS = (
+    SpatialEventKind.TOUCHDOWN,
+    SpatialEventKind.LIFTOFF,
+    SpatialEventKind.SLIP,
+    SpatialEventKind.STICK,
+)
+OF_VELOCITIES = (SpatialEventKind.JOINT_SLIP, SpatialEventKind.JOINT_STICK)
+
+
+def _where(event: SpatialEvent, run: SpatialRun) -> str:
+    """Name of the contact point, joint or velocity at which an event happened."""
+    if event.kind in OF_POINTS:
+        return in_words(run.robot.contact_names[event.contact])
+    if event.kind is SpatialEventKind.JOINT_STOP:
+        return in_words(run.robot.joint_names[event.contact])
+    if event.kind in OF_VELOCITIES:
+        return in_words(run.robot.velocity_names[event.contact])
+    return ""
+
+
+def _described(event: SpatialEvent, run: SpatialRun) -> dict[str, Any]:
+    of_a_point = event.kind in OF_POINTS
+    return {
+        "time": event.time,
+        "kind": in_words(event.kind.name.lower()),
+        "where": _where(event, run),
+        "contact": event.contact if of_a_point else -1,
+        "impulse": event.impulse[0] if of_a_point else 0.0,
+        "unit": "N s" if of_a_point else "",
+        "impact": event.kind in IMPACTS,
+    }
+
+
+def _certificates(run: SpatialRun) -> dict[str, str]:
+    worst, solver = run.certificates, run.solver
+    return {
+        "deepest penetration": f"{worst.penetration:.3g} m",
+        "residual of the contact problems": f"{worst.residual:.3g} of the data",
+        "steps not certified to 1e-9": str(worst.uncertified),
+        "steps taken in parts": str(worst.halved),
+        "contact problems": f"{solver.solves}, {solver.shortcuts} by known modes, "
+        f"{solver.fallbacks} by another way, {solver.failures} failed",
+    }
+
+
+def _provenance(run: SpatialRun, command: str) -> dict[str, str]:
+    robot, ground = run.robot, run.ground
+    normal = ", ".join(f"{float(value):.4g}" for value in np.asarray(ground.normal))
+    return {
+        **({"command": command} if command else {}),
+        **versions(),
+        "robot": f"{robot.name}, {robot.total_mass:.6g} kg, {robot.nv} velocities, {robot.nu} "
+        f"actuators, {robot.nc} contact points",
+        "ground": f"plane with normal ({normal}), {len(ground.boxes)} boxes, friction "
+        f"{ground.friction:g}, restitution {ground.restitution:g}",
+        "method": repr(run.method),
+        "record": f"{run.steps} steps, {len(run.time)} rows from {run.time[0]:.6g} s to "
+        f"{run.time[-1]:.6g} s, {len(run.events)} events",
+    }
