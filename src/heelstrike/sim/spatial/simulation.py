@@ -271,7 +271,7 @@ class SpatialSimulation:
         return f"t = {self.time:.6g} s"
 
     def _kept(self) -> dict[str, Bundle]:
-        """All that its further course hangs on, beside a controller in Python."""
+        """All that its further course depends on, beside a controller in Python."""
         law = self._law
         return {
             "memory.": self._memory, "clock.": self._clock, "parameters.": law.parameters,
@@ -279,7 +279,7 @@ class SpatialSimulation:
         }  # fmt: skip
 
     def snapshot(self) -> SpatialSnapshot:
-        """Return everything that the further course hangs on, in this process.
+        """Return everything that the further course depends on, in this process.
 
         Raises
         ------
@@ -296,7 +296,7 @@ class SpatialSimulation:
         return SpatialSnapshot(self.time, self.robot, self._controller, arrays, numbers)
 
     def restore(self, snapshot: SpatialSnapshot) -> None:
-        """Be again as a simulation was; the record begins anew.
+        """Be again as a simulation was; the record starts again.
 
         Parameters
         ----------
