@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 from heelstrike.wording import LONGEST_GUESS, meant, some_of
 
 
@@ -18,3 +21,25 @@ def test_a_misspelt_name_is_guessed() -> None:
     assert meant("mas", {"mass": "<mass>"}, " ({}?)") == " (<mass>?)"
     assert meant("x" * 10_000_000, ["walk"]) == ""
     assert meant("walk" + " " * 2 * LONGEST_GUESS, ["w" * LONGEST_GUESS]) == ""
+
+
+FORBIDDEN = {
+    r"\bhangs? on\b": "depends on; is attached to",
+    r"\banew\b": "again",
+    r"\bfor ever\b": "forever",
+    r"\bseen and touched\b": "live viewer",
+}
+"""Phrases that readers stumbled over, and what to write instead."""
+
+
+def test_no_page_and_no_message_has_a_phrase_that_readers_stumbled_over() -> None:
+    root = Path(__file__).resolve().parent.parent
+    texts = [root / "README.md", root / "CONTRIBUTING.md", *(root / "docs").rglob("*.md")]
+    texts += (root / "src").rglob("*.py")
+    found = [
+        f"{text.relative_to(root)}: {match[0]!r}, write {instead!r}"
+        for text in texts
+        for phrase, instead in FORBIDDEN.items()
+        for match in re.finditer(phrase, text.read_text(encoding="utf-8"), re.IGNORECASE)
+    ]
+    assert found == []
