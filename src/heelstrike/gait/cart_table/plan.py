@@ -116,7 +116,7 @@ def plan_motion(
     request = checked_request(
         robot, phases, repeat="mirrored", distance=step_length, duration=step_duration, speed=None,
         start=None, end=None, friction=friction, clearance=0.0, slope=0.0, cost="torque",
-        force_margin=0.0,
+        force_margin=0.0, landing_speed=0.0,
     )  # fmt: skip
     program = MotionProgram(
         request, Instants(robot, request.cost, per_metre=False),

@@ -193,7 +193,9 @@ def _from_json(path: Name, gaps: bool) -> Table:
     except json.JSONDecodeError as error:
         raise GaitError(f"{path}, line {error.lineno}: no JSON: {error.msg}") from error
     except (RecursionError, ValueError) as error:
-        raise GaitError(f"{path} cannot be read: {str(error)[:100]}") from error
+        raise GaitError(
+            f"{path} cannot be read: {str(error).removeprefix(f'{path}: ')[:100]}"
+        ) from error
     if not isinstance(data, dict):
         raise GaitError(f'{path}: columns by name are wanted, as {{"time [s]": [0.0, ...], ...}}')
     rate = data.pop("rate_Hz", None)

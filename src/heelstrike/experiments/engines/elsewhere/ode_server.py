@@ -16,7 +16,7 @@ shared = runpy.run_path(str(Path(__file__).with_name("exchange.py")))
 Server, Tree = shared["Server"], shared["Tree"]
 settings_of = shared["settings_of"]
 
-MASSLESS = 1e-9
+AS_GOOD_AS_NONE = 1e-9
 """Mass (kg) and inertia (kg m²) that stand for none."""
 
 
@@ -75,9 +75,18 @@ class Robot:
     def _body(self, link: dict[str, Any]) -> Any:
         body = ode.Body(self.world)
         mass = ode.Mass()
-        inertia = max(link["inertia"], MASSLESS)
+        inertia = max(link["inertia"], AS_GOOD_AS_NONE)
         mass.setParameters(
-            max(link["mass"], MASSLESS), 0.0, 0.0, 0.0, inertia, inertia, inertia, 0.0, 0.0, 0.0
+            max(link["mass"], AS_GOOD_AS_NONE),
+            0.0,
+            0.0,
+            0.0,
+            inertia,
+            inertia,
+            inertia,
+            0.0,
+            0.0,
+            0.0,
         )
         body.setMass(mass)
         return body
