@@ -75,3 +75,15 @@ def test_what_engines_are_not_asked_for_is_refused(
         assert result.exit_code == 2
         assert "on level ground without restitution or pushes" in " ".join(result.stderr.split())
     assert not asked
+
+
+def test_options_that_would_do_nothing_are_refused(tmp_path: Path) -> None:
+    without = invoke(tmp_path, "--page", "page.md", "--films")
+    assert without.exit_code == 2
+    assert "--page, --films: for other engines only" in " ".join(without.output.split())
+    within = invoke(tmp_path, "--engines", "mujoco", "--method", "compliant")
+    assert within.exit_code == 2
+    assert "engines have methods of their own" in " ".join(within.output.split())
+    sizes = invoke(tmp_path, "--engines", "mujoco", "--sizes", "abc")
+    assert sizes.exit_code == 2
+    assert "--sizes" in sizes.output

@@ -31,6 +31,7 @@ from heelstrike.cli.terminal import (
     tell_interruption,
     wrote,
 )
+from heelstrike.errors import SimulationError
 
 USUAL = (
     Method.EVENT_DRIVEN,
@@ -76,6 +77,10 @@ def compare(
     from heelstrike.view.style import save_figure
     from heelstrike.whole_file import write_whole
 
+    if others.engines is None:
+        others.refuse_without_engines()
+    elif method:
+        raise SimulationError("--method: engines have methods of their own. Leave it out")
     case = asked_for(robot, how, walking, steps=steps, restitution=restitution)
     methods = methods_asked(case, method or USUAL, step)
     case = with_gait(case, walking.gait)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from heelstrike.cli.terminal import output, stage, tell, wrote
+from heelstrike.cli.values import numbers_called
+from heelstrike.errors import SimulationError
 
 if TYPE_CHECKING:
     from heelstrike.experiments.engine_comparison import EngineComparison
@@ -66,6 +68,19 @@ class InEngines:
         bool, typer.Option("--quick", help="In engines: four steps at 1 ms, for a try.")
     ] = False
 
+    def refuse_without_engines(self) -> None:
+        """Refuse options of engines where none is asked for."""
+        usual = InEngines()
+        given = [
+            f"--{name}"
+            for name in vars(usual)
+            if name != "engines" and getattr(self, name) != getattr(usual, name)
+        ]
+        if given:
+            raise SimulationError(
+                f"{', '.join(given)}: for other engines only. Add --engines all, or leave out"
+            )
+
 
 def compare_in_engines(
     case: Case, start: Beginning, asked: InEngines, steps: int, out: Path, *, as_json: bool
@@ -85,7 +100,7 @@ def compare_in_engines(
         return
     sizes: tuple[float, ...] = QUICK_SIZES if asked.quick else STEP_SIZES
     if asked.sizes is not None:
-        sizes = tuple(float(each) for each in asked.sizes.split(","))
+        sizes = tuple(numbers_called(asked.sizes, "--sizes"))
     names = asked.engines.split(",")
     with stage("walking in engines") as show:
         comparison = compare_engines(
@@ -166,8 +181,6 @@ def _write_page(comparison: EngineComparison, out: Path, page: Path) -> None:
 
 def _check(case: Case) -> None:
     """Refuse what engines are not asked for."""
-    from heelstrike.errors import SimulationError
-
     ground = case.ground.model()
     level = case.ground.shape is None and not ground.vertices[:, 1].any()
     if not level or case.pushes or ground.restitution.any():

@@ -38,13 +38,14 @@ def planners(
     """
     with stage("loading"):
         from heelstrike.experiments.planners import compare_planners
-        from heelstrike.robot import builtin_robots, load_robot
+        from heelstrike.robot import builtin_robots
+        from heelstrike.robot.library import load_planar_robot
         from heelstrike.view.planner_figure import draw_planners
         from heelstrike.view.style import save_figure
         from heelstrike.whole_file import write_whole
 
         built_in = robot in builtin_robots()
-        machine = load_robot(robot) if built_in else load_robot(robot, **how.keywords())
+        machine = load_planar_robot(robot, **({} if built_in else how.keywords()))
         asked = numbers_called(speeds, "--speeds")
     with stage("walking") as doing:
         found = compare_planners(

@@ -38,6 +38,8 @@ COLUMNS = {
 """Figures of a walk and their headings."""
 OPTIMUM = "optimum"
 """What the optimal gait is called."""
+REACHED = 0.9
+"""Share of the distance that is asked for from which on a robot has walked."""
 LANDING = 5e-3
 """Time (s) around an event in which feet come to rest and the zero moment point says nothing."""
 UNKNOWN = float("nan")
@@ -174,11 +176,10 @@ def _walked(
         ground=Ground(friction=friction),
     )  # fmt: skip
     fall = first_cause(run, walk if isinstance(walk, Gait) else None)
-    if not walked_on(run, fall):
-        return Planned(
-            planner, speed, walks=False, message=run.message if fall is None else str(fall)
-        )
     summary = run.summary()
+    if not (walked_on(run, fall) and summary.distance_m > REACHED * speed * duration):
+        message = f"{run.message}, {summary.distance_m:.3g} m ahead" if fall is None else str(fall)
+        return Planned(planner, speed, walks=False, message=message)
     return Planned(
         planner=planner,
         speed=speed,

@@ -71,6 +71,7 @@ def test_both_planners_at_a_given_height(bravo7: hs.Robot) -> None:
         ({"planner": "prewiev"}, "planner must be one of 'preview', 'capture_point'"),
         ({"step_length": -0.3}, "step_length must be a positive number"),
         ({"step_duration": np.inf}, "step_duration must be a positive number"),
+        ({"step_duration": 0.002}, "step_duration must be from 0.1 to 10 s"),
         ({"double_support": 1.0}, "between 0 and 1"),
         ({"clearance": 0.0}, "clearance must be a positive number"),
         ({"corrections": -1}, "whole number from 0 to 10"),

@@ -261,6 +261,19 @@ def test_velocities_repeat_without_a_rest(running: hs.Motion) -> None:
         assert np.abs(running.velocity(t)[:, 0]).min() > 1.0
 
 
+def test_a_guess_is_taken_between_two_states_as_well(bravo7: hs.Robot) -> None:
+    low, high = (crouched(bravo7, knee) for knee in (0.9, 0.3))
+    both = hs.ContactPhase("right_foot", "left_foot", duration=(0.5, 0.9), pieces=4)
+    asked = []
+
+    def guess(time: float) -> np.ndarray:
+        asked.append(time)
+        return low.q + (high.q - low.q) * min(time / 0.5, 1.0)
+
+    hs.optimize_motion(bravo7, [both], repeat="never", start=low, end=high, starts=1, guess=guess)
+    assert asked
+
+
 def test_states_that_do_not_stand_are_refused(bravo7: hs.Robot) -> None:
     """What stands must be on the ground, and be where it was."""
     low, high = (crouched(bravo7, knee) for knee in (0.9, 0.3))

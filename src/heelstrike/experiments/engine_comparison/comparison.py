@@ -169,7 +169,7 @@ def compare_engines(
     say("the truth, event by event", 0.0)
     truth = walk.ours(TRUTH)
     versions = peers(load=False)
-    kept = KeptRows(folder, walk.entries())
+    kept = KeptRows(folder if walk.can_be_told else None, walk.entries())
     asked = [("heelstrike", "heelstrike", DEFAULTS, step) for step in step_sizes]
     for name, entry in entries.items():
         for which in settings:
@@ -182,8 +182,9 @@ def compare_engines(
             say(f"{title}, {which}, {1e3 * step:g} ms", k / len(asked))
             row = EngineRow(
                 name, title, which, step, None, "",
-                f"heelstrike compare {robot.name} --engines {name} --settings {which} "
-                f"--sizes {step:g} --steps {steps}",
+                f"heelstrike compare {robot.name} --engines {'all' if name in OURS else name} "
+                f"--settings {which} --sizes {step:g} --steps {steps} --period {control_period:g} "
+                f"--controller {type(controller).__name__}",
             )  # fmt: skip
             if name in OURS:
                 rows.append(kept.row(row, {}, partial(walk.by, OURS[name](step), truth)))

@@ -22,7 +22,10 @@ from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.kept_files import program_digest
 from heelstrike.whole_file import write_whole
 
-ROOMS = ("experiments/engines", "experiments/engine_comparison", "analysis", "sim", "control")
+ROOMS = (
+    "experiments/engines", "experiments/engine_comparison", "analysis", "sim", "control", "contact",
+    "dynamics", "gait", "robot", "compiler",
+)  # fmt: skip
 """Rooms of this package whose text is in the digest."""
 
 

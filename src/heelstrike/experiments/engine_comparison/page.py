@@ -82,7 +82,7 @@ process of its own, is given torques, and tells its state and its contact forces
 compiled one of heelstrike, called every 2 ms with the engine's state and forces, whatever the
 engine's step. Times are those of the engine's steps alone, with the calls from Python that a step
 takes, and ours with the law; they were taken beside other work, so that a factor of two means
-little.
+little. The tables may come from several runs: each says its steps, its law and its step size.
 """
 
 
@@ -97,10 +97,10 @@ def _title(name: str) -> str:
 
 
 def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
-    versions = next(iter(walks.values()))["versions"]
+    versions = {name: each for walk in walks.values() for name, each in walk["versions"].items()}
     theirs = [
         [
-            _title(name), "" if name == "heelstrike" else versions[ENTRIES[name].package],
+            _title(name), "" if name == "heelstrike" else versions.get(ENTRIES[name].package, ""),
             f.languages, f.engine, f.graphics, f.licence, f.systems, f.open_source,
             f.documentation,
         ]

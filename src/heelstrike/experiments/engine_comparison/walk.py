@@ -54,6 +54,11 @@ class Walk:
         for process in self.processes.values():
             process.end()
 
+    @property
+    def can_be_told(self) -> bool:
+        """Whether two controllers can be told apart: one in Python says nothing of its numbers."""
+        return isinstance(self.controller, Law) or hasattr(self.controller, "snapshot")
+
     def entries(self) -> dict[str, Any]:
         """Return all that a walk follows from but the engine, as JSON has it."""
         law = self.controller

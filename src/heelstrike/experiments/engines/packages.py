@@ -96,9 +96,12 @@ def _state(package: Package, load: bool) -> str:
 def _state_elsewhere(package: Package) -> str:
     from heelstrike.experiments.engines.served import version_elsewhere
 
-    return version_elsewhere(package.module) or (
-        f"{NOT_INSTALLED}: Debian has it as {package.distribution}"
-    )
+    found = version_elsewhere(package.module)
+    if found:
+        return found
+    if package.distribution.startswith("python3-"):
+        return f"{NOT_INSTALLED}: Debian has it as {package.distribution}"
+    return f"{NOT_INSTALLED}: pip install {package.distribution}"
 
 
 def compared(found: dict[str, str]) -> list[str]:

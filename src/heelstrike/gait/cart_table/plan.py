@@ -33,6 +33,8 @@ HEIGHTS = np.arange(0.99, 0.7, -0.01)
 """Heights of the centre of mass that are tried, as shares of that of the standing robot."""
 PIECES = (8, 16)
 """Pieces of polynomials in double and in single support."""
+SHORTEST, LONGEST = 0.1, 10.0
+"""Durations (s) of steps that are planned."""
 CORRECTIONS = 2
 """Times that the plan is corrected by the zero moment point of the whole robot."""
 
@@ -137,6 +139,10 @@ def _check_numbers(
     ):  # fmt: skip
         if not (np.isfinite(value) and value > 0.0):
             raise GaitError(f"{name} must be a positive number{unit}, got {value!r}")
+    if not SHORTEST <= step_duration <= LONGEST:
+        raise GaitError(
+            f"step_duration must be from {SHORTEST:g} to {LONGEST:g} s, got {step_duration:g}"
+        )
     if not 0.0 < double_support < 1.0:
         raise GaitError(
             f"double_support is a part of the step, between 0 and 1, not {double_support}"

@@ -35,10 +35,10 @@ def guess_of(program: MotionProgram, *, lean: float = 0.0, lowered: float = LOWE
     request = program.request
     durations = request.usual
     distance = _distance(request, durations)
-    if request.repeat is Repeat.NEVER and request.start is not None and request.end is not None:
-        drawn: _Drawing = _Between(request, durations)
-    elif request.guess is not None:
-        drawn = _Given(request)
+    if request.guess is not None:
+        drawn: _Drawing = _Given(request)
+    elif request.repeat is Repeat.NEVER and request.start is not None and request.end is not None:
+        drawn = _Between(request, durations)
     else:
         drawn = _Walking(request, durations, distance, lean, lowered)
     ends = np.cumsum(durations)
