@@ -183,6 +183,10 @@ def _kinds(annotation: Any) -> tuple[str, ...]:
 def refusal(name: str, value: object, kinds: Sequence[str]) -> str:
     """Say that an argument is none of what is wanted, what was given, and what makes one."""
     makes = next((INSTEAD[kind] for kind in kinds if kind in INSTEAD), "")
+    if "Robot" in kinds and type(value).__name__ == "SpatialRobot":
+        makes = "this is for the plane: hs.load_robot(file, dimension=2) makes one"
+    if "Run" in kinds and type(value).__name__ == "SpatialRun":
+        makes = "this is for runs in the plane"
     advice = f"; {makes}" if makes else ""
     return f"{name} must be {_words(kinds)}, got {shown(value)}{advice}"
 

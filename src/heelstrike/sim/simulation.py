@@ -161,8 +161,18 @@ class Simulation:
         if isinstance(robot, SpatialRobot):
             from heelstrike.sim.spatial.simulation import SpatialSimulation
 
+            if cls is not Simulation:
+                raise SimulationError(
+                    f"{cls.__name__} simulates robots in the plane. In space derive from "
+                    "heelstrike.sim.spatial.SpatialSimulation"
+                )
             return SpatialSimulation(robot, *others, **setup)
         return super().__new__(cls)
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Tell a subclass by the signature of its own beginning."""
+        super().__init_subclass__(**options)
+        cls.__signature__ = _of_init(cls.__init__)  # type: ignore[attr-defined]
 
     @takes(SimulationError)
     def __init__(

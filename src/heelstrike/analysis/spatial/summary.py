@@ -65,7 +65,9 @@ class SpatialSummary(ShownInNotebooks):
     latter is relative."""
     uncertified: int
     halved: int
-    """uncertified, halved: Steps that went on with a residual above 1e-9; steps taken in parts."""
+    relaxed: int
+    """uncertified, halved, relaxed: Steps that went on with a residual above 1e-9; steps taken in
+    parts; contact problems in which points in a wedge were not asked to leave the ground."""
     solver: SpatialSolverCount
     """How the contact problems were solved."""
     torque_cost_N2m2s: float  # noqa: N815 - units keep their capitals
@@ -171,6 +173,7 @@ def summarize_in_space(run: SpatialRun) -> SpatialSummary:
         residual_max=run.certificates.residual,
         uncertified=run.certificates.uncertified,
         halved=run.certificates.halved,
+        relaxed=run.certificates.relaxed,
         solver=run.solver,
         torque_cost_N2m2s=float(((run.torque[:-1] ** 2).sum(axis=1) * held).sum()),
         cost_of_transport=float((np.abs(power).sum(axis=1) * held).sum() / scale),
@@ -232,7 +235,8 @@ LINES = {
     "penetration": "{s.penetration_max_m:.2} m",
     "contact problems": "{s.solver.solves} solved, {s.solver.shortcuts} by known modes, "
     "{s.solver.fallbacks} by another way, {s.solver.failures} failed; residual {s.residual_max:.2}",
-    "steps not certified": "{s.uncertified} to 1e-9; {s.halved} halved",
+    "steps not certified": "{s.uncertified} to 1e-9; {s.halved} halved; {s.relaxed} not asked to "
+    "leave the ground (in wedges)",
     "energy made by impacts": "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
     "torque cost": "{s.torque_cost_N2m2s:.4} N²m²s",
     "cost of transport": "{s.cost_of_transport:.3} "

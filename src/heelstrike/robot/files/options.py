@@ -117,7 +117,8 @@ class Options:
         """What JSON can hold of them; macros are expanded before."""
         return {
             **{name: getattr(self, name) for name in ("floating", "projected", "forward")},
-            **{name: getattr(self, name) for name in ("mirror", "mesh_points", "lenient")},
+            **{name: getattr(self, name) for name in ("mirror", "lenient")},
+            "mesh_points": int(self.mesh_points),
             "pose": self.pose and {joint: float(value) for joint, value in self.pose.items()},
             "package_path": [str(folder.absolute()) for folder in self.packages],
         }

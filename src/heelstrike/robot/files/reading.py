@@ -204,6 +204,11 @@ def _read(
             if asked.dimension is not None:
                 raise
             leaves = error
+            if options.mirror is not None:
+                raise RobotError(
+                    f"{error} Left and right are made equal in the plane only: add dimension=2, or "
+                    "leave out mirror."
+                ) from error
             caught.clear()  # what was said of a robot that is not the one
     robot = spatial_robot(source, options, asked.name, asked.text)
     if leaves is not None and not robot.floating:

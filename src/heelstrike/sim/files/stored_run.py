@@ -73,6 +73,11 @@ def stored_run(
     """
     stored = Stored({name.removeprefix("/"): value for name, value in contents.items()})
     if "@heelstrike_format" not in stored.contents:
+        if "in space" in str(stored.contents.get("@title", "")):
+            raise RunFileError(
+                f"{source}: a run in space, which cannot be taken up again. Read its data with "
+                "xarray.open_dataset."
+            )
         raise RunFileError(f"{source}: this NetCDF file is not a run of heelstrike")
     try:
         layout = stored.number("heelstrike_format")

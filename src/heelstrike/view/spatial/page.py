@@ -185,6 +185,7 @@ def _certificates(run: SpatialRun) -> dict[str, str]:
         "residual of the contact problems": f"{worst.residual:.3g} of the data",
         "steps not certified to 1e-9": str(worst.uncertified),
         "steps taken in parts": str(worst.halved),
+        "problems of wedges, not asked to leave the ground": str(worst.relaxed),
         "contact problems": f"{solver.solves}, {solver.shortcuts} by known modes, "
         f"{solver.fallbacks} by another way, {solver.failures} failed",
     }
