@@ -11,6 +11,11 @@ from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
 
+ROLLS = """<mujoco><worldbody><body name="trunk"><freejoint/><geom size="0.1" mass="9"/>
+<body name="leg" pos="0 0.1 0"><joint name="roll" axis="1 0 0"/>
+<geom name="foot" size="0.05" pos="0 0 -0.5" mass="1"/></body></body></worldbody></mujoco>"""
+"""A robot whose leg leaves the plane."""
+
 
 def test_what_cannot_be_read_is_told(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["mimic", str(tmp_path / "none.trc")])
@@ -19,6 +24,20 @@ def test_what_cannot_be_read_is_told(tmp_path: Path) -> None:
     wrong = CliRunner().invoke(app, ["mimic", "winter", "--marker", "right_hip"])
     assert wrong.exit_code == 2
     assert "LANDMARK=NAME" in wrong.stderr
+
+
+def test_what_cannot_come_of_it_is_told_before_it_is_computed(tmp_path: Path) -> None:
+    """The recording is not even opened: there is none."""
+    none = str(tmp_path / "none.trc")
+    rate = CliRunner().invoke(app, ["mimic", none, "--csv-rate", "0"])
+    assert rate.exit_code == 2
+    assert "--csv-rate must be from" in rate.stderr
+    robot = tmp_path / "turns.xml"
+    robot.write_text(ROLLS)
+    leaves = CliRunner().invoke(app, ["mimic", none, "--robot", str(robot)])
+    assert leaves.exit_code == 2
+    assert "none.trc" not in leaves.stderr
+    assert "plane" in leaves.stderr
 
 
 @pytest.mark.slow

@@ -51,7 +51,8 @@ class Recording:
         typer.Option(help="Axis of the walk: x, -x, y, ...", show_default="from heel to toe"),
     ] = None
     forces: Annotated[
-        Path | None, typer.Option(dir_okay=False, help="Measured forces: .mot, .sto or a table.")
+        Path | None,
+        typer.Option(dir_okay=False, help="Forces measured with markers: .mot, .sto or a table."),
     ] = None
 
     def landmarks(self) -> dict[str, str]:
@@ -96,18 +97,23 @@ def mimic(
 ) -> None:
     """Find the gait nearest to a recorded person that is exact on hard contact, and walk it.
 
-    Writes motion.json, motion.csv (for a robot), person.csv, angles.png, walk.nc and summary.json.
-    The exit status is 0 if all steps were walked, 1 if not.
+    Writes motion.json, motion.csv (for a robot), person.csv, angles.png, walk.nc and summary.json;
+    moments.csv where forces were measured. The exit status is 0 if all steps were walked, 1 if not.
     """
     with stage("loading"):
         from heelstrike.experiments.people import mimic as mimicked
         from heelstrike.experiments.people.writing import figures_of, write_mimicry
-        from heelstrike.robot import builtin_robots, load_robot
+        from heelstrike.gait.recordings.saving import check_rate
+        from heelstrike.robot import builtin_robots
+        from heelstrike.robot.library import load_planar_robot
 
+        check_rate(csv_rate, "--csv-rate")
         machine = None
         if robot is not None:
             built_in = robot in builtin_robots()
-            machine = load_robot(robot) if built_in else load_robot(robot, **how.keywords())
+            machine = (
+                load_planar_robot(robot) if built_in else load_planar_robot(robot, **how.keywords())
+            )
     with stage("reading", when_slow=FIRST_TIME) as doing:
         found = mimicked(
             recording, robot=machine, mass=person.mass, height=person.height, speed=person.speed,

@@ -62,7 +62,9 @@ def test_who_walks_another_way_is_turned_round(tmp_path: Path) -> None:
     turned = np.stack([position[..., 2], position[..., 1], -position[..., 0]], axis=-1)
     seen = load_markers(trc(tmp_path, turned, unit="cm", scale=1e2))
     np.testing.assert_allclose(seen.position, position[:, :3, :2], atol=1e-10)
+    assert (seen.forward, seen.up) == ("-z", "y")
     back = load_markers(trc(tmp_path, turned, unit="cm", scale=1e2), forward="z")
+    assert (back.forward, back.up) == ("z", "y")
     np.testing.assert_allclose(back.position[..., 0], -seen.position[..., 0])
     with pytest.raises(GaitError, match="both up and forward"):
         load_markers(trc(tmp_path, turned), forward="y")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 import walking
 
 from heelstrike.errors import GaitError
-from heelstrike.gait.recordings.motion import load_recorded_motion
+from heelstrike.gait.recordings.motion import load_recorded_motion, motion_of
+from heelstrike.gait.recordings.opensim import joints_of_opensim
+from heelstrike.gait.recordings.table import read_table
 
 NAMES = walking.bravo7().actuator_names
 ROWS = np.linspace(-0.5, 0.5, 60).reshape(10, 6)
@@ -83,3 +86,44 @@ def test_files_that_are_none(tmp_path: Path) -> None:
         load_recorded_motion(tmp_path / "picture.csv", robot)
     with pytest.raises(GaitError, match="rad or deg"):
         load_recorded_motion(tmp_path / "empty.csv", robot, unit="grad")
+
+
+def test_a_unit_that_is_none_is_told_wherever_a_table_is_read(tmp_path: Path) -> None:
+    table = read_table(written(tmp_path, ",".join(NAMES), ROWS))
+    with pytest.raises(GaitError, match="rad or deg, got 'degree'"):
+        motion_of(table, walking.bravo7(), rate=50.0, unit="degree")
+
+
+@pytest.mark.parametrize("suffix", ["csv", "json"])
+def test_a_joint_that_is_missing_in_a_row_is_told_with_the_row(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"motion.{suffix}"
+    if suffix == "csv":
+        lines = [",".join(repr(float(x)) for x in row) + ",1" for row in ROWS]
+        lines[6] = ",".join(["0.1", "", *lines[6].split(",")[2:]])
+        path.write_text("\n".join([",".join([*NAMES, "battery"]), *lines]) + "\n")
+        place = "line 8"
+    else:
+        columns = dict(zip(NAMES, ROWS.T.tolist(), strict=True))
+        columns[NAMES[1]][6] = None
+        path.write_text(json.dumps(columns))
+        place = "row 7"
+    table = read_table(path, gaps=True)
+    with pytest.raises(GaitError, match=f"{place}: column '{NAMES[1]}' has no number"):
+        motion_of(table, walking.bravo7(), rate=50.0)
+
+
+def test_a_gap_in_a_column_that_is_no_joint_does_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "motion.csv"
+    lines = [",".join(repr(float(x)) for x in row) + "," for row in ROWS]
+    path.write_text("\n".join([",".join([*NAMES, "battery"]), *lines]) + "\n")
+    motion = motion_of(read_table(path, gaps=True), walking.bravo7(), rate=50.0)
+    np.testing.assert_array_equal(motion.position, ROWS)
+
+
+def test_a_unit_that_is_said_holds_for_coordinates_of_opensim(tmp_path: Path) -> None:
+    rows = 40.0 * ROWS
+    path = written(tmp_path, "pelvis_tilt,hip_flexion_r,knee_angle_r [rad],a,b,c", rows)
+    table = joints_of_opensim(read_table(path), "deg")
+    np.testing.assert_allclose(table.whole(["right_hip"])[:, 0], -np.deg2rad(rows[:, 1]))
+    np.testing.assert_allclose(table.whole(["root_pitch"])[:, 0], -np.deg2rad(rows[:, 0]))
+    np.testing.assert_array_equal(np.abs(table.whole(["right_knee"])[:, 0]), np.abs(rows[:, 2]))

@@ -9,6 +9,7 @@ from heelstrike.experiments.people.splines import Splines
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.recordings.motion import RecordedMotion
 from heelstrike.gait.recordings.table import Table
+from heelstrike.gait.recordings.units import ANGLES, UNITS
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 
@@ -74,21 +75,26 @@ def body_of_joints(robot: Robot, motion: RecordedMotion, pitch: Floats | None) -
     return BodyMotion(robot, motion.time, q, v, acceleration, ("right", "left"), {})
 
 
-def pitch_in(table: Table) -> Floats | None:
+def pitch_in(table: Table, unit: str = "") -> Floats | None:
     """Return the pitch of the trunk (rad) that a table holds, if it does.
+
+    Parameters
+    ----------
+    table : Table
+        The table.
+    unit : str
+        Of the pitch, where its column names none; rad by default.
 
     Raises
     ------
     GaitError
-        If it is in no unit of angles.
+        If it is in no unit of angles, or a number is missing.
     """
     column = table.column("root_pitch")
     if column < 0:
         return None
-    from heelstrike.gait.recordings.units import UNITS
-
-    unit = table.units[column] or "rad"
-    if unit not in ("rad", "deg", "degrees"):
+    unit = table.units[column] or unit or "rad"
+    if unit not in ANGLES:
         raise GaitError(f"{table.path}: root_pitch is in {unit}; an angle is wanted")
-    pitch: Floats = table.values[:, column] * UNITS[unit]
+    pitch: Floats = table.whole(["root_pitch"])[:, 0] * UNITS[unit]
     return pitch

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
 from heelstrike.arguments import takes
 from heelstrike.errors import GaitError
 from heelstrike.experiments.people.body import BodyMotion, body_of_joints, pitch_in
@@ -18,10 +20,11 @@ from heelstrike.experiments.people.stride import stride_of
 from heelstrike.experiments.people.walking import Walked, walked
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.recordings.forces import load_forces
-from heelstrike.gait.recordings.markers import load_markers
+from heelstrike.gait.recordings.markers import RecordedMarkers, load_markers
 from heelstrike.gait.recordings.motion import motion_of
 from heelstrike.gait.recordings.opensim import joints_of_opensim
 from heelstrike.gait.recordings.table import read_table
+from heelstrike.gait.recordings.units import check_unit
 from heelstrike.robot.human import human
 from heelstrike.robot.robot import Robot
 
@@ -141,7 +144,7 @@ def mimic(
         Axes of the file of markers, as for
         :func:`~heelstrike.gait.recordings.markers.load_markers`.
     forces : path, optional
-        Measured forces of the ground, by the clock and in the axes of the file.
+        Forces of the ground that were measured with markers, by their clock and in their axes.
     friction : float
         Of the ground.
     steps : int
@@ -157,8 +160,9 @@ def mimic(
     Raises
     ------
     GaitError
-        If the file is none that can be read, there is no whole stride in it, or the robot cannot do
-        what people do.
+        If the file is none that can be read, there is no whole stride in it, its joints seem to be
+        in degrees and no unit is told, forces go with joints, or the robot cannot do what people
+        do.
     InfeasibleGaitError
         If no motion was found; the message names what is in conflict.
     """
@@ -167,7 +171,7 @@ def mimic(
     if str(path) == WINTER:
         path = LIBRARY / "winter_table_a1.csv"
         mass = WINTER_MASS if mass is None else mass
-    person = _person(
+    person, seen = _person(
         path,
         mass=mass,
         height=height,
@@ -179,8 +183,13 @@ def mimic(
     )
     moments = None
     if forces is not None:
+        if seen is None:
+            raise GaitError(
+                f"{path}: forces go with markers only. A table of joints does not tell where the "
+                "trunk moves, and without that there are no moments; leave out forces"
+            )
         tell("inverse dynamics", 0.0)
-        moments = moments_of(person, load_forces(forces, forward=forward or "x", up=up or "y"))
+        moments = moments_of(person, load_forces(forces, forward=seen.forward, up=seen.up))
     wanted = retargeted(stride_of(person, speed=speed), robot or person.robot)
     nearest = nearest_motion(
         wanted, friction=friction, progress=lambda done: tell("the nearest gait", done)
@@ -194,15 +203,21 @@ def mimic(
 def _person(
     path: str | PathLike[str], *, mass: float | None, height: float | None, rate: float | None,
     unit: str, markers: Mapping[str, str] | None, up: str | None, forward: str | None,
-) -> BodyMotion:  # fmt: skip
-    """Motion of the person, from markers or joints."""
+) -> tuple[BodyMotion, RecordedMarkers | None]:  # fmt: skip
+    """Motion of the person, from markers or joints, and the markers if there are."""
+    check_unit(unit)
     if Path(path).suffix.lower() not in MARKERS:
-        table = joints_of_opensim(read_table(path, gaps=True))
+        table = joints_of_opensim(read_table(path, gaps=True), unit)
         if any(table.column(f"{side}_hip") >= 0 for side in ("right", "left")):
             height = USUAL_HEIGHT if height is None else height
             robot = human(BODY_MASS_INDEX * height**2 if mass is None else mass, height)
-            return body_of_joints(
-                robot, motion_of(table, robot, rate=rate, unit=unit), pitch_in(table)
-            )
+            motion = motion_of(table, robot, rate=rate, unit=unit)
+            if motion.seems_degrees(robot):
+                largest = float(np.abs(motion.position).max())
+                raise GaitError(
+                    f"{path}: angles up to {largest:.3g} make no sense in rad, but in degrees; say "
+                    "the unit: deg, or a column right_hip [deg]"
+                )
+            return body_of_joints(robot, motion, pitch_in(table, unit)), None
     seen = load_markers(path, names=markers, rate=rate, up=up, forward=forward)
-    return fit_markers(person_of(seen, mass=mass, height=height), seen)
+    return fit_markers(person_of(seen, mass=mass, height=height), seen), seen

@@ -9,8 +9,13 @@ import numpy as np
 from heelstrike.errors import GaitError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.recordings.lines import Name
-from heelstrike.gait.recordings.table import read_table
+from heelstrike.gait.recordings.markers import AXES, axis_and_sense
+from heelstrike.gait.recordings.table import Table, read_table
+from heelstrike.gait.recordings.units import UNITS
 from heelstrike.robot.model import Floats
+
+KINDS = {"v": ("n",), "p": ("m", "cm", "mm")}
+"""Units of forces and of where they act; the first one where none is told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +38,7 @@ def load_forces(path: Name, *, forward: str = "x", up: str = "y") -> RecordedFor
     path : path
         A MOT or STO file of OpenSim, or a table of text or JSON.
     forward, up : str
-        Axes of the file.
+        Axes of the file, each perhaps with a minus before it.
 
     Returns
     -------
@@ -43,17 +48,21 @@ def load_forces(path: Name, *, forward: str = "x", up: str = "y") -> RecordedFor
     Raises
     ------
     GaitError
-        If there are none; the message has the place.
+        If there are none, or they are in no unit of forces or lengths; the message has the place.
     """
+    axes = axis_and_sense(forward, "forward"), axis_and_sense(up, "up")
+    if axes[0][0] == axes[1][0]:
+        raise GaitError(f"{path}: one axis cannot be both up and forward")
     table = read_table(path)
     plates = [name[:-2] for name in table.names if re.fullmatch(r".*_vx", name)]
     forces, points = [], []
     for plate in plates:
-        columns = [f"{plate}{kind}{axis}" for kind in "vp" for axis in (forward, up)]
+        columns = [f"{plate}{kind}{AXES[axis]}" for kind in KINDS for axis, _ in axes]
         missing = [name for name in columns if table.column(name) < 0]
         if missing:
             raise GaitError(f"{path}: no column {missing[0]!r} beside {plate}vx")
-        values = table.values[:, [table.column(name) for name in columns]]
+        scale = [_scale(table, name) for name in columns]
+        values = table.whole(columns) * scale * ([sense for _, sense in axes] * 2)
         forces.append(values[:, :2])
         points.append(values[:, 2:])
     if not plates:
@@ -63,3 +72,16 @@ def load_forces(path: Name, *, forward: str = "x", up: str = "y") -> RecordedFor
         )
     time = table.begin + table.time()
     return RecordedForces(time, np.stack(forces, axis=1), np.stack(points, axis=1))
+
+
+def _scale(table: Table, name: str) -> float:
+    """What a number of a column is in N or m."""
+    k = table.column(name)
+    units = KINDS[name[-2]]
+    unit = table.units[k] or units[0]
+    if unit not in units:
+        raise GaitError(
+            f"{table.path}: column {table.written[k]!r} is in {unit}; {' or '.join(units)} is "
+            "wanted"
+        )
+    return UNITS[unit]

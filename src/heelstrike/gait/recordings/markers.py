@@ -55,6 +55,10 @@ class RecordedMarkers:
     """Markers of the file that are no landmarks that are known."""
     begin: float = 0.0
     """When it begins, as the file counts time, in s: forces of another file go by that."""
+    forward: str = "x"
+    """Axis of the file in which the person walks, with a minus where that is against it."""
+    up: str = "z"
+    """Axis of the file that is up; forces of another file go by these, too."""
 
     @property
     def rate(self) -> float:
@@ -127,28 +131,45 @@ def load_markers(
         If it is no such file, or axes or markers are missing; the message has the place.
     """
     for what, axis in (("up", up), ("forward", forward)):
-        if axis is not None and axis.removeprefix("-") not in tuple(AXES):
-            raise GaitError(
-                f"{what} must be x, y or z, or one with a minus before it, got {axis!r}"
-            )
+        if axis is not None:
+            axis_and_sense(axis, what)
     points = _points(path, rate)
     found = _landmarks(path, points, names or {})
     places = points.position[:, list(found.values())]
-    vertical, upward = _axis(up or points.up)
+    vertical, upward = axis_and_sense(up or points.up)
     if forward is None:
         horizontal, ahead = _forward(path, places, list(found), vertical)
     else:
-        horizontal, ahead = _axis(forward)
+        horizontal, ahead = axis_and_sense(forward)
     if horizontal == vertical:
         raise GaitError(f"{path}: one axis cannot be both up and forward")
     plane = np.stack([ahead * places[..., horizontal], upward * places[..., vertical]], axis=-1)
     used = set(found.values())
     ignored = tuple(name for k, name in enumerate(points.names) if k not in used)
     begin = float(points.time[0])
-    return RecordedMarkers(points.time - begin, tuple(found), plane, ignored, begin)
+    walked = ("-" if ahead < 0.0 else "") + AXES[horizontal]
+    return RecordedMarkers(
+        points.time - begin, tuple(found), plane, ignored, begin, walked, up or points.up
+    )
 
 
-def _axis(name: str) -> tuple[int, float]:
+def axis_and_sense(name: str, what: str = "axis") -> tuple[int, float]:
+    """Return the number of an axis by its name, and 1, or -1 where a minus stands before it.
+
+    Parameters
+    ----------
+    name : str
+        As ``"x"`` or ``"-x"``.
+    what : str
+        What the axis is, for the message.
+
+    Raises
+    ------
+    GaitError
+        If there is no such axis.
+    """
+    if name.removeprefix("-") not in tuple(AXES):
+        raise GaitError(f"{what} must be x, y or z, or one with a minus before it, got {name!r}")
     return AXES.index(name.removeprefix("-")), -1.0 if name.startswith("-") else 1.0
 
 

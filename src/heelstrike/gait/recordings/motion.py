@@ -9,7 +9,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.gait.recordings.lines import Name
 from heelstrike.gait.recordings.opensim import joints_of_opensim
 from heelstrike.gait.recordings.table import Table, read_table
-from heelstrike.gait.recordings.units import UNITS, plain
+from heelstrike.gait.recordings.units import UNITS, check_unit, plain
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.wording import meant
@@ -89,8 +89,7 @@ def load_recorded_motion(
     GaitError
         If it is no such file, a joint is missing, or numbers are; the message has the place.
     """
-    if unit not in ("", "rad", "deg"):
-        raise GaitError(f"unit must be rad or deg, got {unit!r}")
+    check_unit(unit)
     return motion_of(read_table(path), robot, rate=rate, unit=unit)
 
 
@@ -108,15 +107,16 @@ def motion_of(
     rate : float, optional
         Rows a second, where the table has no times.
     unit : str
-        Of columns that name none.
+        Of columns that name none: ``"rad"`` or ``"deg"``; rad by default.
 
     Raises
     ------
     GaitError
-        If a joint is missing, or there are no times.
+        If the unit is none of these, a joint or a number of one is missing, or there are no times.
     """
+    check_unit(unit)
     if table.opensim:
-        table = joints_of_opensim(table)
+        table = joints_of_opensim(table, unit)
     missing = [name for name in robot.actuator_names if table.column(plain(name)) < 0]
     if missing:
         guess = meant(missing[0], {name: repr(name) for name in table.names})
@@ -124,8 +124,9 @@ def motion_of(
             f"{table.path}: no column for {', '.join(missing)}.{guess} The first line names the "
             f"columns; it has {', '.join(table.written[:12])}"
         )
-    order = [table.column(plain(name)) for name in robot.actuator_names]
+    names = [plain(name) for name in robot.actuator_names]
+    order = [table.column(name) for name in names]
     scale = [UNITS[table.units[column] or unit or "rad"] for column in order]
     used = {*order, table.column("time")}
     ignored = tuple(name for column, name in enumerate(table.written) if column not in used)
-    return RecordedMotion(table.time(rate), table.values[:, order] * scale, ignored)
+    return RecordedMotion(table.time(rate), table.whole(names) * scale, ignored)

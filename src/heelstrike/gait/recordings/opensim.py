@@ -15,18 +15,25 @@ from heelstrike.gait.recordings.units import UNITS
 SIDES = {"r": "right", "l": "left"}
 
 
-def joints_of_opensim(table: Table) -> Table:
+def joints_of_opensim(table: Table, unit: str = "") -> Table:
     """Return a table in which coordinates of OpenSim have our names and senses, in rad.
 
     ``root_pitch`` is that of the trunk if there is a ``lumbar_extension``, else of the pelvis, and
     hips are turned as they are against it. Other columns stay as they are; so does a table that
     has no such coordinates.
+
+    Parameters
+    ----------
+    table : Table
+        The table.
+    unit : str
+        Of coordinates whose columns name none; rad by default.
     """
     columns = {name: k for k, name in enumerate(table.names)}
 
     def angle(name: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
         k = columns[name]
-        return np.asarray(table.values[:, k] * UNITS[table.units[k] or "rad"])
+        return np.asarray(table.values[:, k] * UNITS[table.units[k] or unit or "rad"])
 
     found = {}
     lumbar = angle("lumbar_extension") if "lumbar_extension" in columns else 0.0

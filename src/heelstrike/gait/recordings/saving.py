@@ -28,6 +28,25 @@ def is_table(path: str | PathLike[str]) -> bool:
     return Path(path).suffix.lower() in SUFFIXES
 
 
+def check_rate(rate: float, name: str = "rate") -> None:
+    """Refuse a rate of rows that makes no sense.
+
+    Parameters
+    ----------
+    rate : float
+        Rows a second.
+    name : str
+        What it is called.
+
+    Raises
+    ------
+    GaitError
+        If it is too low or too high.
+    """
+    if not SLOWEST <= rate <= FASTEST:
+        raise GaitError(f"{name} must be from {SLOWEST:g} to {FASTEST:g} rows a second, got {rate}")
+
+
 def times_at(rate: float, duration: float) -> Floats:
     """Return times at a rate (1/s) from 0 to a duration (s), both included where it fits.
 
@@ -36,8 +55,7 @@ def times_at(rate: float, duration: float) -> Floats:
     GaitError
         If the rate makes no sense, or there were fewer times than a recording has.
     """
-    if not SLOWEST <= rate <= FASTEST:
-        raise GaitError(f"rate must be from {SLOWEST:g} to {FASTEST:g} rows a second, got {rate}")
+    check_rate(rate)
     count = round(rate * duration)
     if count + 1 < FEWEST:
         raise GaitError(
@@ -87,17 +105,42 @@ def save_joints(
             raise GaitError(f"there is no joint {name!r}.{meant(name, names)}")
     if len(set(wanted)) < len(wanted) or not wanted:
         raise GaitError(f"joints must be different names, one or more, got {wanted}")
-    if LETTERS * len(time) * (len(wanted) + 1) > LARGEST_FILE:
-        raise GaitError(f"{len(time)} rows are too many for a table; give a lower rate")
     order = [list(names).index(name) for name in wanted]
     turns = [bool(hinges[k]) for k in order]
     units = [("deg" if degrees else "rad") if each else "m" for each in turns]
     values = position[:, order]
     if degrees:
         values = np.where(turns, np.rad2deg(values), values)
+    save_columns(
+        path, [f"{name} [{unit}]" for name, unit in zip(wanted, units, strict=True)], time, values
+    )
+
+
+def save_columns(
+    path: str | PathLike[str], headings: Sequence[str], time: Floats, values: Floats
+) -> None:
+    """Write a table of anything over time, which appears whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        File to write: .csv, or .tsv.
+    headings : sequence of str
+        Names of the columns after that of the times, with their units.
+    time : (n,) array
+        In s.
+    values : (n, columns) array
+        Numbers, in these units.
+
+    Raises
+    ------
+    GaitError
+        If there are too many rows, or the file cannot be written.
+    """
+    if LETTERS * len(time) * (len(headings) + 1) > LARGEST_FILE:
+        raise GaitError(f"{len(time)} rows are too many for a table; give a lower rate")
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n", delimiter=SUFFIXES[Path(path).suffix.lower()])
-    headings = [f"{name} [{unit}]" for name, unit in zip(wanted, units, strict=True)]
     table.writerow(["time [s]", *headings])
     for row in np.column_stack([time, values]).tolist():
         table.writerow([repr(number) for number in row])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,30 @@ class Table:
     def column(self, name: str) -> int:
         """Return the place of a column, -1 where there is none of a plain name."""
         return self.names.index(name) if name in self.names else -1
+
+    def whole(self, names: Sequence[str]) -> Floats:
+        """Return columns in which no number is missing, (n, names), in the units of the file.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Plain names of columns that there are.
+
+        Raises
+        ------
+        GaitError
+            If a number is missing; the message has the line, or the row where lines have no number.
+        """
+        values: Floats = self.values[:, [self.column(name) for name in names]]
+        lacking = np.argwhere(~np.isfinite(values))
+        if len(lacking):
+            row, k = (int(each) for each in lacking[0])
+            place = f"line {self.places[row]}" if self.places[row] else f"row {row + 1}"
+            raise GaitError(
+                f"{self.path}, {place}: column {names[k]!r} has no number there; one is "
+                "wanted in every row, so fill it in or cut the recording there"
+            )
+        return values
 
     @property
     def begin(self) -> float:
@@ -171,14 +196,18 @@ def _from_opensim(path: Name, lines: list[Line], ends: list[int]) -> Table:
         raise GaitError(f"{path}: its header says {said} rows, and there are {len(numbers)}")
     found = table_of(path, names, numbers, tuple(place for place, _ in rows), opensim=True)
     if header.get("indegrees") == "yes":
-        angles = tuple("deg" if _turns(each) else "" for each in found.names)
+        pairs = zip(found.names, found.units, strict=True)
+        angles = tuple(unit or ("deg" if _turns(name) else "") for name, unit in pairs)
         found = Table(**{**vars(found), "units": angles})
     return found
 
 
 def _turns(name: str) -> bool:
-    """Whether a column of OpenSim is an angle, by its name: what slides ends in _t and an axis."""
-    moves = re.search(r"_t[xyz]$", name) is not None
+    """Whether a column of OpenSim is an angle, by its name.
+
+    What slides ends in _t and an axis, forces and where they act in _v and _p.
+    """
+    moves = re.search(r"_[tvp][xyz]$", name) is not None
     return not (moves or name == "time" or "force" in name or "torque" in name)
 
 

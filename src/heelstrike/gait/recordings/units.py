@@ -6,11 +6,29 @@ import re
 
 import numpy as np
 
+from heelstrike.errors import GaitError
+
 UNITS = {
     "rad": 1.0, "deg": np.pi / 180.0, "degrees": np.pi / 180.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3,
     "s": 1.0, "ms": 1e-3, "n": 1.0,
 }  # fmt: skip
 """Units, in those of ours."""
+
+
+ANGLES = ("rad", "deg", "degrees")
+"""Units of angles."""
+
+
+def check_unit(unit: str) -> None:
+    """Refuse a unit for joints whose columns name none, unless it is empty, rad or deg.
+
+    Raises
+    ------
+    GaitError
+        If it is another one.
+    """
+    if unit not in ("", "rad", "deg"):
+        raise GaitError(f"unit must be rad or deg, got {unit!r}")
 
 
 def plain(name: str) -> str:
