@@ -180,7 +180,9 @@ class SpatialSimulation:
         self._ground = spatial_ground(ground)
         self._pushes = (pushes,) if isinstance(pushes, Push) else tuple(pushes)
         begin = checked_state(robot, state)
-        self._memory = allocate_spatial_memory(robot, spatial_pushes(robot, self._pushes))
+        self._memory = allocate_spatial_memory(
+            robot, spatial_pushes(robot, self._pushes), walls=len(self._ground.boxes) > 0
+        )
         self._memory.q[:], self._memory.v[:] = begin.q, begin.v
         self._clock = clock = SpatialClock.allocate()
         clock.step, clock.record_every = self.method.step, int(record_every)
