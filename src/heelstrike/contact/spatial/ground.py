@@ -84,6 +84,10 @@ class Box:
             if values.shape != (3,) or not np.all(np.isfinite(values) & (values > least)):
                 raise SimulationError(f"{name} of a box must be three numbers, got {values}")
             object.__setattr__(self, name, tuple(values.tolist()))
+        for name in ("yaw", "pitch", "friction", "restitution"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise SimulationError(f"{name} of a box must be a finite number, got {value}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +124,9 @@ class SpatialGround:
             raise SimulationError(
                 f"normal must be three numbers, the last positive, got {self.normal!r}"
             )
+        if not math.isfinite(self.height):
+            raise SimulationError(f"height of the ground must be finite, got {self.height}")
+        normal /= np.max(np.abs(normal))
         normal /= np.linalg.norm(normal)
         boxes = tuple(self.boxes)
         for each in boxes:
