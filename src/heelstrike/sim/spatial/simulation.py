@@ -104,6 +104,8 @@ class SpatialSnapshot:
     """What decided its torques."""
     arrays: Mapping[str, NDArray[Any]] = field(repr=False)
     """All numbers of the simulation, by name."""
+    surroundings: Mapping[str, Any] = field(repr=False)
+    """What it is simulated with, by name: method, ground, pushes, control period."""
     numbers: NDArray[Any] | None = field(default=None, repr=False)
     """The memory of a controller in Python."""
 
@@ -295,7 +297,21 @@ class SpatialSimulation:
             for prefix, bundle in self._kept().items()
             for name, values in bundle.storage(prefix)
         }
-        return SpatialSnapshot(self.time, self.robot, self._controller, arrays, numbers)
+        return SpatialSnapshot(
+            self.time, self.robot, self._controller, arrays, self._surroundings(), numbers
+        )
+
+    def _surroundings(self) -> dict[str, Any]:
+        """What a snapshot must have been simulated with, too, in numbers that compare."""
+        parts = {"ground": self._ground.model(), "pushes": self._memory.pushes}
+        return {
+            "method": repr(self.method),
+            "control period": self._clock.control_every * self._clock.step,
+            **{
+                name: [(each, array.shape, array.tobytes()) for each, array in bundle.storage()]
+                for name, bundle in parts.items()
+            },
+        }
 
     def restore(self, snapshot: SpatialSnapshot) -> None:
         """Be again as a simulation was; the record starts again.
@@ -303,26 +319,42 @@ class SpatialSimulation:
         Parameters
         ----------
         snapshot : SpatialSnapshot
-            Of this simulation, or of one of the same robot and controller.
+            Of this simulation, or of one of the same robot, controller, method, ground, pushes and
+            control period, in this process. The rows of its record are as far apart as those of
+            the snapshot.
 
         Raises
         ------
-        SimulationError, ControllerError
-            If it is one of another robot, controller or pushes.
+        SimulationError
+            If it is one of another of these.
+        ControllerError
+            If a controller in Python does not take part in snapshots.
         """
         if not isinstance(snapshot, SpatialSnapshot):
             raise SimulationError(f"restore takes a SpatialSnapshot, got {type(snapshot).__name__}")
-        same = snapshot.robot is self.robot and snapshot.controller is self._controller
+        same = {
+            "robot": snapshot.robot is self.robot,
+            "controller": snapshot.controller is self._controller,
+        } | {
+            what: snapshot.surroundings.get(what) == mine
+            for what, mine in self._surroundings().items()
+        }
+        for what, alike in same.items():
+            if not alike:
+                raise SimulationError(
+                    f"the snapshot is one of another {what}: restore it into a simulation with "
+                    f"the same {what}"
+                )
         mine = {
             name: values
             for prefix, bundle in self._kept().items()
             for name, values in bundle.storage(prefix)
         }
-        alike = mine.keys() == snapshot.arrays.keys() and all(
+        fits = mine.keys() == snapshot.arrays.keys() and all(
             values.shape == snapshot.arrays[name].shape for name, values in mine.items()
         )
-        if not (same and alike):
-            raise SimulationError("the snapshot is one of another robot, controller or pushes")
+        if not fits:
+            raise SimulationError("the snapshot is damaged: its arrays are not those of this one")
         if self._python is not None and snapshot.numbers is not None:
             self._partaking().restore(snapshot.numbers.copy())
         for name, values in mine.items():

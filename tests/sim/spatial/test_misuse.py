@@ -1,0 +1,46 @@
+"""What a simulation in space refuses, and what becomes of controllers that do what they may not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from spatial_robots import Maker
+
+import heelstrike as hs
+from heelstrike.errors import SimulationError
+
+BALL = "<body name='ball'><freejoint/><geom type='sphere' size='0.1' mass='1'/></body>"
+ARM = (
+    "<body name='arm' pos='0 0 1'><joint name='shoulder' axis='0 1 0'/>"
+    "<geom type='capsule' fromto='0 0 0 0.4 0 0' size='0.02' mass='1'/></body>"
+)
+MOTOR = "<actuator><motor name='motor' joint='shoulder'/></actuator>"
+
+
+@pytest.mark.parametrize(
+    ("what", "mine", "its"),
+    [
+        ("method", {}, {"method": hs.TimeStepping(step=5e-4)}),
+        ("ground", {}, {"ground": hs.SpatialGround(friction=0.3)}),
+        (
+            "pushes",
+            {"pushes": hs.Push("ball", force=(1.0, 0.0, 0.0), start=0.0, duration=0.1)},
+            {"pushes": hs.Push("ball", force=(2.0, 0.0, 0.0), start=0.0, duration=0.1)},
+        ),
+        ("control period", {}, {"control_period": 0.004}),
+    ],
+)
+def test_a_snapshot_of_another_setting_is_refused(
+    made: Maker, what: str, mine: dict[str, Any], its: dict[str, Any]
+) -> None:
+    robot = made(BALL)
+    state = robot.reference_state()
+    kept = hs.Simulation(robot, state=state, **its).snapshot()
+    simulation = hs.Simulation(robot, state=state, **mine)
+    with pytest.raises(SimulationError, match=f"another {what}"):
+        simulation.restore(kept)
+    assert simulation.message == "not begun"
+    again = hs.Simulation(robot, state=state, **its)
+    again.restore(kept)
+    assert again.message.startswith("restored")
