@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from typing import Any
 
 import pytest
@@ -44,3 +46,11 @@ def test_a_snapshot_of_another_setting_is_refused(
     again = hs.Simulation(robot, state=state, **its)
     again.restore(kept)
     assert again.message.startswith("restored")
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_simulation_is_not_copied(made: Maker, duplicate: Any) -> None:
+    robot = made(BALL)
+    simulation = hs.Simulation(robot, state=robot.reference_state())
+    with pytest.raises(TypeError, match="cannot be copied or pickled"):
+        duplicate(simulation)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time as clock_time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -207,6 +207,13 @@ class SpatialSimulation:
         self.status: RunStatus = RunStatus.COMPLETED
         self.message = "not begun"
         self.error: BaseException | None = None
+
+    def __reduce__(self) -> NoReturn:
+        """Copies would share memory that compiled code finds by address."""
+        raise TypeError(
+            "a simulation cannot be copied or pickled: begin another one with "
+            "state=simulation.state, or keep simulation.snapshot() and restore it here"
+        )
 
     def _find_state(self) -> None:
         memory = self._memory
