@@ -6,6 +6,7 @@ import copy
 import pickle
 from typing import Any
 
+import numpy as np
 import pytest
 from spatial_robots import Maker
 
@@ -54,3 +55,33 @@ def test_a_simulation_is_not_copied(made: Maker, duplicate: Any) -> None:
     simulation = hs.Simulation(robot, state=robot.reference_state())
     with pytest.raises(TypeError, match="cannot be copied or pickled"):
         duplicate(simulation)
+
+
+class FailsAtTheEnd:
+    """Raises something when it is asked for the last time, at 0.01 s."""
+
+    def __init__(self, error: BaseException) -> None:
+        self.error = error
+
+    def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+        if t > 0.0095:
+            raise self.error
+        return np.zeros(1)
+
+
+def test_errors_of_the_last_instant_are_told_as_others(made: Maker) -> None:
+    robot = made(ARM, MOTOR)
+    begin: dict[str, Any] = {"state": robot.reference_state(), "duration": 0.01}
+    with pytest.raises(ValueError, match="too late"):
+        hs.simulate(robot, FailsAtTheEnd(ValueError("too late")), on_error="raise", **begin)
+    with pytest.warns(hs.ControllerWarning, match="too late"):
+        hs.simulate(robot, FailsAtTheEnd(ValueError("too late")), **begin)
+
+
+def test_ctrl_c_at_the_last_instant_keeps_the_run(made: Maker) -> None:
+    robot = made(ARM, MOTOR)
+    run = hs.simulate(
+        robot, FailsAtTheEnd(KeyboardInterrupt()), state=robot.reference_state(), duration=0.01
+    )
+    assert run.status is hs.RunStatus.INTERRUPTED
+    assert len(run.time) == 10

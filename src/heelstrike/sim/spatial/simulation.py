@@ -432,9 +432,13 @@ class SpatialSimulation:
             acknowledge(interrupt)
             self.status, self.message = RunStatus.INTERRUPTED, f"interrupted at {self._now}"
         self._wall_s += clock_time.perf_counter() - begin
+        self._tell_error()
+        return self.status
+
+    def _tell_error(self) -> None:
+        """Do with an error in the controller as `on_error` says."""
         if self.status is RunStatus.CONTROLLER_FAILED and self.error is not None:
             tell(self.message, self.error, self.on_error)
-        return self.status
 
     def _forget_error(self) -> None:
         self.error = None
@@ -563,11 +567,17 @@ class SpatialSimulation:
             return
         self._clock.finishing = 1
         begin = clock_time.perf_counter()
-        ended = self._run_loop()
-        self._wall_s += clock_time.perf_counter() - begin
-        self._clock.finishing = 0
+        try:
+            ended = self._run_loop()
+        except KeyboardInterrupt as interrupt:  # too late for anything to be lost
+            acknowledge(interrupt)
+            ended = RunStatus.INTERRUPTED, f"interrupted at {self._now}"
+        finally:
+            self._wall_s += clock_time.perf_counter() - begin
+            self._clock.finishing = 0
         if ended is not None:
             self.status, self.message = ended
+            self._tell_error()
 
 
 def simulate_in_space(
