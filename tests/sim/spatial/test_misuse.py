@@ -11,7 +11,7 @@ import pytest
 from spatial_robots import Maker
 
 import heelstrike as hs
-from heelstrike.errors import SimulationError
+from heelstrike.errors import ControllerError, SimulationError
 
 BALL = "<body name='ball'><freejoint/><geom type='sphere' size='0.1' mass='1'/></body>"
 ARM = (
@@ -85,3 +85,22 @@ def test_ctrl_c_at_the_last_instant_keeps_the_run(made: Maker) -> None:
     )
     assert run.status is hs.RunStatus.INTERRUPTED
     assert len(run.time) == 10
+
+
+def test_a_controller_may_not_change_the_robot(made: Maker) -> None:
+    """The run ends in words, and the robot is as before."""
+    robot = made(ARM, MOTOR)
+    mass = robot.model.mass.copy()
+
+    class Lightens:
+        def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+            robot.model.mass[:] = 0.1
+            return np.zeros(1)
+
+    run = hs.simulate(
+        robot, Lightens(), state=robot.reference_state(), duration=0.01, on_error="stop"
+    )
+    assert run.status is hs.RunStatus.CONTROLLER_FAILED
+    assert "changed the robot: model.mass[0]" in run.message
+    assert isinstance(run.error, ControllerError)
+    assert np.array_equal(robot.model.mass, mass)

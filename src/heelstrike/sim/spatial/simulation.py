@@ -22,6 +22,7 @@ from heelstrike.sim.closed_sets import OnError, RunStatus, Scheme
 from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
 from heelstrike.sim.controller.law import Law, law_of, no_torque
 from heelstrike.sim.controller.raised import EndOfRun, tell
+from heelstrike.sim.controller.watch import numbers_of, restored
 from heelstrike.sim.frame import Outcome
 from heelstrike.sim.method import Method, whole_steps
 from heelstrike.sim.push import Push
@@ -243,6 +244,8 @@ class SpatialSimulation:
             f"{type(controller).__name__}.torque" if law is None
             else f"controller {law.function.name!r}"
         )  # fmt: skip
+        robot: Any = self.robot
+        self._robot_numbers = {} if self._python is None else numbers_of(robot)
         self._shown: Contacts = read_only(self._memory.contacts)
 
     @property
@@ -466,6 +469,16 @@ class SpatialSimulation:
             steps = int(min(ROWS, max(1.0, more)))
 
     def _run_loop(self) -> tuple[RunStatus, str] | None:
+        """Run the loop until it pauses or ends; a robot that was changed meanwhile is put back."""
+        ended = self._run_unwatched()
+        robot: Any = self.robot
+        if changed := restored(robot, self._robot_numbers):
+            wrong = f"{self._name} changed the robot: {changed}; noticed at {self._now}"
+            self.error = ControllerError(wrong)
+            return RunStatus.CONTROLLER_FAILED, wrong
+        return ended
+
+    def _run_unwatched(self) -> tuple[RunStatus, str] | None:
         """Run the loop until it pauses or ends, with what it needs from Python."""
         if not self._records:
             self._new_record()
