@@ -104,3 +104,11 @@ def test_a_controller_may_not_change_the_robot(made: Maker) -> None:
     assert "changed the robot: model.mass[0]" in run.message
     assert isinstance(run.error, ControllerError)
     assert np.array_equal(robot.model.mass, mass)
+
+
+def test_options_of_the_plane_are_told_from_unknown_ones(made: Maker) -> None:
+    robot = made(BALL)
+    with pytest.raises(SimulationError, match="has no option 'braked' yet"):
+        hs.Simulation(robot, state=robot.reference_state(), braked=())
+    with pytest.raises(SimulationError, match="unknown option 'colour'"):
+        hs.Simulation(robot, state=robot.reference_state(), colour="red")

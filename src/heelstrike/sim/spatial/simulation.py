@@ -27,7 +27,7 @@ from heelstrike.sim.frame import Outcome
 from heelstrike.sim.method import Method, whole_steps
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Timing
-from heelstrike.sim.setting import FALL_FRACTION, checked_on_error
+from heelstrike.sim.setting import FALL_FRACTION, Setup, checked_on_error
 from heelstrike.sim.spatial.controlled import GOES_ON, ReadySpatialLaw, words_in_space
 from heelstrike.sim.spatial.loop import SpatialClock, height_of_mass, spatial_loop
 from heelstrike.sim.spatial.memory import allocate_spatial_memory
@@ -173,7 +173,9 @@ class SpatialSimulation:
         **others: Any,
     ) -> None:
         for name in others:
-            raise SimulationError(f"a simulation in space has no option {name!r} yet")
+            if name in Setup.__annotations__:
+                raise SimulationError(f"a simulation in space has no option {name!r} yet")
+            raise SimulationError(f"unknown option {name!r} of a simulation in space")
         if not isinstance(robot, SpatialRobot):
             raise SimulationError(f"robot must be a SpatialRobot, got {type(robot).__name__}")
         if not (isinstance(record_every, int | np.integer) and record_every >= 1):
