@@ -1,7 +1,7 @@
 """Ground in space: a plane of any slope, and boxes on it that stand still.
 
-Contact points meet the nearest face of all of them. Only points of the robot are looked at: edges
-of a box do not meet edges of the robot.
+Contact points meet the nearest face of all of them, and one wall beside it. Only points of the
+robot are looked at: edges of a box do not meet edges of the robot.
 """
 
 from __future__ import annotations
@@ -24,6 +24,15 @@ from heelstrike.field_texts import dataclass
 ON_THE_FACE = 1e-12
 """Distance (m) from a box below which the direction to it says nothing about its face."""
 
+COVERED = 1e-9
+"""Distance (m) up to which a face that touches something lies on it."""
+
+BESIDE = 1e-6
+"""Depth (m) below the rim of a face from which on a point meets it as a wall."""
+
+PARALLEL = 1.0 - 1e-9
+"""Cosine of the angle below which two faces are one."""
+
 
 class SpatialGroundModel(Bundle):
     """The ground in space as the kernels see it; boxes come after the plane."""
@@ -38,6 +47,9 @@ class SpatialGroundModel(Bundle):
     """Its axes in the world, row by row."""
     half: Floats = array("boxes", 3)
     """Half its lengths along them (m)."""
+    exposed: Floats = array("boxes", 6)
+    """1 of what can be touched of their faces, 0 of what lies wholly on the plane or within another
+    box: those at the upper end of each axis, then at the lower ends."""
     friction: Floats = array("boxes + 1")
     restitution: Floats = array("boxes + 1")
     """friction, restitution: Of the plane, then of each box."""
@@ -72,6 +84,10 @@ class Box:
             if values.shape != (3,) or not np.all(np.isfinite(values) & (values > least)):
                 raise SimulationError(f"{name} of a box must be three numbers, got {values}")
             object.__setattr__(self, name, tuple(values.tolist()))
+        for name in ("yaw", "pitch", "friction", "restitution"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise SimulationError(f"{name} of a box must be a finite number, got {value}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +124,9 @@ class SpatialGround:
             raise SimulationError(
                 f"normal must be three numbers, the last positive, got {self.normal!r}"
             )
+        if not math.isfinite(self.height):
+            raise SimulationError(f"height of the ground must be finite, got {self.height}")
+        normal /= np.max(np.abs(normal))
         normal /= np.linalg.norm(normal)
         boxes = tuple(self.boxes)
         for each in boxes:
@@ -124,12 +143,14 @@ class SpatialGround:
             for value in values:
                 if not 0.0 <= value <= most or not np.isfinite(value):
                     raise SimulationError(f"{name} of the ground cannot be {value}")
+        height = float(normal[2] * self.height)
         model = SpatialGroundModel(
             normal=normal,
-            height=float(normal[2] * self.height),
+            height=height,
             center=np.array([each.center for each in boxes], dtype=float).reshape(-1, 3),
             rotation=np.array([_axes(each) for each in boxes], dtype=float).reshape(-1, 9),
             half=0.5 * np.array([each.size for each in boxes], dtype=float).reshape(-1, 3),
+            exposed=_exposed(boxes, normal, height),
             friction=np.array(friction, dtype=float),
             restitution=np.array(restitution, dtype=float),
         )
@@ -225,6 +246,30 @@ def _axes(box: Box) -> Floats:
     return np.array([c * a, s * a, -b, -s, c, 0.0, c * b, s * b, a])
 
 
+def _exposed(boxes: tuple[Box, ...], normal: Floats, height: float) -> Floats:
+    """Which faces can be touched, (boxes, 6): all corners of the others lie in one other thing."""
+    exposed = np.ones((len(boxes), 6))
+    axes = [_axes(each).reshape(3, 3) for each in boxes]
+    center = [np.array(each.center) for each in boxes]
+    half = [0.5 * np.array(each.size) for each in boxes]
+    signs = np.array([(i, j) for i in (-1.0, 1.0) for j in (-1.0, 1.0)])
+    for box in range(len(boxes)):
+        for face in range(6):
+            own = np.empty((4, 3))
+            own[:, face % 3] = 1.0 if face < 3 else -1.0
+            own[:, [k for k in range(3) if k != face % 3]] = signs
+            corners = center[box] + (own * half[box]) @ axes[box]
+            covered = bool(np.all(corners @ normal <= height + COVERED))
+            for other in range(len(boxes)):
+                if other != box:
+                    there = np.abs((corners - center[other]) @ axes[other].T)
+                    covered = covered or bool(np.all(there <= half[other] + COVERED))
+            exposed[box, face] = 0.0 if covered else 1.0
+        if not exposed[box].any():  # nothing can touch it
+            exposed[box] = 1.0
+    return exposed
+
+
 @kernel
 def distance_to_box(ground: SpatialGroundModel, box: int, point: Triple) -> tuple[float, Triple]:
     """Signed distance of a point to a box, and the direction away from it."""
@@ -238,8 +283,14 @@ def distance_to_box(ground: SpatialGroundModel, box: int, point: Triple) -> tupl
     for k in range(3):
         own = r[box, 3 * k] * x + r[box, 3 * k + 1] * y + r[box, 3 * k + 2] * z
         beyond = abs(own) - ground.half[box, k]
-        if beyond > deepest:
+        far = -abs(own) - ground.half[box, k]
+        upper = ground.exposed[box, k] > 0.0
+        lower = ground.exposed[box, 3 + k] > 0.0
+        near_one, far_one = (upper, lower) if own >= 0.0 else (lower, upper)
+        if near_one and beyond > deepest:
             deepest, face, side = beyond, k, (1.0 if own >= 0.0 else -1.0)
+        elif not near_one and far_one and far > deepest:
+            deepest, face, side = far, k, (-1.0 if own >= 0.0 else 1.0)
         if beyond > 0.0:
             square += beyond * beyond
             signed = beyond if own >= 0.0 else -beyond
@@ -274,3 +325,44 @@ def nearest_face(ground: SpatialGroundModel, point: Triple) -> tuple[int, float,
         if other < distance:
             best, distance, normal = box + 1, other, away
     return best, distance, normal
+
+
+@kernel
+def is_beside(ground: SpatialGroundModel, box: int, point: Triple) -> bool:
+    """Whether a point is before or behind one exposed face of a box, and not at its rim.
+
+    Points on the top of a box do not stumble over the rim of the next one.
+    """
+    x = point[0] - ground.center[box, 0]
+    y = point[1] - ground.center[box, 1]
+    z = point[2] - ground.center[box, 2]
+    r = ground.rotation
+    shallow = 0
+    for k in range(3):
+        own = r[box, 3 * k] * x + r[box, 3 * k + 1] * y + r[box, 3 * k + 2] * z
+        beyond = abs(own) - ground.half[box, k]
+        seen = ground.exposed[box, k if own >= 0.0 else 3 + k] > 0.0
+        if not seen and beyond > BESIDE:
+            return False
+        shallow += seen and beyond > -BESIDE
+    return shallow == 1
+
+
+@kernel
+def faces_at(ground: SpatialGroundModel, point: Triple) -> tuple[int, int]:
+    """Return the face that a point meets, and the wall beside it; -1 if there is none.
+
+    In a corner the first is the one that points more upwards.
+    """
+    best, distance, normal = nearest_face(ground, point)
+    wall, least, across = -1, math.inf, normal
+    for face in range(ground.half.shape[0] + 1):
+        if face == best or (face > 0 and not is_beside(ground, face - 1, point)):
+            continue
+        other, away = distance_to_face(ground, face, point)
+        along = away[0] * normal[0] + away[1] * normal[1] + away[2] * normal[2]
+        if other < least and along < PARALLEL:
+            wall, least, across = face, other, away
+    if wall >= 0 and least <= distance + BESIDE and across[2] > normal[2]:
+        return wall, best
+    return best, wall

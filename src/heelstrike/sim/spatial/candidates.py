@@ -13,7 +13,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.spatial.ground import (
     SpatialGroundModel,
     distance_to_face,
-    nearest_face,
+    faces_at,
 )
 from heelstrike.dynamics.spatial.algebra import dot, spatial, velocity_at
 from heelstrike.dynamics.spatial.configurations import turn_between
@@ -38,7 +38,7 @@ from heelstrike.sim.spatial.memory import (
     SpatialEquations,
     SpatialFeet,
 )
-from heelstrike.sim.spatial.table import BALL_STOP, DRY_JOINT, POINT, STOP, BlockTable
+from heelstrike.sim.spatial.table import BALL_STOP, DRY_JOINT, POINT, STOP, WALL, BlockTable
 
 CLOSING = 5.0
 """Speed (m/s) at which what closes within a step takes part; or at twice its free speed."""
@@ -54,6 +54,12 @@ NO_ANGLE = 1e-12
 
 
 @kernel
+def is_point(kind: int) -> bool:
+    """Whether an entry is a contact point, at the face below it or at a wall."""
+    return kind in (POINT, WALL)
+
+
+@kernel
 def locate_points(
     model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, table: BlockTable,
     contacts: Contacts, feet: SpatialFeet,
@@ -61,7 +67,8 @@ def locate_points(
     """Find where the contact points are, and the ground that is nearest to each."""
     for contact in range(model.nc):
         center = contact_center(model, tree, contact)
-        face, _, normal = nearest_face(ground, center)
+        face, wall = faces_at(ground, center)
+        _, normal = distance_to_face(ground, face, center)
         point = contact_point(model, tree, contact, normal)
         gap, normal = distance_to_face(ground, face, point)
         frame = contact_frame(normal)
@@ -76,6 +83,31 @@ def locate_points(
         table.friction[contact] = model.friction_scale[contact] * ground.friction[face]
         bounces = model.restitution_scale[contact] * ground.restitution[face]
         table.restitution[contact] = min(bounces, 1.0)
+        if feet.foot.shape[0] > model.nc:
+            locate_wall(model, ground, tree, contact, wall, table, feet)
+
+
+@kernel
+def locate_wall(
+    model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, contact: int,
+    wall: int, table: BlockTable, feet: SpatialFeet,
+) -> None:  # fmt: skip
+    """Find how far a contact point is from the wall beside it, infinitely if there is none."""
+    entry = model.nc + contact
+    table.gap[entry] = math.inf
+    if wall < 0:
+        return
+    _, normal = distance_to_face(ground, wall, contact_center(model, tree, contact))
+    point = contact_point(model, tree, contact, normal)
+    gap, normal = distance_to_face(ground, wall, point)
+    frame = contact_frame(normal)
+    for k in range(3):
+        feet.foot[entry, k] = point[k] - gap * normal[k]
+    for k in range(9):
+        feet.frame[entry, k] = frame[k]
+    table.gap[entry] = gap
+    table.friction[entry] = model.friction_scale[contact] * ground.friction[wall]
+    table.restitution[entry] = min(model.restitution_scale[contact] * ground.restitution[wall], 1.0)
 
 
 @kernel
@@ -100,11 +132,12 @@ def turn_of_ball(model: SpatialModel, joint: int, q: Floats) -> tuple[float, flo
 
 @kernel
 def normal_speed(
-    model: SpatialModel, tree: SpatialWorkspace, contact: int, feet: SpatialFeet, v: Floats
-) -> float:
-    """Normal velocity of a contact point at some velocities."""
-    foot = feet.foot[contact, 0], feet.foot[contact, 1], feet.foot[contact, 2]
-    normal = feet.frame[contact, 0], feet.frame[contact, 1], feet.frame[contact, 2]
+    model: SpatialModel, tree: SpatialWorkspace, contact: int, entry: int, feet: SpatialFeet,
+    v: Floats,
+) -> float:  # fmt: skip
+    """Normal velocity of a contact point, to the face of an entry, at some velocities."""
+    foot = feet.foot[entry, 0], feet.foot[entry, 1], feet.foot[entry, 2]
+    normal = feet.frame[entry, 0], feet.frame[entry, 1], feet.frame[entry, 2]
     place = place_of(tree, foot)
     last = model.last_velocity[model.contact_link[contact]]
     speed = 0.0
@@ -132,8 +165,8 @@ def entry_speed(
 ) -> float:  # fmt: skip
     """How fast the gap of an entry opens at some velocities."""
     owner = table.owner[entry]
-    if table.kind[entry] == POINT:
-        return normal_speed(model, tree, owner, feet, v)
+    if is_point(table.kind[entry]):
+        return normal_speed(model, tree, owner, entry, feet, v)
     if table.kind[entry] == STOP:
         return table.side[entry] * v[model.first_velocity[owner]]
     return ball_speed(model, owner, q, v)
@@ -142,7 +175,7 @@ def entry_speed(
 @kernel
 def is_far(step: float, entry: int, table: BlockTable) -> bool:
     """Whether something is too far away to be looked at: 100 m/s would not bring it there."""
-    closing = CLOSING if table.kind[entry] == POINT else CLOSING_TURN
+    closing = CLOSING if is_point(table.kind[entry]) else CLOSING_TURN
     return table.gap[entry] > FAR * closing * step
 
 
@@ -155,7 +188,7 @@ def could_act(
     if table.kind[entry] == DRY_JOINT or table.called[entry] == 1:
         return True
     gap = table.gap[entry]
-    if gap <= step * (CLOSING if table.kind[entry] == POINT else CLOSING_TURN):
+    if gap <= step * (CLOSING if is_point(table.kind[entry]) else CLOSING_TURN):
         return True
     if is_far(step, entry, table):
         return False
@@ -198,9 +231,9 @@ def write_rows_of(
 ) -> None:  # fmt: skip
     """Write the rows of an entry along its chain."""
     owner = table.owner[entry]
-    if table.kind[entry] == POINT:
-        foot = feet.foot[owner, 0], feet.foot[owner, 1], feet.foot[owner, 2]
-        frame = matrix(feet.frame, owner)
+    if is_point(table.kind[entry]):
+        foot = feet.foot[entry, 0], feet.foot[entry, 1], feet.foot[entry, 2]
+        frame = matrix(feet.frame, entry)
         write_point_rows(model, tree, model.contact_link[owner], foot, frame, first, rows)
     elif table.kind[entry] == STOP:
         write_velocity_row(model, model.first_velocity[owner], table.side[entry], first, rows)

@@ -155,7 +155,7 @@ def advance_in_space(
         clock.answered = 0
         if not limit_commands(model, memory.v, memory.command, memory.tally, memory.torque):
             return BAD_CONTROLLER
-        note_deepest(memory.contacts.gap, memory.tally)
+        note_deepest(memory.feet.foot.shape[0], memory.blocks.gap, memory.tally)
         due = clock.index % clock.record_every == 0 or clock.finishing == 1
         if due:
             begin_row(time, memory.q, memory.v, memory.torque, memory.contacts, record)

@@ -66,10 +66,10 @@ class SpatialEquations(Bundle):
 class SpatialFeet(Bundle):
     """The contact points of an instant beside what controllers see."""
 
-    foot: Floats = array("nc", 3)
-    """Projection of each point onto the ground: where its rows are taken."""
-    frame: Floats = array("nc", 9)
-    """Normal and tangents, row by row."""
+    foot: Floats = array("feet", 3)
+    """Projection of each point onto the ground, then onto its wall: where its rows are taken."""
+    frame: Floats = array("feet", 9)
+    """Normals and tangents, row by row."""
     slip: Floats = array("nc", 2)
     """Tangential velocity at the end of the step."""
 
@@ -170,12 +170,15 @@ class SpatialMemory(Bundle):
     tally: SpatialTally = part(SpatialTally)
 
 
-def allocate_spatial_memory(robot: SpatialRobot, pushes: SpatialPushes) -> SpatialMemory:
-    """Allocate the memory of a simulation of a robot in space."""
-    table = lay_out_table(robot)
+def allocate_spatial_memory(
+    robot: SpatialRobot, pushes: SpatialPushes, *, walls: bool = False
+) -> SpatialMemory:
+    """Allocate the memory of a simulation of a robot in space, on ground with walls or without."""
+    table = lay_out_table(robot, walls=walls)
     entries, rows = len(table.kind), max(most_rows_of(table), 1)
     extents = {
         **robot.model.extents, "entries": entries, "capacity": rows, "axes": 3, "components": 3,
+        "feet": (2 if walls else 1) * robot.model.nc,
     }  # fmt: skip
     blocks = max(entries, 1)
     assembly = SpatialAssembly.allocate(

@@ -10,7 +10,7 @@ from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.spatial.memory import SpatialReported, SpatialTally
-from heelstrike.sim.spatial.table import DRY_JOINT, POINT, BlockTable
+from heelstrike.sim.spatial.table import DRY_JOINT, POINT, WALL, BlockTable
 
 GONE = 1e-7
 """A contact point has left the ground when its gap exceeds this (m)."""
@@ -140,9 +140,9 @@ def log_spatial_event(
 
 
 @kernel
-def note_deepest(gap: Floats, tally: SpatialTally) -> None:
-    """Keep the deepest penetration of the run."""
-    for contact in range(gap.shape[0]):
+def note_deepest(faces: int, gap: Floats, tally: SpatialTally) -> None:
+    """Keep the deepest penetration of the run, of the first entries: points and walls."""
+    for contact in range(faces):
         tally.penetration = max(tally.penetration, -gap[contact])
 
 
@@ -153,12 +153,15 @@ def note_spatial_events(
 ) -> None:  # fmt: skip
     """Find what happened in a step that has been taken, to every entry of the table.
 
-    What stands on the ground, or at a stop, as the run begins does not get there.
+    What stands on the ground, or at a stop, as the run begins does not get there. Walls are not
+    told of: a point at one is often on the ground already, or not yet.
     """
     closed, slipping = reported.closed, reported.slipping
     end = time + step
     for entry in range(table.kind.shape[0]):
         owner, kind = table.owner[entry], table.kind[entry]
+        if kind == WALL:
+            continue
         force = table.force[entry, 0], table.force[entry, 1], table.force[entry, 2]
         impulse = step * force[0], step * force[1], step * force[2]
         if kind == DRY_JOINT:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time as clock_time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,12 @@ from heelstrike.sim.closed_sets import OnError, RunStatus, Scheme
 from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
 from heelstrike.sim.controller.law import Law, law_of, no_torque
 from heelstrike.sim.controller.raised import EndOfRun, tell
+from heelstrike.sim.controller.watch import numbers_of, restored
 from heelstrike.sim.frame import Outcome
 from heelstrike.sim.method import Method, whole_steps
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Timing
-from heelstrike.sim.setting import FALL_FRACTION, checked_on_error
+from heelstrike.sim.setting import FALL_FRACTION, Setup, checked_on_error
 from heelstrike.sim.spatial.controlled import GOES_ON, ReadySpatialLaw, words_in_space
 from heelstrike.sim.spatial.loop import SpatialClock, height_of_mass, spatial_loop
 from heelstrike.sim.spatial.memory import allocate_spatial_memory
@@ -104,6 +105,8 @@ class SpatialSnapshot:
     """What decided its torques."""
     arrays: Mapping[str, NDArray[Any]] = field(repr=False)
     """All numbers of the simulation, by name."""
+    surroundings: Mapping[str, Any] = field(repr=False)
+    """What it is simulated with, by name: method, ground, pushes, control period."""
     numbers: NDArray[Any] | None = field(default=None, repr=False)
     """The memory of a controller in Python."""
 
@@ -170,7 +173,9 @@ class SpatialSimulation:
         **others: Any,
     ) -> None:
         for name in others:
-            raise SimulationError(f"a simulation in space has no option {name!r} yet")
+            if name in Setup.__annotations__:
+                raise SimulationError(f"a simulation in space has no option {name!r} yet")
+            raise SimulationError(f"unknown option {name!r} of a simulation in space")
         if not isinstance(robot, SpatialRobot):
             raise SimulationError(f"robot must be a SpatialRobot, got {type(robot).__name__}")
         if not (isinstance(record_every, int | np.integer) and record_every >= 1):
@@ -180,7 +185,9 @@ class SpatialSimulation:
         self._ground = spatial_ground(ground)
         self._pushes = (pushes,) if isinstance(pushes, Push) else tuple(pushes)
         begin = checked_state(robot, state)
-        self._memory = allocate_spatial_memory(robot, spatial_pushes(robot, self._pushes))
+        self._memory = allocate_spatial_memory(
+            robot, spatial_pushes(robot, self._pushes), walls=len(self._ground.boxes) > 0
+        )
         self._memory.q[:], self._memory.v[:] = begin.q, begin.v
         self._clock = clock = SpatialClock.allocate()
         clock.step, clock.record_every = self.method.step, int(record_every)
@@ -203,6 +210,13 @@ class SpatialSimulation:
         self.status: RunStatus = RunStatus.COMPLETED
         self.message = "not begun"
         self.error: BaseException | None = None
+
+    def __reduce__(self) -> NoReturn:
+        """Copies would share memory that compiled code finds by address."""
+        raise TypeError(
+            "a simulation cannot be copied or pickled: begin another one with "
+            "state=simulation.state, or keep simulation.snapshot() and restore it here"
+        )
 
     def _find_state(self) -> None:
         memory = self._memory
@@ -232,6 +246,8 @@ class SpatialSimulation:
             f"{type(controller).__name__}.torque" if law is None
             else f"controller {law.function.name!r}"
         )  # fmt: skip
+        robot: Any = self.robot
+        self._robot_numbers = {} if self._python is None else numbers_of(robot)
         self._shown: Contacts = read_only(self._memory.contacts)
 
     @property
@@ -293,7 +309,21 @@ class SpatialSimulation:
             for prefix, bundle in self._kept().items()
             for name, values in bundle.storage(prefix)
         }
-        return SpatialSnapshot(self.time, self.robot, self._controller, arrays, numbers)
+        return SpatialSnapshot(
+            self.time, self.robot, self._controller, arrays, self._surroundings(), numbers
+        )
+
+    def _surroundings(self) -> dict[str, Any]:
+        """What a snapshot must have been simulated with, too, in numbers that compare."""
+        parts = {"ground": self._ground.model(), "pushes": self._memory.pushes}
+        return {
+            "method": repr(self.method),
+            "control period": self._clock.control_every * self._clock.step,
+            **{
+                name: [(each, array.shape, array.tobytes()) for each, array in bundle.storage()]
+                for name, bundle in parts.items()
+            },
+        }
 
     def restore(self, snapshot: SpatialSnapshot) -> None:
         """Be again as a simulation was; the record starts again.
@@ -301,26 +331,42 @@ class SpatialSimulation:
         Parameters
         ----------
         snapshot : SpatialSnapshot
-            Of this simulation, or of one of the same robot and controller.
+            Of this simulation, or of one of the same robot, controller, method, ground, pushes and
+            control period, in this process. The rows of its record are as far apart as those of
+            the snapshot.
 
         Raises
         ------
-        SimulationError, ControllerError
-            If it is one of another robot, controller or pushes.
+        SimulationError
+            If it is one of another of these.
+        ControllerError
+            If a controller in Python does not take part in snapshots.
         """
         if not isinstance(snapshot, SpatialSnapshot):
             raise SimulationError(f"restore takes a SpatialSnapshot, got {type(snapshot).__name__}")
-        same = snapshot.robot is self.robot and snapshot.controller is self._controller
+        same = {
+            "robot": snapshot.robot is self.robot,
+            "controller": snapshot.controller is self._controller,
+        } | {
+            what: snapshot.surroundings.get(what) == mine
+            for what, mine in self._surroundings().items()
+        }
+        for what, alike in same.items():
+            if not alike:
+                raise SimulationError(
+                    f"the snapshot is one of another {what}: restore it into a simulation with "
+                    f"the same {what}"
+                )
         mine = {
             name: values
             for prefix, bundle in self._kept().items()
             for name, values in bundle.storage(prefix)
         }
-        alike = mine.keys() == snapshot.arrays.keys() and all(
+        fits = mine.keys() == snapshot.arrays.keys() and all(
             values.shape == snapshot.arrays[name].shape for name, values in mine.items()
         )
-        if not (same and alike):
-            raise SimulationError("the snapshot is one of another robot, controller or pushes")
+        if not fits:
+            raise SimulationError("the snapshot is damaged: its arrays are not those of this one")
         if self._python is not None and snapshot.numbers is not None:
             self._partaking().restore(snapshot.numbers.copy())
         for name, values in mine.items():
@@ -391,9 +437,13 @@ class SpatialSimulation:
             acknowledge(interrupt)
             self.status, self.message = RunStatus.INTERRUPTED, f"interrupted at {self._now}"
         self._wall_s += clock_time.perf_counter() - begin
+        self._tell_error()
+        return self.status
+
+    def _tell_error(self) -> None:
+        """Do with an error in the controller as `on_error` says."""
         if self.status is RunStatus.CONTROLLER_FAILED and self.error is not None:
             tell(self.message, self.error, self.on_error)
-        return self.status
 
     def _forget_error(self) -> None:
         self.error = None
@@ -421,6 +471,16 @@ class SpatialSimulation:
             steps = int(min(ROWS, max(1.0, more)))
 
     def _run_loop(self) -> tuple[RunStatus, str] | None:
+        """Run the loop until it pauses or ends; a robot that was changed meanwhile is put back."""
+        ended = self._run_unwatched()
+        robot: Any = self.robot
+        if changed := restored(robot, self._robot_numbers):
+            wrong = f"{self._name} changed the robot: {changed}; noticed at {self._now}"
+            self.error = ControllerError(wrong)
+            return RunStatus.CONTROLLER_FAILED, wrong
+        return ended
+
+    def _run_unwatched(self) -> tuple[RunStatus, str] | None:
         """Run the loop until it pauses or ends, with what it needs from Python."""
         if not self._records:
             self._new_record()
@@ -522,11 +582,17 @@ class SpatialSimulation:
             return
         self._clock.finishing = 1
         begin = clock_time.perf_counter()
-        ended = self._run_loop()
-        self._wall_s += clock_time.perf_counter() - begin
-        self._clock.finishing = 0
+        try:
+            ended = self._run_loop()
+        except KeyboardInterrupt as interrupt:  # too late for anything to be lost
+            acknowledge(interrupt)
+            ended = RunStatus.INTERRUPTED, f"interrupted at {self._now}"
+        finally:
+            self._wall_s += clock_time.perf_counter() - begin
+            self._clock.finishing = 0
         if ended is not None:
             self.status, self.message = ended
+            self._tell_error()
 
 
 def simulate_in_space(

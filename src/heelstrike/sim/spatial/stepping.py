@@ -57,6 +57,7 @@ from heelstrike.sim.spatial.table import (
     DRY_JOINT,
     POINT,
     STOP,
+    WALL,
     BlockTable,
 )
 from heelstrike.tolerances import CLOSED_GAP
@@ -294,10 +295,13 @@ def note_answer_of(
 
 @kernel
 def share_forces(
-    model: SpatialModel, q: Floats, table: BlockTable, contact_force: Floats, stop_torque: Floats,
-    friction_torque: Floats,
+    model: SpatialModel, q: Floats, table: BlockTable, feet: SpatialFeet, contact_force: Floats,
+    stop_torque: Floats, friction_torque: Floats,
 ) -> None:  # fmt: skip
-    """Write the mean forces of the step where records and controllers look for them."""
+    """Write the mean forces of the step where records and controllers look for them.
+
+    Those of walls are added in the axes of the face below the point.
+    """
     for k in range(model.nv):
         stop_torque[k] = 0.0
         friction_torque[k] = 0.0
@@ -306,6 +310,13 @@ def share_forces(
         if kind == POINT:
             for i in range(3):
                 contact_force[owner, i] = table.force[entry, i]
+        elif kind == WALL:
+            for i in range(3):
+                for j in range(3):
+                    along = 0.0
+                    for k in range(3):
+                        along += feet.frame[owner, 3 * i + k] * feet.frame[entry, 3 * j + k]
+                    contact_force[owner, i] += along * table.force[entry, j]
         elif kind == STOP:
             k = model.first_velocity[owner]
             stop_torque[k] += table.side[entry] * table.force[entry, 0]
@@ -400,7 +411,7 @@ def take_step(
     memory.tally.energy_gain += gain
     memory.tally.uncertified += not certified
     share_forces(
-        model, memory.q, memory.blocks, memory.contacts.force, memory.stop_torque,
+        model, memory.q, memory.blocks, memory.feet, memory.contacts.force, memory.stop_torque,
         memory.friction_torque,
     )  # fmt: skip
     return True, certified

@@ -13,14 +13,15 @@ from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import BALL, HINGE, SLIDE
 from heelstrike.robot.spatial.robot import SpatialRobot
 
-POINT, STOP, BALL_STOP, DRY_JOINT = range(4)
+POINT, STOP, BALL_STOP, DRY_JOINT, WALL = range(5)
+"""Kinds of entries; a wall is a second face that a contact point may meet."""
 
 NEVER_TOUCHED = -2
 """The step at whose end what has not touched did so."""
 
 
 class BlockTable(Bundle):
-    """All that may hold a robot: first its contact points, then stops, then dry friction."""
+    """All that may hold a robot: contact points, then their walls, stops, dry friction."""
 
     kind: Integers = array("entries", of=int)
     """What each entry is."""
@@ -50,11 +51,12 @@ class BlockTable(Bundle):
     """What takes part although it seemed too far away."""
 
 
-def lay_out_table(robot: SpatialRobot) -> BlockTable:
-    """Return the table of a robot."""
+def lay_out_table(robot: SpatialRobot, *, walls: bool) -> BlockTable:
+    """Return the table of a robot, with an entry for a wall at each contact point or without."""
     model = robot.model
     entries: list[tuple[int, int, float, int, int, int]] = [
-        (POINT, contact, 0.0, int(model.last_velocity[link]), CONE, 3)
+        (kind, contact, 0.0, int(model.last_velocity[link]), CONE, 3)
+        for kind in ((POINT, WALL) if walls else (POINT,))
         for contact, link in enumerate(model.contact_link.tolist())
     ]
     for joint, kind in enumerate(model.joint_kind.tolist()):

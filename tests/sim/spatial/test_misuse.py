@@ -1,0 +1,114 @@
+"""What a simulation in space refuses, and what becomes of controllers that do what they may not."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from spatial_robots import Maker
+
+import heelstrike as hs
+from heelstrike.errors import ControllerError, SimulationError
+
+BALL = "<body name='ball'><freejoint/><geom type='sphere' size='0.1' mass='1'/></body>"
+ARM = (
+    "<body name='arm' pos='0 0 1'><joint name='shoulder' axis='0 1 0'/>"
+    "<geom type='capsule' fromto='0 0 0 0.4 0 0' size='0.02' mass='1'/></body>"
+)
+MOTOR = "<actuator><motor name='motor' joint='shoulder'/></actuator>"
+
+
+@pytest.mark.parametrize(
+    ("what", "mine", "its"),
+    [
+        ("method", {}, {"method": hs.TimeStepping(step=5e-4)}),
+        ("ground", {}, {"ground": hs.SpatialGround(friction=0.3)}),
+        (
+            "pushes",
+            {"pushes": hs.Push("ball", force=(1.0, 0.0, 0.0), start=0.0, duration=0.1)},
+            {"pushes": hs.Push("ball", force=(2.0, 0.0, 0.0), start=0.0, duration=0.1)},
+        ),
+        ("control period", {}, {"control_period": 0.004}),
+    ],
+)
+def test_a_snapshot_of_another_setting_is_refused(
+    made: Maker, what: str, mine: dict[str, Any], its: dict[str, Any]
+) -> None:
+    robot = made(BALL)
+    state = robot.reference_state()
+    kept = hs.Simulation(robot, state=state, **its).snapshot()
+    simulation = hs.Simulation(robot, state=state, **mine)
+    with pytest.raises(SimulationError, match=f"another {what}"):
+        simulation.restore(kept)
+    assert simulation.message == "not begun"
+    again = hs.Simulation(robot, state=state, **its)
+    again.restore(kept)
+    assert again.message.startswith("restored")
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_simulation_is_not_copied(made: Maker, duplicate: Any) -> None:
+    robot = made(BALL)
+    simulation = hs.Simulation(robot, state=robot.reference_state())
+    with pytest.raises(TypeError, match="cannot be copied or pickled"):
+        duplicate(simulation)
+
+
+class FailsAtTheEnd:
+    """Raises something when it is asked for the last time, at 0.01 s."""
+
+    def __init__(self, error: BaseException) -> None:
+        self.error = error
+
+    def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+        if t > 0.0095:
+            raise self.error
+        return np.zeros(1)
+
+
+def test_errors_of_the_last_instant_are_told_as_others(made: Maker) -> None:
+    robot = made(ARM, MOTOR)
+    begin: dict[str, Any] = {"state": robot.reference_state(), "duration": 0.01}
+    with pytest.raises(ValueError, match="too late"):
+        hs.simulate(robot, FailsAtTheEnd(ValueError("too late")), on_error="raise", **begin)
+    with pytest.warns(hs.ControllerWarning, match="too late"):
+        hs.simulate(robot, FailsAtTheEnd(ValueError("too late")), **begin)
+
+
+def test_ctrl_c_at_the_last_instant_keeps_the_run(made: Maker) -> None:
+    robot = made(ARM, MOTOR)
+    run = hs.simulate(
+        robot, FailsAtTheEnd(KeyboardInterrupt()), state=robot.reference_state(), duration=0.01
+    )
+    assert run.status is hs.RunStatus.INTERRUPTED
+    assert len(run.time) == 10
+
+
+def test_a_controller_may_not_change_the_robot(made: Maker) -> None:
+    """The run ends in words, and the robot is as before."""
+    robot = made(ARM, MOTOR)
+    mass = robot.model.mass.copy()
+
+    class Lightens:
+        def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+            robot.model.mass[:] = 0.1
+            return np.zeros(1)
+
+    run = hs.simulate(
+        robot, Lightens(), state=robot.reference_state(), duration=0.01, on_error="stop"
+    )
+    assert run.status is hs.RunStatus.CONTROLLER_FAILED
+    assert "changed the robot: model.mass[0]" in run.message
+    assert isinstance(run.error, ControllerError)
+    assert np.array_equal(robot.model.mass, mass)
+
+
+def test_options_of_the_plane_are_told_from_unknown_ones(made: Maker) -> None:
+    robot = made(BALL)
+    with pytest.raises(SimulationError, match="has no option 'braked' yet"):
+        hs.Simulation(robot, state=robot.reference_state(), braked=())
+    with pytest.raises(SimulationError, match="unknown option 'colour'"):
+        hs.Simulation(robot, state=robot.reference_state(), colour="red")

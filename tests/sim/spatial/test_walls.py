@@ -1,0 +1,82 @@
+"""Walls of boxes: what slides against one stands before it, judged by the corners of the robot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from spatial_robots import Maker
+
+import heelstrike as hs
+
+CRATE = (
+    "<body name='crate' pos='0 0 0.3'><freejoint/>"
+    "<geom type='box' size='0.15 0.15 0.3' mass='5'/></body>"
+)
+FEELER = (
+    "<body name='feeler' pos='0 0 0.1'><freejoint/>"
+    "<geom type='box' size='0.2 0.15 0.1' mass='2'/></body>"
+)
+
+
+def depth_in(run: object, half: tuple[float, ...], box: hs.Box) -> float:
+    """Deepest corner of a robot of one box in a box that is not turned, by all its faces."""
+    deepest = 0.0
+    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * half
+    low = np.array(box.center) - 0.5 * np.array(box.size)
+    high = np.array(box.center) + 0.5 * np.array(box.size)
+    for row in run.position:  # type: ignore[attr-defined]
+        w, x, y, z = row[3:]
+        turn = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        at = row[:3] + corners @ turn.T
+        # Below its bottom there is the plane: only the way to the other faces counts.
+        out = np.min(np.c_[at[:, :2] - low[:2], high - at], axis=1)
+        deepest = max(deepest, float(np.max(out)))
+    return deepest
+
+
+@pytest.mark.parametrize(
+    ("inner", "half"), [(CRATE, (0.15, 0.15, 0.3)), (FEELER, (0.2, 0.15, 0.1))]
+)
+def test_a_box_stops_at_a_wall_that_stands_on_the_plane(
+    made: Maker, inner: str, half: tuple[float, float, float]
+) -> None:
+    robot = made(inner)
+    box = hs.Box(center=(0.7, 0.0, 0.1), size=(0.4, 2.0, 0.2))
+    ground = hs.SpatialGround(friction=0.0, boxes=(box,))
+    state = hs.State(robot.reference_state().q, np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    run = hs.simulate(robot, state=state, duration=0.6, ground=ground)
+    assert run.certificates.uncertified == 0
+    assert depth_in(run, half, box) <= 1e-6
+    assert np.max(run.position[:, 0]) > 0.5 - half[0] - 1e-3
+    assert run.velocity[-1, 0] < 0.9
+
+
+def test_the_first_riser_of_stairs_is_felt(made: Maker) -> None:
+    robot = made(FEELER)
+    ground = hs.SpatialGround.stairs(rise=0.08, tread=0.3, count=3, start=0.4, friction=0.0)
+    state = hs.State(robot.reference_state().q, np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    run = hs.simulate(robot, state=state, duration=0.5, ground=ground)
+    assert depth_in(run, (0.2, 0.15, 0.1), ground.boxes[0]) <= 1e-6
+    assert np.max(run.position[:, 0]) > 0.2 - 1e-3
+
+
+def test_points_slide_from_box_to_box_of_one_height(made: Maker) -> None:
+    """The rim of the next box, wider than the first, is no wall."""
+    robot = made(FEELER)
+    boxes = (
+        hs.Box(center=(0.0, 0.0, 0.1), size=(1.0, 1.0, 0.2)),
+        hs.Box(center=(1.0, 0.0, 0.1), size=(1.0, 2.0, 0.2)),
+    )
+    ground = hs.SpatialGround(friction=0.0, boxes=boxes)
+    q = robot.reference_state().q.copy()
+    q[2] = 0.3
+    run = hs.simulate(
+        robot, state=hs.State(q, np.r_[1.0, np.zeros(5)]), duration=0.6, ground=ground
+    )
+    assert run.velocity[-1] == pytest.approx(np.r_[1.0, np.zeros(5)], abs=1e-9)
