@@ -1,12 +1,13 @@
-"""Ground in space refuses numbers that are none."""
+"""Ground in space: numbers that it refuses, and faces of boxes that nothing can touch."""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
-from heelstrike.contact.spatial.ground import Box, SpatialGround
+from heelstrike.contact.spatial.ground import Box, SpatialGround, distance_to_box
 from heelstrike.errors import SimulationError
 
 
@@ -34,3 +35,19 @@ def test_a_normal_may_be_of_any_length() -> None:
     assert SpatialGround(normal=(1e200, 0.0, 1e200)).normal == pytest.approx(
         (math.sqrt(0.5), 0.0, math.sqrt(0.5))
     )
+
+
+def test_only_covered_faces_are_left_out() -> None:
+    """Of stairs the bottoms; treads that the next step covers in part stay, as do all sides."""
+    exposed = SpatialGround.stairs(rise=0.1, tread=0.3, count=3).model().exposed
+    assert np.array_equal(exposed, [[1, 1, 1, 1, 1, 0]] * 3)
+    floating = Box(center=(0.0, 0.0, 0.2), size=(0.2, 0.2, 0.2))
+    assert np.all(SpatialGround(boxes=(floating,)).model().exposed == 1.0)
+
+
+def test_depth_counts_to_faces_that_can_be_left_by() -> None:
+    """A point on the plane, 1 mm within a wall, is 1 mm deep and pushed out of its side."""
+    ground = SpatialGround(boxes=(Box(center=(0.7, 0.0, 0.1), size=(0.4, 2.0, 0.2)),))
+    depth, normal = distance_to_box(ground.model(), 0, (0.501, 0.0, 0.0))
+    assert depth == pytest.approx(-1e-3, abs=1e-15)
+    assert normal == pytest.approx((-1.0, 0.0, 0.0))

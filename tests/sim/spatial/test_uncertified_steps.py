@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
+import pytest
 from spatial_robots import Maker
 
 import heelstrike as hs
+from heelstrike.contact.spatial.modes import NOT_FOUND, SOLVED
+from heelstrike.contact.spatial.workspace import block_answer
 from heelstrike.sim.spatial.record import SpatialEventKind
+from heelstrike.sim.spatial.stepping import left_by
 
 BLOCK = (
     "<body name='block' pos='0 0 0.1'><freejoint/><geom type='box' size='0.2 0.15 0.1' mass='2'/>"
@@ -56,3 +62,36 @@ def test_stairs_are_as_high_and_deep_as_they_say(made: Maker) -> None:
         run = hs.simulate(robot, state=hs.State(q, np.zeros(6)), duration=0.5, ground=ground)
         assert abs(run.position[-1, 2] - height - 0.05) <= 1e-9
         assert np.max(np.abs(run.position[-1, :2] - q[:2])) <= 1e-9
+
+
+@pytest.mark.parametrize(
+    ("residual", "rounding", "least"),
+    [(0.0, 0.0, 1e-17), (0.0, 1e-3, 1e-3), (0.25, 0.25, 0.5), (np.nan, 0.0, np.inf)],
+)
+def test_what_is_not_solved_leaves_something(
+    residual: float, rounding: float, least: float
+) -> None:
+    """A solve that rounding alone refused is not taken for one that is certified."""
+    answer = block_answer(1, 3)
+    answer.residual, answer.rounding = residual, rounding
+    assert left_by(NOT_FOUND, answer) >= least
+    assert left_by(SOLVED, answer) == 0.0
+
+
+def test_a_block_at_rest_is_not_certified_beyond_its_rounding(made: Maker) -> None:
+    robot = made(BLOCK)
+    simulation = hs.Simulation(robot, state=robot.reference_state())
+    simulation._memory.solver.settings.tolerance = 1e-25
+    simulation.advance(0.01)
+    assert simulation.record.certificates.uncertified == 10
+
+
+def test_the_message_names_the_residual_that_ended_the_run(made: Maker) -> None:
+    simulation = sliding(made)
+    simulation.advance(0.005)
+    simulation._memory.solver.settings.ways = 0
+    simulation.advance(0.01)
+    told = re.search(r"residual (\S+)\. A", simulation.message)
+    assert told is not None
+    assert float(told.group(1)) == pytest.approx(simulation._memory.tally.unsolved, rel=1e-2)
+    assert float(told.group(1)) > 1e-6

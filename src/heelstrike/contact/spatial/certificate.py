@@ -155,7 +155,8 @@ def certify_blocks(
 ) -> float:
     """Compute the velocity that an impulse gives and its residual; return it, rounding included.
 
-    Writes ``velocity`` and ``residual`` of the answer, and names its modes by the velocity.
+    Writes ``velocity``, ``residual`` and ``rounding`` of the answer, and names its modes by the
+    velocity.
     """
     weigh_blocks(problem, settings, scaled)
     rounding = sum_blocks(problem, scaled, answer)
@@ -189,6 +190,7 @@ def certify_blocks(
         worst = math.inf
     scaled.rounding = most
     answer.residual = worst
+    answer.rounding = most
     return worst + most
 
 

@@ -46,6 +46,8 @@ class BlockAnswer(Bundle):
     velocity: Floats = array("rows")
     residual: float = cell(float)
     """Natural map, rounding left out; see :mod:`heelstrike.contact.spatial.certificate`."""
+    rounding: float = cell(float)
+    """How far the true residual may exceed this."""
 
 
 class BlockSettings(Bundle):

@@ -44,7 +44,7 @@ from heelstrike.sim.spatial.record import (
     note_deepest,
     note_spatial_events,
 )
-from heelstrike.sim.spatial.stepping import find_state, take_step
+from heelstrike.sim.spatial.stepping import find_state, residual_of, take_step
 
 
 class SpatialClock(Bundle):
@@ -171,7 +171,7 @@ def advance_in_space(
         if due:
             finish_row(
                 memory.stop_torque, memory.friction_torque, memory.contacts.force, memory.feet.slip,
-                memory.assembly.answer.residual, record,
+                residual_of(memory.assembly.answer), record,
             )  # fmt: skip
         ended = below or clock.finishing == 1 or control.robot.ending >= 0
         if not done or ended:

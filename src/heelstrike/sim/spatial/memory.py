@@ -44,7 +44,9 @@ class SpatialTally(Bundle):
     penetration: float = cell(float)
     """Deepest penetration of a contact point (m)."""
     residual: float = cell(float)
-    """Largest residual of a contact problem."""
+    """Largest residual of a contact problem, rounding included."""
+    unsolved: float = cell(float)
+    """Residual of the step that nothing could certify and that was not taken."""
     energy_gain: float = cell(float)
     """Kinetic energy that restitution made (J)."""
 

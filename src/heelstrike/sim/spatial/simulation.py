@@ -549,7 +549,7 @@ class SpatialSimulation:
             )
         return RunStatus.SOLVER_FAILED, (
             f"no contact impulses could be certified at {self._now}, nor in parts of the step: "
-            f"residual {max(self._memory.assembly.answer.residual, 0.0):.3g}. A smaller step may "
+            f"residual {tally.unsolved:.3g}. A smaller step may "
             "get past it"
         )
 

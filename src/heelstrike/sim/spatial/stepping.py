@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.compensated import UNIT_ROUNDOFF
 from heelstrike.contact.spatial.certified_solve import solve_block_problem
 from heelstrike.contact.spatial.ground import SpatialGroundModel
 from heelstrike.contact.spatial.modes import SOLVED
-from heelstrike.contact.spatial.workspace import BlockWorkspace
+from heelstrike.contact.spatial.workspace import BlockAnswer, BlockWorkspace
 from heelstrike.dynamics.spatial.algebra import dot, spatial, velocity_at
 from heelstrike.dynamics.spatial.configurations import integrate
 from heelstrike.dynamics.spatial.equations import (
@@ -216,6 +217,19 @@ def solve_positions(
 
 
 @kernel
+def residual_of(answer: BlockAnswer) -> float:
+    """Residual of a contact problem, rounding included; infinite where it is no number."""
+    residual = answer.residual + answer.rounding
+    return residual if residual >= 0.0 else math.inf
+
+
+@kernel
+def left_by(status: int, answer: BlockAnswer) -> float:
+    """What a solve leaves: nothing if it is certified, and otherwise more than nothing."""
+    return 0.0 if status == SOLVED else max(residual_of(answer), UNIT_ROUNDOFF)
+
+
+@kernel
 def solve_step_of(
     model: SpatialModel, time: float, step: float, resolves: bool, memory: SpatialMemory
 ) -> float:
@@ -247,16 +261,15 @@ def solve_step_of(
                 model, step, table, memory.feet, memory.q, v, next_v, equations, assembly
             )  # fmt: skip
             steps = memory.tally.steps
-            if solve_positions(step, steps, table, memory.solver, assembly, impact) != SOLVED:
-                worst = assembly.answer.residual
+            status = solve_positions(step, steps, table, memory.solver, assembly, impact)
+            worst = left_by(status, assembly.answer)
             add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
             for row in range(assembly.problem.first[assembly.count]):
                 impact.impulse[row] = assembly.answer.impulse[row]
             if resolves and worst == 0.0 and closes(step, before, table, assembly):
                 impact.happens = 1
                 status = solve_impact_of(step, before, table, memory.solver, assembly, impact)
-                if status != SOLVED:
-                    worst = impact.answer.residual
+                worst = left_by(status, impact.answer)
                 add_impulses(model, impact.impulse, equations, assembly, next_v)
             else:
                 for k in range(model.nv):
@@ -387,6 +400,7 @@ def take_step(
             done *= 2
             continue
         if not worst <= BEARABLE:
+            memory.tally.unsolved = worst
             return False, False
         if worst > 0.0:
             certified = False
@@ -395,9 +409,9 @@ def take_step(
         )  # fmt: skip
         gain += memory.impact.gain
         if memory.assembly.count > 0:
-            memory.tally.residual = max(memory.tally.residual, memory.assembly.answer.residual)
+            memory.tally.residual = max(memory.tally.residual, residual_of(memory.assembly.answer))
         if memory.impact.happens == 1:
-            memory.tally.residual = max(memory.tally.residual, memory.impact.answer.residual)
+            memory.tally.residual = max(memory.tally.residual, residual_of(memory.impact.answer))
         memory.tally.relaxed += memory.impact.relaxed
         if done + 1 == parts:
             find_slip(
