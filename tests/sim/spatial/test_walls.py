@@ -41,7 +41,9 @@ def depth_in(run: object, half: tuple[float, ...], box: hs.Box) -> float:
 
 
 @pytest.mark.parametrize(
-    ("inner", "half"), [(CRATE, (0.15, 0.15, 0.3)), (FEELER, (0.2, 0.15, 0.1))]
+    ("inner", "half"),
+    [(CRATE, (0.15, 0.15, 0.3)), (FEELER, (0.2, 0.15, 0.1))],
+    ids=["tall", "flat"],
 )
 def test_a_box_stops_at_a_wall_that_stands_on_the_plane(
     made: Maker, inner: str, half: tuple[float, float, float]
