@@ -47,7 +47,7 @@ NOT_YET: dict[str, int] = {
     "sim.frame": 1,
     "sim.linearized.time_step": 2,
     "sim.record.recording": 7,
-    "sim.spatial.candidates": 1,
+    "sim.spatial.candidates": 2,
     "sim.spatial.controlled": 1,
     "sim.time_stepping.corners": 1,
     "sim.time_stepping.method": 16,

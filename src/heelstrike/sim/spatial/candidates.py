@@ -83,7 +83,7 @@ def locate_points(
         table.friction[contact] = model.friction_scale[contact] * ground.friction[face]
         bounces = model.restitution_scale[contact] * ground.restitution[face]
         table.restitution[contact] = min(bounces, 1.0)
-        if feet.foot.shape[0] > model.nc:
+        if table.wall[contact] >= 0:
             locate_wall(model, ground, tree, contact, wall, table, feet)
 
 
@@ -93,7 +93,7 @@ def locate_wall(
     wall: int, table: BlockTable, feet: SpatialFeet,
 ) -> None:  # fmt: skip
     """Find how far a contact point is from the wall beside it, infinitely if there is none."""
-    entry = model.nc + contact
+    entry = table.wall[contact]
     table.gap[entry] = math.inf
     if wall < 0:
         return

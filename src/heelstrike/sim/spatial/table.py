@@ -27,6 +27,8 @@ class BlockTable(Bundle):
     """What each entry is."""
     owner: Integers = array("entries", of=int)
     """Its contact point; its joint; or its velocity, of dry friction."""
+    wall: Integers = array("entries", of=int)
+    """Of a contact point the entry of its wall; −1 of all else, and where there are no walls."""
     side: Floats = array("entries")
     """Of a stop 1 for the lower end of the range, −1 for the upper."""
     last: Integers = array("entries", of=int)
@@ -73,11 +75,15 @@ def lay_out_table(robot: SpatialRobot, *, walls: bool) -> BlockTable:
     def column(place: int, dtype: type) -> Any:
         return np.array([entry[place] for entry in entries], dtype=dtype)
 
-    kind = column(0, np.int64)
+    kind, owner = column(0, np.int64), column(1, np.int64)
+    wall = np.full(len(entries), -1)
+    if walls:
+        wall[kind == POINT] = np.flatnonzero(kind == WALL)
     return BlockTable.allocate(
         entries=len(entries),
         kind=kind,
-        owner=column(1, np.int64),
+        owner=owner,
+        wall=wall,
         side=column(2, np.float64),
         last=column(3, np.int64),
         set=column(4, np.int64),
