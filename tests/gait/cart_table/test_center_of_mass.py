@@ -20,6 +20,14 @@ def test_it_repeats_a_step_further(planner: Planner) -> None:
     assert end - begin == pytest.approx([LENGTH, 0.0, 0.0], abs=1e-11)
 
 
+def test_quick_steps_repeat_as_well() -> None:
+    """One of 0.1 s leaves 70 % of its beginning to the next."""
+    times = np.linspace(0.0, 0.1, 21)
+    wanted = np.interp(times, [0.0, 0.02, 0.1], [-0.1, 0.0, 0.0])
+    begin, end = followed(Planner.PREVIEW, times, wanted, HEIGHT, GRAVITY)(times[[0, -1]]).T
+    assert end - begin == pytest.approx([0.1, 0.0, 0.0], abs=1e-10)
+
+
 @every
 def test_derivatives(planner: Planner) -> None:
     """Between samples, by central differences."""

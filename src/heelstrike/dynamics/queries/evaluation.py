@@ -128,12 +128,17 @@ def joint_vector(robot: Robot, name: str, value: ArrayLike) -> Floats:
         That names them, if it has another length.
     """
     entries = robot.actuator_names if name == "torque" else robot.joint_names
+    return vector_over(entries, robot.name, name, value)
+
+
+def vector_over(entries: tuple[str, ...], robot: str, name: str, value: ArrayLike) -> Floats:
+    """Return a vector of one number an entry, or raise a `RobotError` that names them."""
     if not are_numbers(value):
         raise RobotError(refusal(name, value, ("ArrayLike",)))
     vector = np.ascontiguousarray(value, dtype=np.float64)
     if vector.shape != (len(entries),):
         raise RobotError(
-            f"{name} of robot {robot.name!r} must have {len(entries)} entries "
+            f"{name} of robot {robot!r} must have {len(entries)} entries "
             f"({', '.join(entries)}), got shape {vector.shape}"
         )
     return vector

@@ -157,7 +157,7 @@ def _check_robot(robot: Robot) -> None:
     if not (flat and [len(leg) for leg in legs] == [3, 3] and robot.nv == 9 and robot.floating):
         raise GaitError(
             "a walk is planned for a trunk on two legs of three driven joints with flat feet, and "
-            f"no other joints; robot {robot.name!r} is another. it is for optimize_motion"
+            f"no other joints; robot {robot.name!r} is another. Use hs.optimize_motion for it."
         )
 
 

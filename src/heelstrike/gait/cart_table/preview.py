@@ -14,9 +14,8 @@ from heelstrike.robot.model import Floats
 ERROR_WEIGHT, JERK_WEIGHT = 1.0, 1e-6
 """Weights of the error of the zero moment point (1/m²) and of the jerk (s⁶/m²): those of the
 paper."""
-SETTLING = 40
-"""Steps after which a walk repeats to rounding: what the slowest pole of the closed
-loop, exp(−T √(g/h)), leaves a tenth after a step, or half after a quick one."""
+SETTLED = 1e-17
+"""What may be left of the beginning: the slowest pole of the closed loop is near exp(−T √(g/h))."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,19 +96,21 @@ class PreviewControl:
         transition, jerk = cart(self.period)
         output = np.array([1.0, 0.0, -self.height / self.gravity])
         looked = len(self.ahead) // count + 2
-        several = np.concatenate([wanted[:-1] + distance * k for k in range(SETTLING + looked)])
+        rate = np.sqrt(self.gravity / self.height)
+        steps = int(np.ceil(-np.log(SETTLED) / (rate * self.period * count))) + 1
+        several = np.concatenate([wanted[:-1] + distance * k for k in range(steps + looked)])
         state, total = np.array([wanted[0], 0.0, 0.0]), 0.0
         states, jerks = np.zeros((count + 1, 3)), np.zeros(count)
-        for k in range(SETTLING * count):
+        for k in range(steps * count):
             total += output @ state - several[k]
             seen = several[k + 1 : k + 1 + len(self.ahead)]
             u = -self.integral * total - self.state @ state - self.ahead @ seen
-            place = k - (SETTLING - 1) * count
+            place = k - (steps - 1) * count
             if place >= 0:
                 states[place], jerks[place] = state, u
             state = transition @ state + jerk * u
         states[count] = state
-        states[:, 0] -= (SETTLING - 1) * distance
+        states[:, 0] -= (steps - 1) * distance
         return states, jerks
 
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.arguments import are_numbers, refusal
 from heelstrike.compiler.mold import Mold
+from heelstrike.dynamics.queries.evaluation import vector_over
 from heelstrike.dynamics.spatial import equations, kinematics
 from heelstrike.dynamics.spatial.algebra import Vector
 from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
@@ -129,15 +130,7 @@ def velocity_vector(robot: SpatialRobot, name: str, value: ArrayLike) -> Floats:
         That names them, if it has another length.
     """
     entries = robot.actuator_names if name == "torque" else robot.velocity_names
-    if not are_numbers(value):
-        raise RobotError(refusal(name, value, ("ArrayLike",)))
-    vector = np.ascontiguousarray(value, dtype=np.float64)
-    if vector.shape != (len(entries),):
-        raise RobotError(
-            f"{name} of robot {robot.name!r} must have {len(entries)} entries "
-            f"({', '.join(entries)}), got shape {vector.shape}"
-        )
-    return vector
+    return vector_over(entries, robot.name, name, value)
 
 
 def space_vector(name: str, value: ArrayLike) -> Vector:
