@@ -1,5 +1,10 @@
 """The ground, the contact problem, its solvers and their certificates."""
 
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from heelstrike.contact.certificate import Certificate
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.ground_shape import GroundShape
@@ -23,10 +28,12 @@ from heelstrike.contact.queries.inverse_dynamics import (
     contact_inverse_dynamics,
 )
 from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
-from heelstrike.contact.spatial.certificate import SpatialCertificate
-from heelstrike.contact.spatial.ground import Box, SpatialGround
-from heelstrike.contact.spatial.modes import SpatialContactMode, SpatialSolver, SpatialStatus
-from heelstrike.contact.spatial.problem import SpatialContactSolution
+
+if TYPE_CHECKING:
+    from heelstrike.contact.spatial.certificate import SpatialCertificate
+    from heelstrike.contact.spatial.ground import Box, SpatialGround
+    from heelstrike.contact.spatial.modes import SpatialContactMode, SpatialSolver, SpatialStatus
+    from heelstrike.contact.spatial.problem import SpatialContactSolution
 
 __all__ = [
     "ActiveContacts",
@@ -58,3 +65,21 @@ __all__ = [
     "saltation_matrix",
     "solve_contact",
 ]
+
+_IN_SPACE = {
+    "Box": "ground",
+    "SpatialCertificate": "certificate",
+    "SpatialContactMode": "modes",
+    "SpatialContactSolution": "problem",
+    "SpatialGround": "ground",
+    "SpatialSolver": "modes",
+    "SpatialStatus": "modes",
+}
+"""Where names of contact in space live."""
+
+
+def __getattr__(name: str) -> Any:
+    # What is for space is loaded only by those who ask for it.
+    if name in _IN_SPACE:
+        return getattr(importlib.import_module(f"{__name__}.spatial.{_IN_SPACE[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
