@@ -14,7 +14,7 @@ from heelstrike.robot.model import Floats
 ERROR_WEIGHT, JERK_WEIGHT = 1.0, 1e-6
 """Weights of the error of the zero moment point (1/m²) and of the jerk (s⁶/m²): those of the
 paper."""
-SETTLED = 1e-17
+REMAINDER = 1e-17
 """What may be left of the beginning: the slowest pole of the closed loop is near exp(−T √(g/h))."""
 
 
@@ -97,7 +97,7 @@ class PreviewControl:
         output = np.array([1.0, 0.0, -self.height / self.gravity])
         looked = len(self.ahead) // count + 2
         rate = np.sqrt(self.gravity / self.height)
-        steps = int(np.ceil(-np.log(SETTLED) / (rate * self.period * count))) + 1
+        steps = int(np.ceil(-np.log(REMAINDER) / (rate * self.period * count))) + 1
         several = np.concatenate([wanted[:-1] + distance * k for k in range(steps + looked)])
         state, total = np.array([wanted[0], 0.0, 0.0]), 0.0
         states, jerks = np.zeros((count + 1, 3)), np.zeros(count)
