@@ -132,7 +132,8 @@ def test_speeds_are_those_of_the_page() -> None:
     others = [factor for factors in times.values() for factor in factors[1:]]
     assert promise("a step of 1 ms") == (
         f"{min(standing):.1f}–{max(standing):.1f} × faster standing on four points, "
-        f"{times['bravo7 walking'][0]:.1f} × walking; "
+        f"{times['bravo7 walking'][0]:.1f} × walking, {times['bravo7 falling'][0]:.1f} × falling, "
+        f"{times['bravo7 lying'][0]:.1f} × lying; "
         f"{min(others):.0f}–{max(others):.0f} × faster than Drake, Bullet and DART"
     )
 
@@ -144,7 +145,7 @@ def test_precision_is_that_of_the_page() -> None:
     assert sides["MuJoCo"][1].startswith("not reached")
     assert min(dart, drake) > bullet
     assert promise("1 s of walking to 1e-4 rad") == (
-        f"{ours:.0f} ms; Bullet takes {round(bullet, -3):.0f} × as long, DART and Drake more, "
+        f"{ours:.0f} ms; Bullet takes {round(bullet, -2):.0f} × as long, DART and Drake more, "
         "MuJoCo does not get there"
     )
 

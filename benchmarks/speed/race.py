@@ -37,8 +37,8 @@ def race(
 ) -> dict[str, Any]:
     """Time the steps of each engine.
 
-    Each runs for two times, in turn; a step costs the difference by the steps between. What it
-    takes to set a run of ours up is what is left of the shorter one.
+    Each runs for two times, in turn; a step costs the difference by the steps between. Where all
+    steps cost the same, the rest of the shorter run is what it takes to set a run of ours up.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def race(
     Returns
     -------
     dict
-        `<name>_us` by engine, `heelstrike_setup_us`; `<name>_check` and `<name>_invalid` say why it
-        counts, or not.
+        `<name>_us` by engine, `heelstrike_setup_us` where it can be told; `<name>_check` and
+        `<name>_invalid` say why it counts, or not.
     """
     row: dict[str, Any] = {}
     method = TimeStepping(step=STEP)
@@ -116,7 +116,8 @@ def race(
             span = best[name] - best.get(f"{name}, begin", 0.0)
             row[f"{name}_us"] = 1e6 * span / (count - first[name])
     ours = row["heelstrike_us"]
-    row["heelstrike_setup_us"] = 1e6 * best["heelstrike, begin"] - first["heelstrike"] * ours
+    if alike:
+        row["heelstrike_setup_us"] = 1e6 * best["heelstrike, begin"] - first["heelstrike"] * ours
     row["times_faster"] = {name: row[f"{name}_us"] / ours for name in engines if name in best}
     return row
 
