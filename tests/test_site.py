@@ -149,7 +149,10 @@ def test_every_cell_that_draws_has_its_picture(notebook: Path) -> None:
 
 @pytest.mark.parametrize(
     ("page", "text"),
-    [("robots", "Mass of the link."), ("simulation", "Name of the body, or index of the link.")],
+    [
+        ("robots", "Coordinates at which all link frames are parallel"),
+        ("simulation", "Name of the body, or index of the link."),
+    ],
     ids=["bundle", "dataclass"],
 )
 def test_the_reference_tells_what_fields_are(page: str, text: str) -> None:
