@@ -70,19 +70,27 @@ def engines_page(folder: Path, figure: str) -> str:
 
 _INTRODUCTION = """# Other engines
 
-The paper's Table 1 compares simulators by what their pages say. Here the same robot walks the same
-gait under the same law of control in each of their engines, and what each makes of it is held
-against an event-driven run at a tolerance of 1e-9. `heelstrike compare bravo7 --engines all` makes
-these tables; with `--scenes --page docs/engines.md` it writes this page. One engine is
-`--engines mujoco`, a try `--quick`; `--films` shows the walks that fall. How to add one:
-CONTRIBUTING.
+The paper's Table 1 compares simulators by their own descriptions. On this page the same robot walks
+the same gait under the same control law in each engine. The reference is an event-driven run at a
+tolerance of 1e-9. `heelstrike compare bravo7 --engines all` makes the tables; with `--scenes --page
+docs/engines.md` it writes this page. For one engine use `--engines mujoco`, for a trial `--quick`;
+`--films` shows the walks that fall. CONTRIBUTING says how to add an engine.
 
-Each engine has the robot link by link, and touches the ground by our contact points. It runs in a
-process of its own, is given torques, and tells its state and its contact forces. The law is the
-compiled one of heelstrike, called every 2 ms with the engine's state and forces, whatever the
-engine's step. Times are those of the engine's steps alone, with the calls from Python that a step
-takes, and ours with the law; they were taken beside other work, so that a factor of two means
-little. The tables may come from several runs: each says its steps, its law and its step size.
+Each engine gets the robot link by link, with our contact points. It runs in its own process, takes
+torques, and returns its state and contact forces. The law is heelstrike's compiled one, called
+every 2 ms with the engine's state and forces. Times are those of the engine's steps, with the calls
+from Python that a step needs; ours include the law. Other work ran at the same time, so a factor of
+two means little. The tables may come from several runs; each states its steps, law and step size.
+
+The columns of the walks:
+
+- *tracking*: error from the gait, root mean square;
+- *error*: distance of all coordinates from the reference over the walk, root mean square;
+- *touchdown*: largest difference of a touchdown's time, which adds up the errors of all steps;
+- *noise*: difference of the ground force from its mean over 10 ms in single support, in percent of
+  the weight;
+- *energy*: energy that no work explains, where all forces are means over steps;
+- *peak*: largest force on a foot over a step, in weights.
 """
 
 
@@ -130,9 +138,9 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
              "open source", "documented"],
             [*theirs, *absent],
         )
-        + "\nIn ours. Creep is how fast a cube slides on a slope that is 0.05 rad less steep than "
-        "its angle of friction, at defaults and a step of 1 ms. The last columns have the steps of "
-        "the engine, in ms, at which bravo7 takes all its steps under a law.\n\n"
+        + "\nOur columns follow. Creep is the speed of a cube on a slope 0.05 rad below its angle "
+        "of friction, at defaults and a step of 1 ms. The last columns have the step sizes, in ms, "
+        "at which bravo7 takes all its steps under a law.\n\n"
         + _table(headings, ours)
     )  # fmt: skip
 
@@ -172,22 +180,24 @@ def _best() -> str:
             str(found["tried"]),
             found["version"],
             found["date"],
-            f"`{found['command']}`",
         ]
         for name, found in best_settings().items()
     ]
+    commands = {
+        found["command"].replace(f"--engines {name} ", "--engines NAME ")
+        for name, found in best_settings().items()
+    }
     advice = [f"- {entry.title}: {entry.advice}." for entry in ENTRIES.values() if entry.advice]
     return (
-        "## Settings\n\nThe best settings are those of one search, the same for all engines: three "
-        "steps at 1 ms; from the defaults on each setting is tried in its turn, and kept if the "
-        "distance from the truth falls by 2 %. It is one pass, and finds what is good, not proven "
-        "to be the best. Distances in mm and mrad.\n\n"
+        "## Settings\n\nOne search finds the best settings of every engine: three steps at 1 ms; "
+        "each setting is varied in turn from its default, and kept if the error falls by 2 %. One "
+        "pass finds good settings, not proven optima. Errors are in mm and mrad. Each row is "
+        + " or ".join(f"`{command}`" for command in sorted(commands)) + ".\n\n"
         + _table(
-            ["engine", "best", "off, defaults", "off, best", "walks tried", "version", "date",
-             "command"],
+            ["engine", "best", "error, defaults", "error, best", "walks tried", "version", "date"],
             rows,
         )
-        + "\nWhat is tried follows the advice of the maintainers:\n\n" + "\n".join(advice) + "\n"
+        + "\nThe settings follow the advice of the maintainers:\n\n" + "\n".join(advice) + "\n"
     )  # fmt: skip
 
 
@@ -224,13 +234,8 @@ def _walks(law: str, found: Mapping[str, Any]) -> str:
     headings = ["engine", "settings", "walks", *(heading for heading, _ in columns.values())]
     said = "\nWhy they did not walk:\n\n" + "\n".join(reasons) + "\n" if reasons else ""
     return (
-        f"## {found['steps']} steps under {law}\n\nAt a step of {1e3 * shown:g} ms. *off* is the "
-        "root mean square distance of all coordinates from the truth over the walk; *lands* the "
-        "largest difference of a landing's time, in which errors of every step add up; *noise* "
-        "what the ground's force differs by from its mean over 10 ms in single support, in "
-        "percent of the weight; *energy* what came or went that no work explains, where all forces "
-        "are told as means over steps; *peak* the largest force on a foot over a step, in weights. "
-        f"Each row is `heelstrike compare {found['robot']} --controller {name} --engines NAME "
+        f"## {found['steps']} steps under {law}\n\nStep size {1e3 * shown:g} ms. Each row is "
+        f"`heelstrike compare {found['robot']} --controller {name} --engines NAME "
         f"--settings SETTINGS --sizes {shown:g} --steps {found['steps']}{often}`.\n\n"
         + _table(headings, rows) + said
     )  # fmt: skip
@@ -260,9 +265,9 @@ def _peaks(walks: Mapping[str, Any]) -> str:
     headings += [f"s, {1e3 * h:g} ms" for h in sizes]
     return (
         "## Foot force over step size\n\nThe largest force on a foot over a step, in weights, of "
-        f"the same walk under {law}, and the computing time of the walk in s. Where contact is "
-        "hard a landing is an impulse within one step, and its force grows as the step shrinks; "
-        "where it is soft the force stays, and is that of the spring.\n\n"
+        f"the same walk under {law}, and its computing time in s. With hard contact a touchdown is "
+        "an impulse within one step, so its force grows as the step shrinks. With soft contact the "
+        "force is that of the spring.\n\n"
         + _table(headings, rows)
     )  # fmt: skip
 
@@ -288,9 +293,9 @@ def _scenes(found: Mapping[str, Any]) -> str:
     )
     return (
         f"## Scenes with closed forms\n\nErrors at a step of {1e3 * found['step_s']:g} ms and "
-        f"{found['settings']}, in the units of:\n\n" + "\n".join(listed) + "\n\n"
+        f"{found['settings']}, in the units of these exact values:\n\n" + "\n".join(listed) + "\n\n"
         + _table(headings, rows)
-        + "\nA dash among the bouncing balls is an engine that takes no coefficient of "
+        + "\nA dash for a bouncing ball marks an engine without a coefficient of "
         "restitution."
         + ("\n\n" + "\n".join(why) if why else "")
         + "\n"
@@ -312,10 +317,10 @@ def _guards(found: Mapping[str, Any]) -> str:
             ]
         )  # fmt: skip
     return (
-        "## Guards\n\nThat an engine has our robot is told by two things: a flight of 0.1 s, "
-        "turning in all joints, whose difference from ours at steps of 1, 0.5 and 0.25 ms is "
-        "extrapolated to no step (at most 1e-6, in single precision 1e-3), and the forces on the "
-        "robot at rest (its weight to 1 %).\n\n"
+        "## Guards\n\nTwo checks confirm that an engine has the same robot. In a flight of 0.1 s, "
+        "with all joints turning, the difference from ours at steps of 1, 0.5 and 0.25 ms is "
+        "extrapolated to step zero (at most 1e-6, in single precision 1e-3). The forces on the "
+        "robot at rest must equal its weight to 1 %.\n\n"
         + _table(
             ["engine", "precision", "flight, 0.25 ms", "order", "extrapolated", "weight",
              "holds"],

@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from heelstrike.experiments.engine_comparison.figures import WalkFigures
 
 WALKING: Mapping[str, tuple[str, float]] = {
-    "tracking_rad": ("follows mrad", 1e3),
-    "position": ("off mm,mrad", 1e3),
-    "touchdown_s": ("lands ms", 1e3),
+    "tracking_rad": ("tracking mrad", 1e3),
+    "position": ("error mm,mrad", 1e3),
+    "touchdown_s": ("touchdown ms", 1e3),
     "impulse_Ns": ("impulse N s", 1.0),
     "zmp_m": ("ZMP mm", 1e3),
 }
 BY_ITSELF: Mapping[str, tuple[str, float]] = {
     "slip_m": ("slip mm", 1e3),
-    "penetration_m": ("deep mm", 1e3),
+    "penetration_m": ("depth mm", 1e3),
     "energy_J": ("energy J", 1.0),
     "noise": ("noise %", 1e2),
     "peak": ("peak", 1.0),
@@ -46,7 +46,7 @@ def walk_table(comparison: EngineComparison) -> Group:
         f"{1e3 * comparison.control_period_s:g} ms"
     )
     parts: list[Table | str] = [
-        _table(comparison, f"{title}: differences from the truth", WALKING),
+        _table(comparison, f"{title}: differences from the reference", WALKING),
         "",
         _table(comparison, "each by itself", BY_ITSELF),
     ]

@@ -152,18 +152,18 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
     lines = [
         "# Zoo of controllers",
         "",
-        "How large a disturbance each controller withstands on each robot: one gait a robot, one "
-        "set of gains a controller, found on one robot; on others they go with weight and height. "
-        "This page, its figure and its numbers are made by",
+        "The tables give the largest disturbance that each controller withstands on each robot. "
+        "Each robot has one gait. Each controller has one set of gains, tuned on one robot and "
+        "scaled with weight and height. This command makes the page, its figure and its numbers:",
         "",
         "```sh",
         command,
         "```",
         "",
-        f"with heelstrike {settings.version}, {settings.method}, seed {settings.seed}, controllers "
-        "called every millisecond, or every step if that is longer.",
+        f"It ran with heelstrike {settings.version}, {settings.method}, seed {settings.seed}, and "
+        "controllers called every millisecond, or every step if that is longer.",
         "",
-        f"![What controllers withstand on robots: one panel a disturbance]({link})",
+        f"![Largest disturbance by robot and controller, one panel for each disturbance]({link})",
         "",
     ]
     for animal, rows in results.robots():
@@ -182,7 +182,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
             for word, names, reason in notes(rows)
         ]
         lines += [*said, ""] if said else []
-    lines += ["## What the numbers say", "", *_explained(there), "", *_measure(results, share)]
+    lines += ["## The numbers", "", *_explained(there), "", *_measure(results, share)]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -194,20 +194,19 @@ def _explained(there: Sequence[Disturbance]) -> list[str]:
 def _measure(results: Results, share: float) -> list[str]:
     settings = results.settings
     return [
-        "A size counts if the walk recovers from it, strictly "
-        "(`heelstrike.analysis.recovery`), and from every "
-        f"smaller one tried: {settings.strides} strides upwards to the first failure, which is "
-        f"halved {settings.halvings} times. ≥ says that nothing tried was too much, < that the "
-        "smallest size tried was. Pushes begin at "
+        "A size counts if the walk strictly recovers (`heelstrike.analysis.recovery`) from it and "
+        f"from every smaller size tried: up to {settings.strides} sizes upwards to the first "
+        f"failure, then {settings.halvings} bisections. ≥ means that the largest size tried was "
+        "withstood, < that the smallest was not. Pushes begin at "
         f"{_counted(settings.trials, 'phase', 'phases')} of a step, and rough ground has "
-        f"{_counted(settings.trials, 'shape', 'shapes')}, drawn from the seed, the same for all: "
-        "the table has what is withstood in every one of them. That says with "
-        f"{SURE:.0%} confidence that as much is withstood at {share:.0%} of all phases, or on as "
-        "many shapes, at least. Everything else has one trial.",
+        f"{_counted(settings.trials, 'shape', 'shapes')}, drawn from the seed, the same for all. "
+        "The tables give the size withstood in all of them; with "
+        f"{SURE:.0%} confidence it is withstood at {share:.0%} of all phases or shapes at least. "
+        "Everything else has one trial.",
         "",
-        "A controller that does not walk undisturbed is not disturbed: it falls, leans by more "
-        "than 0.6 rad, or strays from its speed. One that stands meets no other ground, "
-        "and what it pays is nothing.",
+        "A controller is not disturbed if its undisturbed walk falls, leans by more than 0.6 rad, "
+        "or strays from its speed. Standing controllers meet pushes and masses only, and have no "
+        "price.",
     ]
 
 
