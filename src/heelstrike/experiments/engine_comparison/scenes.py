@@ -274,10 +274,11 @@ DESCENT = math.radians(8.0)
 
 
 def _wheel() -> tuple[Robot, float, float, float]:
-    """Return a rimless wheel on its slope, and of its walk: share m / (m + I), part of ω² that a
-    landing keeps, and ω² just after a landing on the walk that repeats.
+    """Return a rimless wheel on its slope, and three numbers of its walk.
 
-    The library's wheel has 1e-6 kg m² about its hub, which is in the formulas here.
+    They are the share m / (m + I), the part of ω² that a landing keeps, and ω² just after a landing
+    on the walk that repeats. The library's wheel has 1e-6 kg m² about its hub, which is in the
+    formulas here.
     """
     half = math.pi / SPOKES
     robot = leaning(load_robot("rimless_wheel"), DESCENT)
