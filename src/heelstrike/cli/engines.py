@@ -55,6 +55,12 @@ class InEngines:
             "--scenes", help="Ask engines for scenes with closed forms, too, and for guards."
         ),
     ] = False
+    pushes: Annotated[
+        bool,
+        typer.Option(
+            "--largest-push", help="Search for the largest push that is stood in engines, too."
+        ),
+    ] = False
     page: Annotated[
         Path | None,
         typer.Option(
@@ -72,7 +78,7 @@ class InEngines:
         """Refuse options of engines where none is asked for."""
         usual = InEngines()
         given = [
-            f"--{name}"
+            f"--{'largest-push' if name == 'pushes' else name}"
             for name in vars(usual)
             if name != "engines" and getattr(self, name) != getattr(usual, name)
         ]
@@ -131,6 +137,8 @@ def compare_in_engines(
     tell(f"in {out}: engines-{law}.json, engines.png")
     if asked.scenes:
         _scenes(case, names, out, as_json=as_json)
+    if asked.pushes:
+        _pushes(case, start, asked, out, as_json=as_json)
     if asked.page is not None:
         _write_page(comparison, out, asked.page)
 
@@ -163,6 +171,34 @@ def _scenes(case: Case, names: list[str], out: Path, *, as_json: bool) -> None:
     if not as_json:
         output().print(table)
     tell(f"in {out}: scenes.json")
+
+
+def _pushes(case: Case, start: Beginning, asked: InEngines, out: Path, *, as_json: bool) -> None:
+    """Search for the largest push that is stood in engines."""
+    from heelstrike.experiments.engine_comparison import compare_pushes
+    from heelstrike.whole_file import write_whole
+
+    assert asked.engines is not None
+    assert start.controller is not None
+    assert case.followed is not None
+    names = asked.engines.split(",")
+    with stage("pushing in engines") as show:
+        table = compare_pushes(
+            case.robot,
+            start.controller,
+            case.followed,
+            engines="all" if names == ["all"] else names,
+            settings=asked.settings.split(","),
+            friction=_friction(case),
+            folder=out / "engines",
+            progress=show.doing,
+        )
+    name = f"pushes-{type(start.controller).__name__}.json"
+    text = json.dumps(table.to_dict(), indent=2, ensure_ascii=False)
+    wrote(write_whole(out / name, text + "\n"))
+    if not as_json:
+        output().print(table)
+    tell(f"in {out}: {name}")
 
 
 def _write_page(comparison: EngineComparison, out: Path, page: Path) -> None:

@@ -37,12 +37,29 @@ SCENES = {
 }  # fmt: skip
 
 
+PUSHES = {
+    "robot": "bravo7",
+    "rows": [
+        {"engine": "mujoco", "title": "MuJoCo", "settings": "defaults", "direction": direction,
+         "largest": largest, "reason": reason}
+        for direction, largest, reason in (
+            ("forward", {"recovered": 90.0, "failed": 93.75, "trials": 8, "unit": "N s"}, ""),
+            ("backward", {"recovered": 240.0, "failed": None, "trials": 9, "unit": "N s"}, ""),
+        )
+    ] + [
+        {"engine": "ode", "title": "ODE", "settings": "defaults", "direction": "forward",
+         "largest": None, "reason": "ODE is not installed"},
+    ],
+}  # fmt: skip
+
+
 @pytest.fixture
 def page(tmp_path: Path) -> str:
     told = json.dumps(made_up().to_dict())
     for law in ("ComputedTorque", "FootstepFeedback"):
         (tmp_path / f"engines-{law}.json").write_text(told)
     (tmp_path / "scenes.json").write_text(json.dumps(SCENES))
+    (tmp_path / "pushes-FootstepFeedback.json").write_text(json.dumps(PUSHES))
     return engines_page(tmp_path, "images/engines.png")
 
 
@@ -90,3 +107,9 @@ def test_scenes_and_guards_are_in_their_tables(page: str) -> None:
 def test_without_files_there_is_no_page(tmp_path: Path) -> None:
     with pytest.raises(SimulationError, match="heelstrike compare --engines all --scenes"):
         engines_page(tmp_path, "figure.png")
+
+
+def test_it_says_which_push_each_stands(page: str) -> None:
+    section = "## Largest push under FootstepFeedback"
+    assert row(page, section, "MuJoCo")[1:] == ["defaults", "90 (94)", "≥ 240"]
+    assert row(page, section, "ODE")[1:] == ["defaults", "ODE is not installed", "–"]

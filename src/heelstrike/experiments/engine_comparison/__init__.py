@@ -3,6 +3,7 @@
 from heelstrike.experiments.engine_comparison.comparison import EngineComparison, compare_engines
 from heelstrike.experiments.engine_comparison.figures import WalkFigures
 from heelstrike.experiments.engine_comparison.guards import Guards, guard
+from heelstrike.experiments.engine_comparison.pushes import PushRow, PushTable, compare_pushes
 from heelstrike.experiments.engine_comparison.rows import EngineRow
 from heelstrike.experiments.engine_comparison.scene_table import (
     SceneRow,
@@ -15,10 +16,13 @@ __all__ = [
     "EngineComparison",
     "EngineRow",
     "Guards",
+    "PushRow",
+    "PushTable",
     "SceneRow",
     "SceneTable",
     "WalkFigures",
     "compare_engines",
+    "compare_pushes",
     "compare_scenes",
     "guard",
     "walk_in",

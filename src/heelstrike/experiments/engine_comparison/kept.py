@@ -61,20 +61,43 @@ class KeptRows:
         make : callable
             Returns the figures, or raises why there are none.
         """
-        file = None
-        if self._folder is not None:
-            own = json.dumps([row.engine, row.step_s, dict(told)], sort_keys=True)
-            digest = hashlib.sha256(self._begun + own.encode()).hexdigest()[:16]
-            file = self._folder / f"{row.engine}-{row.settings}-{row.step_s:g}-{digest}.json"
-            if file.exists():
-                return replace(row, figures=_figures(json.loads(file.read_text())))
+        name = f"{row.engine}-{row.settings}-{row.step_s:g}"
+        own = [row.engine, row.step_s, dict(told)]
         try:
-            found = replace(row, figures=make())
+            found = self.entries(name, own, lambda: asdict(make()))
         except (InvalidRunError, SimulationError) as error:
             return replace(row, reason=str(error))  # the next comparison asks again
-        if file is not None and found.figures is not None:
-            write_whole(file, json.dumps(plain(asdict(found.figures)), indent=1))
-        return found
+        return replace(row, figures=_figures(found))
+
+    def entries(self, name: str, told: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """Return numbers and texts, from the folder if they are there.
+
+        Parameters
+        ----------
+        name : str
+            Of their file, to which a digest is added.
+        told : object
+            What else they follow from, as JSON has it.
+        make : callable
+            Makes them, or raises why there are none.
+
+        Returns
+        -------
+        dict
+            Numbers that are not finite are None.
+        """
+        if self._folder is None:
+            made: dict[str, Any] = plain(make())
+            return made
+        own = json.dumps(told, sort_keys=True).encode()
+        digest = hashlib.sha256(self._begun + own).hexdigest()[:16]
+        file = self._folder / f"{name}-{digest}.json"
+        if file.exists():
+            kept: dict[str, Any] = json.loads(file.read_text())
+            return kept
+        made = plain(make())
+        write_whole(file, json.dumps(made, indent=1))
+        return made
 
 
 def _figures(entries: Mapping[str, Any]) -> WalkFigures:

@@ -13,6 +13,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
+from heelstrike.experiments.engine_comparison.pushes import DIRECTIONS
 from heelstrike.experiments.engine_comparison.settings import best_settings
 from heelstrike.experiments.engine_comparison.tables import BY_ITSELF, WALKING, short
 
@@ -62,6 +63,7 @@ def engines_page(folder: Path, figure: str) -> str:
         *(_walks(law, found) for law, found in walks.items()),
         f"![Error over computing time]({figure})\n",
         _peaks(walks),
+        *(_pushes(file) for file in sorted(folder.glob("pushes-*.json"))),
         _scenes(scenes),
         _guards(scenes["guards"]),
     ]
@@ -270,6 +272,36 @@ def _peaks(walks: Mapping[str, Any]) -> str:
         "force is that of the spring.\n\n"
         + _table(headings, rows)
     )  # fmt: skip
+
+
+def _pushes(file: Path) -> str:
+    law = file.stem.removeprefix("pushes-")
+    found = json.loads(file.read_text(encoding="utf-8"))
+    told: dict[tuple[str, str], dict[str, str]] = {}
+    for row in found["rows"]:
+        cells = told.setdefault((row["title"], row["settings"]), {})
+        cells[row["direction"]] = row["reason"] or _largest(row["largest"])
+    return (
+        f"## Largest push under {law}\n\nOn the trunk, in the middle of the third step, for 0.1 s, "
+        "in N s: the largest that is stood, as are all smaller ones that were tried, and in "
+        "brackets the smallest that is not. Each engine takes over when the push ends, with the "
+        "state of our event-driven run and a law that remembers what came before. Steps of 1 ms. "
+        f"`heelstrike compare {found['robot']} --controller {law} --engines NAME "
+        "--largest-push`.\n\n"
+        + _table(
+            ["engine", "settings", *DIRECTIONS],
+            [
+                [title, which, *(cells.get(each, "–") for each in DIRECTIONS)]
+                for (title, which), cells in told.items()
+            ],
+        )
+    )
+
+
+def _largest(found: Mapping[str, Any]) -> str:
+    if found["failed"] is None:
+        return f"≥ {short(found['recovered'])}"
+    return f"{short(found['recovered'])} ({short(found['failed'])})"
 
 
 def _scenes(found: Mapping[str, Any]) -> str:

@@ -98,10 +98,13 @@ def scenes() -> tuple[Scene, ...]:
     return (
         *(_on_slope(name, angle) for name, angle in _SLOPES),
         _launched(),
+        _on_a_corner(),
+        _rocking(),
         *(_bouncing(restitution) for restitution in (0.9, 0.5, 0.0)),
         _rolling(),
         *(_slipping(share) for share in (0.5, 1.0)),
         _rimless(),
+        _rimless_beside_its_cycle(),
     )
 
 
@@ -132,6 +135,81 @@ def _launched() -> Scene:
         name, Scenario(name, robot, start, 1.0, friction=FRICTION),
         lambda q, _: float(q[0]), speed**2 / (2.0 * FRICTION * GRAVITY), "m",
         "it stops after v² / (2 μ g)",
+    )  # fmt: skip
+
+
+def _turning(body: Robot, arm: float) -> tuple[float, float]:
+    """Return m g R / I and m R² / I of a body that turns about a point at a distance R (m)."""
+    mass, inertia = float(body.model.mass.sum()), float(body.model.inertia.sum())
+    about = inertia + mass * arm**2
+    return mass * GRAVITY * arm / about, mass * arm**2 / about
+
+
+def _on_a_corner() -> Scene:
+    """A cube that is thrown turning, and lands on a corner right below its centre."""
+    robot, arm = cube(), math.sqrt(2.0) * HALF
+    pull, share = _turning(robot, arm)
+    speed, rate, falling = 1.0, 2.0, 0.1
+    q = robot.model.reference + np.array(
+        [0.0, arm - HALF + 0.5 * GRAVITY * falling**2, 0.25 * math.pi - rate * falling]
+    )
+    # Angular momentum about the corner is kept: I ω + m R v = (I + m R²) ω⁺.
+    after = (1.0 - share) * rate + share * speed / arm
+    name = "cube thrown onto a corner"
+    return Scene(
+        name,
+        Scenario(
+            name, robot, State(q, np.array([speed, 0.0, rate])), falling + 0.08, friction=FRICTION
+        ),
+        lambda q, v: _upright_rate(float(q[2]) - 0.25 * math.pi, float(v[2]), pull),
+        after, "rad/s",
+        "rate after the landing, by the angular momentum about the corner, which turns on: "
+        "½ I ω² + m g R cos φ is constant",
+    )  # fmt: skip
+
+
+def _upright_rate(lean: float, rate: float, pull: float) -> float:
+    """Rate at which an inverted pendulum, now at a lean (rad), was or will be upright."""
+    return math.sqrt(max(0.0, rate**2 - 2.0 * pull * (1.0 - math.cos(lean))))
+
+
+ROCKING_HEIGHT = 0.5
+"""Half the height of the block, in m; half its width is `HALF`."""
+TILT = 0.12
+"""Angle (rad) at which the block is let go, of 0.197 at which it would stand on its corner."""
+
+
+def _rocking() -> Scene:
+    """A slender block that rocks from corner to corner."""
+    corner, arm = math.atan(HALF / ROCKING_HEIGHT), math.hypot(HALF, ROCKING_HEIGHT)
+    builder = RobotBuilder("block", gravity=GRAVITY)
+    body = builder.floating_base(
+        "body", (0.0, ROCKING_HEIGHT), mass=2.0, inertia=2.0 * arm**2 / 3.0
+    )
+    for x in (-HALF, HALF):
+        builder.contact(body, at=(x, -ROCKING_HEIGHT))
+    robot = builder.build()
+    pull, share = _turning(robot, arm)
+    kept = 1.0 - 2.0 * share * math.sin(corner) ** 2
+    landing = math.sqrt(2.0 * pull * (math.cos(corner - TILT) - math.cos(corner)))
+    # It leans forward on its front corner, which stays where it is.
+    q = np.array(
+        [
+            HALF - arm * math.sin(corner - TILT), arm * math.cos(corner - TILT), TILT
+        ]
+    )  # fmt: skip
+    name = "block that rocks"
+    return Scene(
+        name, Scenario(name, robot, State(q, np.zeros(3)), 0.75, friction=FRICTION),
+        lambda q, v: math.sqrt(
+            max(
+                0.0,
+                float(v[2]) ** 2
+                + 2.0 * pull * (math.cos(corner - abs(float(q[2]))) - math.cos(corner)),
+            )
+        ),
+        kept * landing, "rad/s",
+        "rate after it has landed once: (1 − 2 m R² sin² α / I) of that before (Housner 1963)",
     )  # fmt: skip
 
 
@@ -195,19 +273,26 @@ SPOKES = 8
 DESCENT = math.radians(8.0)
 
 
-def _rimless() -> Scene:
-    """A rimless wheel on its walk that repeats, whose speed has a closed form.
+def _wheel() -> tuple[Robot, float, float, float]:
+    """Return a rimless wheel on its slope, and three numbers of its walk.
 
-    The library's wheel has 1e-6 kg m² about its hub, which is in the formula here.
+    They are the share m / (m + I), the part of ω² that a landing keeps, and ω² just after a landing
+    on the walk that repeats. The library's wheel has 1e-6 kg m² about its hub, which is in the
+    formulas here.
     """
     half = math.pi / SPOKES
     robot = leaning(load_robot("rimless_wheel"), DESCENT)
     mass, inertia = float(robot.model.mass.sum()), float(robot.model.inertia.sum())
     kept = ((mass * math.cos(2.0 * half) + inertia) / (mass + inertia)) ** 2
-    gained = 4.0 * mass * GRAVITY * math.sin(half) * math.sin(DESCENT) / (mass + inertia)
-    rate = math.sqrt(gained * kept / (1.0 - kept))
-    lean = -half
-    start = robot.state(
+    share = mass / (mass + inertia)
+    gained = 4.0 * share * GRAVITY * math.sin(half) * math.sin(DESCENT)
+    return robot, share, kept, gained * kept / (1.0 - kept)
+
+
+def _landed(robot: Robot, rate: float) -> State:
+    """Return a wheel that has just landed on a spoke, turning at a rate (rad/s)."""
+    lean = -math.pi / SPOKES
+    return robot.state(
         {"root_x": math.sin(lean), "root_z": math.cos(lean), "root_pitch": 0.0},
         {
             "root_x": math.cos(lean) * rate,
@@ -215,14 +300,42 @@ def _rimless() -> Scene:
             "root_pitch": rate,
         },
     )
-    name = "rimless wheel on its limit cycle"
-    duration = 4.0
 
+
+def _rimless() -> Scene:
+    """A rimless wheel on its walk that repeats, whose speed has a closed form."""
+    robot, share, kept, squared = _wheel()
+    name = "rimless wheel on its limit cycle"
     return Scene(
-        name, Scenario(name, robot, start, duration, friction=FRICTION),
-        partial(_landing_rate, half=half, share=mass / (mass + inertia)),
-        rate / math.sqrt(kept), "rad/s",
+        name, Scenario(name, robot, _landed(robot, math.sqrt(squared)), 4.0, friction=FRICTION),
+        partial(_landing_rate, half=math.pi / SPOKES, share=share),
+        math.sqrt(squared / kept), "rad/s",
         "rate just before a landing: ω² = 4 g sin α sin γ / (r (1 − cos² 2α)) (Coleman 1998)",
+    )  # fmt: skip
+
+
+FASTER = 1.2
+"""How many times faster than on its limit cycle a wheel is pushed off."""
+LANDINGS, BACK = 2, 1.2
+"""How often that wheel lands, and in how many seconds."""
+
+
+def _rimless_beside_its_cycle() -> Scene:
+    """A rimless wheel that comes back to its limit cycle: its Floquet multiplier."""
+    robot, share, kept, squared = _wheel()
+    half = math.pi / SPOKES
+    start = _landed(robot, FASTER * math.sqrt(squared))
+
+    def multiplier(q: Floats, v: Floats) -> float:
+        before = _landing_rate(q, v, half, share) ** 2
+        beside = (kept * before - squared) / (squared * (FASTER**2 - 1.0))
+        return math.copysign(abs(beside) ** (1.0 / (LANDINGS + 1)), beside)
+
+    name = "rimless wheel beside its limit cycle"
+    return Scene(
+        name, Scenario(name, robot, start, BACK, friction=FRICTION), multiplier, kept, "",
+        "its Floquet multiplier, cos² 2α of ω² (McGeer 1990), from what is left of a disturbance "
+        f"after {LANDINGS} landings",
     )  # fmt: skip
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import field
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,16 +21,30 @@ from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.gait.file import entries_of
 from heelstrike.reader_process import ReaderProcess
-from heelstrike.robot import Robot
+from heelstrike.robot import Robot, State
 from heelstrike.robot.files.robot_json import robot_entries
 from heelstrike.sim import Controller, EventDriven, Run, simulate
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.law import Law
 from heelstrike.sim.method import Method
+from heelstrike.sim.push import Push
 from heelstrike.sim.whole_run import whole
 
 TRUTH = EventDriven(rtol=1e-9, atol=1e-11, output_period=1e-3)
 """What the engines are held against."""
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where a walk in an engine begins, if not at the beginning of the gait."""
+
+    controller: Any
+    """As it is asked from Python, with the memory that it has by then."""
+    state: State
+    """The robot's."""
+    time: float
+    until: float
+    """time, until: When it begins, and when it ends (s)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +75,12 @@ class Walk:
 
     def entries(self) -> dict[str, Any]:
         """Return all that a walk follows from but the engine, as JSON has it."""
-        law = self.controller
-        asked: Any = AskedLaw(self.robot, law, compiled=True) if isinstance(law, Law) else law
-        begins = asked.snapshot().tolist() if hasattr(asked, "snapshot") else repr(type(law))
+        asked = self.asked()
+        name = type(self.controller).__name__
+        begins = asked.snapshot().tolist() if hasattr(asked, "snapshot") else name
         return {
             "robot": robot_entries(self.robot),
-            "controller": [str(getattr(asked, "name", type(law).__name__)), begins],
+            "controller": [str(getattr(asked, "name", name)), begins],
             "gait": entries_of(self.gait),
             "steps": self.steps,
             "control_period": self.control_period,
@@ -81,13 +95,17 @@ class Walk:
             "walk", self.robot, self.gait.initial_state, duration, friction=self.friction
         )
 
-    def ours(self, method: Method) -> Run:
+    def ours(self, method: Method, *, pushes: Sequence[Push] = (), until: float = 0.0) -> Run:
         """Walk by a method of ours.
 
         Parameters
         ----------
         method : Method
             Which.
+        pushes : sequence of Push
+            What disturbs it.
+        until : float
+            When it ends (s), if not after all steps.
         """
         scenario = self.scenario
         return whole(
@@ -95,12 +113,19 @@ class Walk:
                 self.robot,
                 self.controller,
                 state=scenario.state,
-                duration=scenario.duration,
+                duration=until or scenario.duration,
                 method=method,
                 ground=Ground(friction=self.friction),
                 control_period=self.control_period,
+                pushes=pushes,
             )
         )
+
+    def asked(self) -> Any:
+        """Return the controller as it is asked from Python, with a memory of its own."""
+        if isinstance(self.controller, Law):
+            return AskedLaw(self.robot, self.controller, compiled=True)
+        return deepcopy(self.controller)
 
     def by(self, method: Method, truth: Run) -> WalkFigures:
         """Walk by a method of ours, and measure it.
@@ -147,8 +172,9 @@ class Walk:
         return found
 
     def run_in(
-        self, entry: Entry, step: float, given: Mapping[str, Any], versions: Mapping[str, str]
-    ) -> tuple[Run, bool]:
+        self, entry: Entry, step: float, given: Mapping[str, Any], versions: Mapping[str, str],
+        start: Start | None = None,
+    ) -> tuple[Run, bool]:  # fmt: skip
         """Walk in an engine; return the run, and whether all forces are told, as means over steps.
 
         Parameters
@@ -161,6 +187,8 @@ class Walk:
             Its settings.
         versions : mapping
             What :func:`~heelstrike.experiments.engines.peers` says of the engines.
+        start : Start, optional
+            Where to begin; by default at the beginning of the gait.
 
         Raises
         ------
@@ -172,12 +200,16 @@ class Walk:
             raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
         if entry.package not in self.processes:
             self.processes[entry.package] = engine_process(entry.package)
+        scenario, begins = self.scenario, 0.0
+        if start is not None:
+            scenario, begins = replace(scenario, state=start.state), start.time
+            scenario = replace(scenario, duration=start.until - begins)
+        controller = self.asked() if start is None else start.controller
         peer = served(
-            entry.package, self.scenario, step, patience=self.patience,
+            entry.package, scenario, step, patience=self.patience,
             process=self.processes[entry.package], **given,
         )  # fmt: skip
-        controller = self.controller
-        if not isinstance(controller, Law):
-            controller = deepcopy(controller)
-        run = walk_in(peer, controller, control_period=self.control_period, name=entry.title)
+        run = walk_in(
+            peer, controller, control_period=self.control_period, name=entry.title, begins=begins
+        )
         return run, bool(peer.facts["tells_friction"] and peer.facts["tells_means"])

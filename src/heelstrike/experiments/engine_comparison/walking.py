@@ -39,7 +39,12 @@ LEAST_FORCE = 1e-9
 
 
 def walk_in(
-    peer: Peer, controller: Law | Controller | None, *, control_period: float, name: str = "engine"
+    peer: Peer,
+    controller: Law | Controller | None,
+    *,
+    control_period: float,
+    name: str = "engine",
+    begins: float = 0.0,
 ) -> Run:
     """Simulate the scenario of a peer under a controller, and record it as a run.
 
@@ -53,6 +58,8 @@ def walk_in(
         Seconds between two calls; a longer step of the engine goes before.
     name : str
         What the method of the run is called.
+    begins : float
+        Time (s) at which it begins, for the controller and in the run.
 
     Returns
     -------
@@ -73,9 +80,7 @@ def walk_in(
         raise SimulationError(
             f"the control period of {control_period:g} s is no whole number of steps of {step:g} s"
         )
-    asked: Any = controller
-    if isinstance(controller, Law):
-        asked = AskedLaw(robot, controller, compiled=True)
+    asked = asked_of(robot, controller)
     model = robot.model
     nq, both = robot.nq, robot.nq + robot.nv
     rows = np.zeros((peer.steps + 1, both + 2 * robot.nc))
@@ -88,7 +93,7 @@ def walk_in(
         q, v = rows[done, :nq], rows[done, nq:both]
         if asked is not None:
             force = rows[done, both:].reshape(-1, 2)
-            wanted = asked.torque(done * step, State(q, v), _seen(robot, q, force))
+            wanted = asked.torque(begins + done * step, State(q, v), seen(robot, q, force))
             torque = np.clip(wanted, model.torque_lower, model.torque_upper)
             saturations += int(np.sum(torque != wanted))
             peer.hold(torque)
@@ -111,7 +116,7 @@ def walk_in(
     torques[done] = torques[max(done - 1, 0)]
     return recorded_run(
         peer, name,
-        time=np.asarray(step * np.arange(done + 1), dtype=np.float64),
+        time=np.asarray(begins + step * np.arange(done + 1), dtype=np.float64),
         position=rows[: done + 1, :nq], velocity=rows[: done + 1, nq:both],
         torque=torques[: done + 1], force=force.reshape(done + 1, -1, 2),
         status=status, saturations=saturations,
@@ -196,8 +201,33 @@ def recorded_run(
     )
 
 
-def _seen(robot: Robot, q: Floats, force: Floats) -> Contacts:
-    """Return the contact points as a controller sees them."""
+def asked_of(robot: Robot, controller: Law | Controller | None) -> Any:
+    """Return a controller as it is asked from Python.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot that it moves.
+    controller : law, controller or None
+        The controller.
+    """
+    if isinstance(controller, Law):
+        return AskedLaw(robot, controller, compiled=True)
+    return controller
+
+
+def seen(robot: Robot, q: Floats, force: Floats) -> Contacts:
+    """Return the contact points as a controller sees them.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q : (nq,) float
+        Where it is.
+    force : (nc, 2) float
+        On its contact points, upwards and forward (N).
+    """
     points = contact_positions(robot, q).reshape(-1, 2).copy()
     points[:, 1] -= robot.model.contact_radius
     normal = np.zeros_like(points)
