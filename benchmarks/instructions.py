@@ -72,7 +72,7 @@ class Counted:
     first, count : int
         Steps to let pass, and steps to count.
     method : Method
-        Way through time.
+        Simulation method.
     controller : controller, optional
         Instead of the scenario's own law.
     beside : str

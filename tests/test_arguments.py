@@ -194,7 +194,7 @@ def simulation() -> hs.Simulation:
         (lambda: hs.dynamics.mass_matrix("bravo7", [0.0]), "robot must be a Robot"),  # type: ignore[arg-type]
         (lambda: hs.dynamics.mass_matrix(walking.bravo7(), "a"), "q must be numbers, got 'a'"),
         (lambda: hs.controller(3), "a controller must be a function, got 3"),  # type: ignore[call-overload]
-        (lambda: hs.controller(endings="fell")(print), "endings are several texts, got 'fell'"),
+        (lambda: hs.controller(endings="fell")(print), "endings must be several texts, got 'fell'"),
         (
             lambda: hs.simulate_batch(
                 walking.bravo7(), parameters={"k": ["a"]}, state=[STATE], duration=0.01

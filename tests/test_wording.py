@@ -5,7 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from heelstrike.wording import LONGEST_GUESS, meant, some_of
+from heelstrike.wording import LONGEST_GUESS, counted, meant, some_of
+
+
+def test_one_thing_is_not_many() -> None:
+    assert counted(1, "contact problem", "contact problems") == "1 contact problem"
+    assert counted(0, "step", "steps") == "0 steps"
+    assert counted(2, "step", "steps") == "2 steps"
 
 
 def test_some_of_many_things_are_named_and_the_others_counted() -> None:

@@ -1,4 +1,4 @@
-"""Random scenes for every way through time, and a judge of its own for what comes out.
+"""Random scenes for every simulation method, and a judge of its own for what comes out.
 
 ``python benchmarks/scenes --help`` runs a campaign; ``baseline.md`` beside this file is its last
 committed table, ``causes.md`` says what lies behind it. The modules, from the bottom up:
@@ -16,7 +16,7 @@ committed table, ``causes.md`` says what lies behind it. The modules, from the b
 ``twins``
     The same scene mirrored, with its links in another order, or begun again.
 ``methods``, ``running``
-    The ways through time by name; one scene under one of them.
+    The simulation methods by name; one scene under one of them.
 ``checks``
     Questions that are put to many scenes one by one: energy, twins, orders, bridges.
 ``campaign``, ``table``

@@ -1,4 +1,4 @@
-"""The ways through time that a campaign can take, by name."""
+"""The simulation methods that a campaign can take, by name."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ class Shove:
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything about a scene but the way through time.
+    """Everything about a scene but the simulation method.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Words that messages share: some of many things, and which name a misspelt one may mean."""
+"""Words that messages share: things counted, some of many, and what a misspelt name may mean."""
 
 from __future__ import annotations
 
@@ -7,6 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 LONGEST_GUESS = 40
 """Letters of a word that are looked at: a longer one is no misspelt name."""
+
+
+def counted(number: int, one: str, many: str) -> str:
+    """Count things in words: ``1 phase``, ``2 phases``."""
+    return f"{number} {one if number == 1 else many}"
 
 
 def some_of(items: Sequence[str], most: int, between: str = ", ") -> str:

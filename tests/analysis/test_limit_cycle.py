@@ -347,7 +347,9 @@ def test_footstep_feedback_repeats_with_its_samples_and_its_memory() -> None:
         largest = float(np.abs(cycle.multipliers[0]))
         assert settled.largest**2 == pytest.approx(largest, rel=5e-3)
         assert settled.along == pytest.approx(1.0, abs=1e-6)
-    with pytest.raises(hs.LimitCycleError, match=r"too large for the samples.*disturbance=1e-05"):
+    with pytest.raises(
+        hs.LimitCycleError, match=r"is too large: the controller is called.*disturbance=1e-05"
+    ):
         hs.floquet_multipliers(
             robot, cycle.snapshot, law, method=method, settling=0, returns=1, disturbance=2e-3
         )
@@ -376,7 +378,7 @@ def test_arguments_of_controllers_that_begin_afresh() -> None:
         with pytest.raises(hs.SimulationError, match="landing is of controllers that begin afresh"):
             hs.find_limit_cycle(robot, state, landing=points, afresh=False)  # type: ignore[arg-type]
     kept = hs.Simulation(robot, state=state).snapshot()
-    with pytest.raises(hs.SimulationError, match="afresh=False it goes on from a Snapshot"):
+    with pytest.raises(hs.SimulationError, match="from a Snapshot use afresh=False"):
         hs.find_limit_cycle(robot, kept)
 
 

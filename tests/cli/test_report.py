@@ -106,7 +106,7 @@ def test_one_that_fell_has_its_exit_status(tmp_path: Path) -> None:
     ("options", "told"),
     [
         (("run.nc", "bravo7"), "not both"),
-        (("bravo7", "rabbit"), "one robot is walked"),
+        (("bravo7", "rabbit"), "give one robot"),
         (("run.nc", "--steps", "3"), "--steps"),
         (("run.nc", "--controller", "JointPD"), "--controller"),
         (("bravo7", "--controller", "JointsPD"), "Did you mean 'JointPD'"),

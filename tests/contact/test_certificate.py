@@ -53,15 +53,15 @@ def verdict(
     G, b, x = (np.array(values, dtype=float) for values in (delassus, free, impulse))
     mu = np.array(friction, dtype=float)
     work = contact_workspace(mu.size)
-    work.yardstick.slope[: mu.size] = slope
+    work.scaling.slope[: mu.size] = slope
     work.settings.floor = floor
     work.settings.skewed = skewed
     problem = contact_problem(mu.size, count=mu.size, delassus=G, free=b, friction=mu)
     problem.set[:] = CONE if sets is None else sets
     answer = ContactAnswer.allocate(nc=mu.size, impulse=x)
-    worst = certify(problem, work.settings, work.yardstick, answer)
-    error = velocity_error(worst, mu, work.yardstick)
-    return Verdict(*answer.residual, worst, work.yardstick.rounding, answer.velocity, error)
+    worst = certify(problem, work.settings, work.scaling, answer)
+    error = velocity_error(worst, mu, work.scaling)
+    return Verdict(*answer.residual, worst, work.scaling.rounding, answer.velocity, error)
 
 
 class TestWrongAnswers:

@@ -106,7 +106,7 @@ def test_wrong_modes_do_no_harm(guess: int) -> None:
 
 def test_counters() -> None:
     caller = Caller()
-    caller.work.settings.amendments = 0
+    caller.work.settings.corrections = 0
     G, b = np.eye(2), [-1.0, 0.2]
     caller.solve(G, b, [0.5])
     caller.solve(G, b, [0.5])
@@ -124,7 +124,7 @@ def test_counters() -> None:
 
 def test_no_solver_left_means_failure_not_zero_force_in_silence() -> None:
     caller = Caller()
-    caller.work.settings.amendments = 0
+    caller.work.settings.corrections = 0
     assert caller.solve(np.eye(2), [-1.0, 0.2], [0.5], order=()) != SOLVED
     assert caller.work.tally.failures == 1
     assert caller.work.tally.shortcuts == 0
@@ -134,7 +134,7 @@ def test_no_solver_left_means_failure_not_zero_force_in_silence() -> None:
 def test_modes_that_nearly_fit_need_no_solver() -> None:
     """The second point of a foot meets the ground, where the first slips the other way.
 
-    What answers for it is the guess, amended; the impulse is the one that a solver finds.
+    What answers for it is the guess, corrected; the impulse is the one that a solver finds.
     """
     x, z = np.array([-0.6, -0.4, 0.4, 0.6]), np.full(4, -0.9)
     root = np.zeros((8, 4))
@@ -143,15 +143,15 @@ def test_modes_that_nearly_fit_need_no_solver() -> None:
     G = root @ root.T
     b = -G @ [0.0, 0.0, 0.0, 0.0, 1.0, 0.1, 0.7, 0.07] + np.tile([0.0, -0.3], 4)
     b[[0, 2]] += 1.0
-    amended, asked = Caller(), Caller()
-    asked.work.settings.amendments = 0
-    for caller in (amended, asked):
+    corrected, asked = Caller(), Caller()
+    asked.work.settings.corrections = 0
+    for caller in (corrected, asked):
         caller.mode[:4] = [OPEN, OPEN, OPEN, SLIP_FORWARD]
         assert caller.solve(G, b, [0.1] * 4) == SOLVED
-    assert (amended.work.tally.solver, asked.work.tally.solver) == (WARM_START, LEMKE)
-    assert amended.mode[:4].tolist() == [OPEN, OPEN, SLIP_BACKWARD, SLIP_BACKWARD]
-    assert 1 <= amended.work.tally.iterations <= 4
-    np.testing.assert_allclose(amended.impulse, asked.impulse, rtol=1e-14, atol=1e-14)
+    assert (corrected.work.tally.solver, asked.work.tally.solver) == (WARM_START, LEMKE)
+    assert corrected.mode[:4].tolist() == [OPEN, OPEN, SLIP_BACKWARD, SLIP_BACKWARD]
+    assert 1 <= corrected.work.tally.iterations <= 4
+    np.testing.assert_allclose(corrected.impulse, asked.impulse, rtol=1e-14, atol=1e-14)
 
 
 def test_what_rounding_allows_no_better_is_accepted() -> None:
@@ -313,7 +313,7 @@ def test_many_points_of_two_soles_that_stick(points: int, close: bool) -> None:
         points, count=points, delassus=delassus, free=free, friction=np.full(points, 0.8)
     )
     answer = ContactAnswer.allocate(nc=points, mode=np.full(points, STICK))
-    assert repeat(problem, work.settings, work.sticking, work.yardstick, answer)
+    assert repeat(problem, work.settings, work.sticking, work.scaling, answer)
     # Impulses with the same effect differ by what J takes to zero.
     shortest = np.linalg.pinv(jacobian.T, rcond=1e-12) @ (jacobian.T @ pressed)
     np.testing.assert_allclose(answer.impulse, shortest, atol=1e-9)

@@ -65,7 +65,7 @@ def with_line(seed: int) -> ContactProblem:
 
 def solved(problem: ContactProblem, solver: int) -> Floats:
     work, answer = contact_workspace(4), ContactAnswer.allocate(nc=4)
-    work.settings.amendments = 0
+    work.settings.corrections = 0
     assert solve_contact_kernel(np.array([solver]), problem, work, answer) == SOLVED
     return answer.impulse
 
@@ -115,9 +115,9 @@ def test_a_line_that_gives_way_is_not_certified(push: float) -> None:
     problem.delassus[0, 0] = 1.0
     problem.free[0] = -1.0
     answer.impulse[0] = 1.0 + push
-    assert certify(problem, work.settings, work.yardstick, answer) == pytest.approx(0.5)
+    assert certify(problem, work.settings, work.scaling, answer) == pytest.approx(0.5)
     answer.impulse[0] = 1.0
-    assert certify(problem, work.settings, work.yardstick, answer) < 1e-14
+    assert certify(problem, work.settings, work.scaling, answer) < 1e-14
 
 
 @pytest.mark.parametrize("solver", [LEMKE, FISCHER_BURMEISTER, GAUSS_SEIDEL])
@@ -165,7 +165,7 @@ def test_intervals_against_enumeration(solver: int, slack: int) -> None:
         given = (problem.delassus.copy(), problem.free.copy(), problem.friction.copy())
         found = solutions(*given, problem.bound)
         work, answer = contact_workspace(4), ContactAnswer.allocate(nc=4)
-        work.settings.amendments = 0
+        work.settings.corrections = 0
         if solve_contact_kernel(np.array([solver]), problem, work, answer) != SOLVED:
             continue
         rows = [0, 1, 3, 4, 5, 7]
@@ -189,6 +189,6 @@ def test_certificate_of_an_interval(impulse: float, residual: float) -> None:
     problem.bound[0] = 3.0
     problem.delassus[1, 1], problem.free[1] = 0.5, 4.0
     answer.impulse[:] = [9.0, impulse]
-    certify(problem, work.settings, work.yardstick, answer)
+    certify(problem, work.settings, work.scaling, answer)
     # In units of 8 N s, which would stop it if there were as many.
     assert answer.residual.max() == pytest.approx(residual * (0.5 if residual < 0.5 else 1.5))

@@ -332,5 +332,5 @@ def test_what_motors_do_not_reach_is_refused(gait: hs.Gait) -> None:
         pitch_of(loose)
     with pytest.raises(GaitError, match="leave 2 of them free"):
         hs.optimize_gait(loose, step_length=0.2)
-    with pytest.raises(GaitError, match="bind joints with motors to each other"):
+    with pytest.raises(GaitError, match="connect driven joints with each other"):
         hs.optimize_gait(biped("both"), step_length=0.2)

@@ -44,8 +44,8 @@ class Again:
 
 def seen_again(run: hs.Run, steps: int, **sensors: Any) -> tuple[np.ndarray, np.ndarray]:
     """What sensors and estimator would have made of a run: joint positions, joint velocities."""
-    shell = hs.Sensed(hs.Estimated(Again(run)), **sensors)
-    shell.robot = run.robot
+    wrapper = hs.Sensed(hs.Estimated(Again(run)), **sensors)
+    wrapper.robot = run.robot
     measured, estimated = [], []
     for k in range(steps):
         force = run.contact_force[k - 1] if k else np.zeros_like(run.contact_force[0])
@@ -53,8 +53,8 @@ def seen_again(run: hs.Run, steps: int, **sensors: Any) -> tuple[np.ndarray, np.
             position=run.contact_point[k], normal=run.contact_normal[k], gap=run.gap[k], force=force
         )
         state = hs.State(run.position[k], run.velocity[k])
-        shell.torque(float(run.time[k]), state, contacts)
-        log = shell._asked.numbers.log  # type: ignore[union-attr]
+        wrapper.torque(float(run.time[k]), state, contacts)
+        log = wrapper._asked.numbers.log  # type: ignore[union-attr]
         told = {name: values.copy() for name, _, values in log.views()}
         measured.append(told["measured_position"][3:])
         estimated.append(told["estimated_velocity"][3:])
@@ -102,8 +102,8 @@ def test_a_push_that_the_model_does_not_know_is_followed() -> None:
     robot = walking.bravo7()
     start = walking.gait().initial_state
     push = hs.Push("trunk", force=(100.0, 0.0), start=0.02, duration=0.02)
-    shell = hs.Estimated(hs.ComputedTorque(robot, walking.gait()))
-    run = hs.simulate(robot, shell, state=start, duration=0.25, pushes=push)
+    wrapper = hs.Estimated(hs.ComputedTorque(robot, walking.gait()))
+    run = hs.simulate(robot, wrapper, state=start, duration=0.25, pushes=push)
     assert run.completed, run.message
     error = np.abs(run.log["estimated_velocity"].values - run.velocity).max(axis=1)
     assert error[40] > 0.01

@@ -169,5 +169,5 @@ def test_motors_that_do_not_reach_what_falls_are_refused() -> None:
     build = hs.RobotBuilder("apart")
     for name, torque in (("free", None), ("driven", 100.0)):
         build.hinge(name, None, mass=1.0, inertia=0.1, center_of_mass=(0.0, 0.5), torque=torque)
-    with pytest.raises(ControllerError, match="do not reach what falls"):
+    with pytest.raises(ControllerError, match="do not control the fall"):
         hs.StandingLQR(build.build())

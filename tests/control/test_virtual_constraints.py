@@ -226,7 +226,7 @@ def test_a_robot_on_other_feet_is_refused() -> None:
         trunk = build.hinge(name, trunk, at=(0.0, -0.2), mass=1.0, inertia=0.1, torque=10.0)
     build.contact(trunk, (0.0, -0.2))
     robot = build.build()
-    with pytest.raises(hs.ControllerError, match="built otherwise than 'one_legged'"):
+    with pytest.raises(hs.ControllerError, match="structure differs from that of 'one_legged'"):
         hs.simulate(
             robot, hs.VirtualConstraints(gait()), state=robot.reference_state(), duration=0.01
         )

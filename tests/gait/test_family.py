@@ -70,7 +70,7 @@ def test_what_was_interrupted_goes_on(bravo7: hs.Robot, tmp_path: Path) -> None:
     assert first is not None
     assert kept is not None
     np.testing.assert_array_equal(first.pieces, kept.pieces)
-    with pytest.raises(GaitError, match="holds a family over other axes"):
+    with pytest.raises(GaitError, match="holds a family with other axes"):
         hs.gait_family(bravo7, speed=[0.40, 0.46], **ASKED, file=file)
 
 

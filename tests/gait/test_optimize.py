@@ -381,7 +381,7 @@ def test_a_step_beyond_the_legs_tells_their_reach(bravo7: hs.Robot) -> None:
         ({"friction": True}, "friction must be a number, got True"),
         ({"clearance": -0.01}, "clearance must be"),
         ({"clearance_profile": "triangle"}, "'parabola', 'smooth'"),
-        ({"zmp_margin": 0.1}, "leaves nothing of the sole"),
+        ({"zmp_margin": 0.1}, "the sole reaches only"),
         ({"force_margin": 1e4}, "more than the robot's weight"),
         ({"joint_speed_limit": 0.0}, "joint_speed_limit must be"),
         ({"intervals": 3}, "intervals must be between"),

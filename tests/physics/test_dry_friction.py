@@ -1,4 +1,4 @@
-"""Dry friction of joints: Coulomb's law with a known normal force, under every way through time.
+"""Dry friction of joints: Coulomb's law with a known normal force, under every simulation method.
 
 Event-driven figures hold to 1e-8, the relative tolerance of the integration, unless a test says
 otherwise; time stepping converges to them at first order; on compliant ground the friction is

@@ -66,5 +66,5 @@ def test_numbers_that_are_refused(options: dict[str, float]) -> None:
 
 
 def test_a_reference_that_is_refused() -> None:
-    with pytest.raises(hs.ControllerError, match="row of finite numbers"):
+    with pytest.raises(hs.ControllerError, match="array of finite numbers"):
         servo().follow([0.0, np.nan])

@@ -68,7 +68,7 @@ def test_what_an_impact_makes_is_told_to_the_joule(method: Any) -> None:
         assert run.completed
         assert (gain > 0.0) == bool(told(run)) == (made > 1e-9)
         assert gain == pytest.approx(max(made, 0.0), abs=1e-12)
-        assert ("energy made by impacts" in str(summarize(run))) == (gain > 0.0)
+        assert ("energy created by impacts" in str(summarize(run))) == (gain > 0.0)
         assert any("bounded_restitution" in line for line in judge(run).advice) == (gain > 0.0)
         if gain > 0.0:
             gains.append(gain)

@@ -314,7 +314,7 @@ PLASTIC = hs.TimeStepping(scheme=Scheme.GAP_LINEARISED)
         ({"ground": [hs.Ground(), hs.Ground(restitution=0.5)], "method": PLASTIC}, "restitution"),
         ({"robot": []}, "robot is empty"),
         ({"robot": ["bravo7"]}, "robot must be"),
-        ({"method": "fast"}, "way through time"),
+        ({"method": "fast"}, "simulation method"),
     ],
 )
 def test_arguments_are_checked_before_anything_runs(options: dict[str, Any], words: str) -> None:

@@ -254,7 +254,7 @@ def test_a_batch_begins_with_brakes_on() -> None:
     with pytest.raises(SimulationError, match=r"braked must be .*, got 3\.0"):
         hs.simulate(robots[0], state=robots[0].state(), duration=0.05, braked=3.0)  # type: ignore[arg-type]
     snapshot = hs.simulate(robots[0], state=robots[0].state(), duration=0.01).final
-    with pytest.raises(SimulationError, match=r"simulate\(state=snapshot\) goes on"):
+    with pytest.raises(SimulationError, match=r"use simulate\(state=snapshot\)"):
         hs.simulate_batch(robots[0], state=snapshot, duration=0.05)  # type: ignore[arg-type]
 
 
@@ -384,7 +384,7 @@ def test_brakes_are_named_where_there_are_none(tmp_path: Path) -> None:
         build.brake("arm")
     with pytest.raises(RobotError, match="no joint 'leg' to brake"):
         build.brake("leg")
-    with pytest.raises(RobotError, match="brake of joint 'arm' must hold something, got 0"):
+    with pytest.raises(RobotError, match="brake of joint 'arm' must be positive, got 0"):
         arm().brake("arm", limit=0)
 
 
@@ -403,7 +403,7 @@ def test_a_brake_goes_through_files(tmp_path: Path) -> None:
     (tmp_path / "slips.xml").write_text(
         (tmp_path / "slips.xml").read_text().replace('data="1 12.5"', 'data="1 -2"')
     )
-    with pytest.raises(RobotError, match=r"brake 'swing' in <custom> must hold something.*-2"):
+    with pytest.raises(RobotError, match=r"brake 'swing' in <custom> needs a positive limit.*-2"):
         hs.load_robot(tmp_path / "slips.xml")
     held = contents_of(slips)
     assert stored_robot(held).model.brake_limit == [12.5]

@@ -1,4 +1,4 @@
-"""Pushes: what a force over a window of time does, under every way through time."""
+"""Pushes: what a force over a window of time does, under every simulation method."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def run(controller: object, **options: object) -> hs.Run:
         ({"record_every": 0}, "record_every"),
         ({"control_period": -1e-3}, "control_period must be a positive number"),
         ({"control_period": 1.5e-3}, "whole number of steps"),
-        ({"method": "fast"}, "way through time"),
+        ({"method": "fast"}, "simulation method"),
         ({"ground": 0.5}, "Ground"),
         ({"state": hs.State(np.zeros(8), np.zeros(9))}, "9 entries"),
         ({"state": hs.State(np.zeros(9), np.full(9, np.nan))}, "root_x"),

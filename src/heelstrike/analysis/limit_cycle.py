@@ -128,7 +128,7 @@ def find_limit_cycle(
     ground : Ground
         Flat or sloping ground; ``Ground()`` by default.
     method : Method
-        Way through time, ``EventDriven(rtol=1e-12, atol=1e-13)`` by default, or any other of a
+        Simulation method, ``EventDriven(rtol=1e-12, atol=1e-13)`` by default, or any other of a
         controller that goes on. Passive walkers whose swing foot scuffs need
         ``swing_feet_pass=True``.
     control_period : float, optional
@@ -265,14 +265,14 @@ def _check(robot: Robot, ground: Ground, state: Any, method: Any) -> None:
     """Refuse what has no limit cycles from touchdown to touchdown."""
     if not isinstance(state, State):
         raise SimulationError(
-            "a controller that begins afresh at every touchdown begins in a State; with "
-            "afresh=False it goes on from a Snapshot"
+            "a controller that restarts at every touchdown needs a State to start from; "
+            "to continue from a Snapshot use afresh=False"
         )
     if not isinstance(method, EventDriven):
         raise SimulationError(
-            f"limit cycles from touchdown to touchdown need the event-driven method, got "
-            f"{type(method).__name__}: no other finds touchdowns sharply enough. afresh=False "
-            "finds those of a controller that goes on from step to step, by any method"
+            "limit cycles from touchdown to touchdown need EventDriven, got "
+            f"{type(method).__name__}: other methods do not locate touchdowns exactly "
+            "enough. With afresh=False every method works"
         )
     check_steps(robot, ground)
 

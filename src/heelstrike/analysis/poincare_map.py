@@ -223,8 +223,8 @@ class PoincareMap:
             self.relabelled = lambda state, contact: turned(robot, state, contact)
         else:
             raise SimulationError(
-                f"robot {robot.name!r} has no mirror image: say which contact points complete a "
-                "step (landing) and, if legs change their parts, how (symmetry)"
+                f"robot {robot.name!r} has no mirror image: give the contact points that "
+                "complete a step (landing) and, if the legs swap roles, how (symmetry)"
             )
 
     def begin(self, state: State) -> Floats:
@@ -313,11 +313,11 @@ def check_steps(robot: Robot, ground: Ground) -> None:
         If the ground is not one line, or the robot not free to move along it.
     """
     if len(ground.model().friction) > 1:
-        raise SimulationError("steps repeat on flat or sloping ground only, the same at every step")
+        raise SimulationError("a step repeats only on flat or evenly sloping ground")
     if not np.array_equal(robot.model.axis[:2], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]):
         raise SimulationError(
-            f"steps repeat of a robot that is free to move along the ground; the first two "
-            f"coordinates of {robot.name!r} are not its position x, z"
+            "a step repeats only for a robot that is free to move along the ground; the "
+            f"first two coordinates of {robot.name!r} are not its position x, z"
         )
 
 

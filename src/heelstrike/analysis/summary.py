@@ -248,16 +248,16 @@ LINES = {
     "friction use": "{s.friction_use_max:.3} of the cone",
     "slip": "{s.slip_max_m:.2} m",
     "penetration": "{s.penetration_max_m:.2} m",
-    "contact problems": "{s.solver}; complementarity {s.complementarity_max:.2}",
-    "energy made by impacts": "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
+    "contact problems": "{s.solver}; complementarity residual {s.complementarity_max:.2}",
+    "energy created by impacts": "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
     "cost of transport": "{s.cost_of_transport:.3} "
-    "({s.cost_of_transport_positive:.3} positive work)",
+    "({s.cost_of_transport_positive:.3} by positive work alone)",
     "torques at their limit": "{s.saturations}",
     "computing time": "{s.wall_s:.3} s ({s.real_time_factor:.3} × real time), "
     "compilation {s.compile_s:.3} s",
 }
 OF_A_GAIT = ("gait", "joint tracking error")
-OF_A_GAIN = "energy made by impacts"
+OF_A_GAIN = "energy created by impacts"
 
 
 def lines(s: Summary) -> list[tuple[str, str]]:

@@ -27,32 +27,36 @@ def check(
         float | None, typer.Option(help="Rows a second, where there is no column of times.")
     ] = None,
     unit: Annotated[
-        str, typer.Option(help="Of columns that name none: rad or deg.", show_default="rad")
+        str, typer.Option(help="Unit of columns that name none: rad or deg.", show_default="rad")
     ] = "",
     friction: Friction = 0.75,
     stiffness: Annotated[
         float | None,
-        typer.Option(help="Of the servos, in N m/rad.", show_default="suits the robot's size"),
+        typer.Option(
+            help="Stiffness of the servos, in N m/rad.", show_default="suits the robot's size"
+        ),
     ] = None,
     damping: Annotated[
         float | None,
-        typer.Option(help="Of the servos, in N m s/rad.", show_default="suits the robot's size"),
+        typer.Option(
+            help="Damping of the servos, in N m s/rad.", show_default="suits the robot's size"
+        ),
     ] = None,
     trials: Annotated[
         int, typer.Option(min=0, help="Walks with tolerances of mass, ground and delay.")
     ] = 64,
-    seed: Annotated[int, typer.Option(min=0, help="Of those.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of these walks.")] = 0,
     how: Reading,
     page: Annotated[
         Path | None, typer.Option(dir_okay=False, help="Also write the walk of it as a page.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Check a trajectory of joints: what stands against it, and whether the robot walks it.
+    """Check a trajectory of joints before it reaches hardware, and walk it.
 
-    The foot that stands lies flat: trunk and phases follow. Then inverse dynamics against motors,
-    soles and friction, a walk on hard contact by servos, and walks with tolerances. The exit status
-    is 0 if nothing stands against it, 1 if something does.
+    The stance foot is assumed flat, which gives trunk and phases. The checks are inverse dynamics
+    against motors, soles and friction, a walk on hard contact by servos, and walks with
+    tolerances. The exit status is 0 if all pass, otherwise 1.
     """
     with stage("loading"):
         from heelstrike.experiments.checking import check_motion

@@ -1,4 +1,4 @@
-"""``heelstrike compare``: the same walk under several ways through time."""
+"""``heelstrike compare``: the same walk under several simulation methods."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def compare(
     step: Step = 1e-4,
     restitution: Annotated[
         float,
-        typer.Option(help="Restitution of the ground; methods that know none are left out."),
+        typer.Option(help="Restitution of the ground; methods without restitution are left out."),
     ] = 0.0,
     others: InEngines,
     how: Reading,
@@ -70,7 +70,7 @@ def compare(
     ] = Path("compare"),
     as_json: AsJson = False,
 ) -> None:
-    """Walk the same steps by several methods, or in several engines; tell how far they differ."""
+    """Walk the same steps by several methods or in several engines, and report the differences."""
     import heelstrike as hs
     from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
     from heelstrike.experiments.walk import beginning

@@ -29,16 +29,16 @@ class InEngines:
         str | None,
         typer.Option(
             metavar="all|NAME,...",
-            help="Walk in other engines instead, by their names with commas between.",
+            help="Walk in other engines instead: their names, separated by commas.",
         ),
     ] = None
     settings: Annotated[
-        str, typer.Option(help="Settings of the engines: defaults, best, or both with a comma.")
+        str, typer.Option(help="Settings of the engines: defaults, best, or defaults,best.")
     ] = "defaults,best"
     sizes: Annotated[
         str | None,
         typer.Option(
-            help="Steps of the engines in s, with commas between.",
+            help="Step sizes of the engines in s, separated by commas.",
             show_default="2e-3,1e-3,5e-4,2e-4",
         ),
     ] = None
@@ -51,9 +51,7 @@ class InEngines:
     ] = False
     scenes: Annotated[
         bool,
-        typer.Option(
-            "--scenes", help="Ask engines for scenes with closed forms, too, and for guards."
-        ),
+        typer.Option("--scenes", help="Also run scenes with closed forms and check the robots."),
     ] = False
     pushes: Annotated[
         bool,
@@ -63,15 +61,13 @@ class InEngines:
     ] = False
     page: Annotated[
         Path | None,
-        typer.Option(
-            dir_okay=False, help="Write a page of what engines made of walks and scenes in --out."
-        ),
+        typer.Option(dir_okay=False, help="Write a page of the walks and scenes in --out."),
     ] = None
     films: Annotated[
         bool, typer.Option("--films", help="Write films of the walks in engines that fall.")
     ] = False
     quick: Annotated[
-        bool, typer.Option("--quick", help="In engines: four steps at 1 ms, for a try.")
+        bool, typer.Option("--quick", help="For engines: only four steps at 1 ms.")
     ] = False
 
     def refuse_without_engines(self) -> None:
@@ -225,7 +221,9 @@ def _check(case: Case) -> None:
             "--restitution and --push out"
         )
     if case.followed is None:
-        raise SimulationError("engines are compared by a walk under a gait, which this one is not")
+        raise SimulationError(
+            "engines are compared by a walk that follows a gait; this controller follows none"
+        )
 
 
 def _friction(case: Case) -> float:

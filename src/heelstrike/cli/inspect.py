@@ -46,10 +46,10 @@ def inspect(
     how: Reading,
     as_json: AsJson = False,
 ) -> None:
-    """Look at a robot: tree, masses, limits, contact points, and what looks wrong.
+    """Describe a robot: tree, masses, limits, contact points, and likely mistakes.
 
-    In space it tells what there is, and not what looks wrong. Ground and pushes are those of the
-    picture. Ends with exit code 1 if something looks wrong.
+    For a robot in space it does not look for mistakes. Ground and pushes appear in the picture
+    only. The exit status is 1 if a mistake is likely.
     """
     from heelstrike.robot.inspection import inspect_robot
 
@@ -57,12 +57,14 @@ def inspect(
     pushes = pushes_called(push)
     if picture is None and (surface is not None or pushes):
         raise typer.BadParameter(
-            "ground and pushes are drawn: say into which file", param_hint="--out"
+            "ground and pushes appear in the picture only: give its file", param_hint="--out"
         )
     if dimension == SPACE:
         if surface is not None or pushes:
             raise typer.BadParameter(
-                "ground and pushes are drawn in the plane only", param_hint="--dimension"
+                "ground and pushes are drawn for planar robots only: leave them out, or "
+                "use --dimension 2",
+                param_hint="--dimension",
             )
         look_in_space(robot, picture, how, as_json=as_json)
         return

@@ -30,21 +30,19 @@ class Recording:
         float | None,
         typer.Option(help="Walking speed in m/s.", show_default="that of the hip"),
     ] = None
-    rate: Annotated[
-        float | None, typer.Option(help="Rows a second, where the file tells none.")
-    ] = None
+    rate: Annotated[float | None, typer.Option(help="Rows a second, if the file has none.")] = None
     unit: Annotated[
-        str, typer.Option(help="Of joints that name none: rad or deg.", show_default="rad")
+        str, typer.Option(help="Unit of joints that name none: rad or deg.", show_default="rad")
     ] = ""
     marker: Annotated[
         list[str] | None,
         typer.Option(
             metavar="LANDMARK=NAME",
-            help="Which marker is which, as right_hip=R.GTRO; repeat the option for more.",
+            help="Marker of a landmark, as in right_hip=R.GTRO; repeat the option for more.",
         ),
     ] = None
     up_axis: Annotated[
-        str | None, typer.Option(help="Axis that is up: y, z.", show_default="as usual")
+        str | None, typer.Option(help="Axis that points up: y, z.", show_default="as usual")
     ] = None
     forward_axis: Annotated[
         str | None,
@@ -81,7 +79,7 @@ def mimic(
     robot: Annotated[
         str | None,
         typer.Option(
-            help="Who is to walk: a built-in robot, or an MJCF, URDF or SDF file.",
+            help="Robot that walks: built-in, or an MJCF, URDF or SDF file.",
             show_default="the person",
         ),
     ] = None,
@@ -92,7 +90,9 @@ def mimic(
         float, typer.Option(help="Rows a second of the table of the motion.")
     ] = 1000.0,
     how: Reading,
-    out: Annotated[Path, typer.Option(file_okay=False, help="For the results.")] = Path("mimic"),
+    out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the results.")] = Path(
+        "mimic"
+    ),
     as_json: AsJson = False,
 ) -> None:
     """Find the gait nearest to a recorded person that is exact on hard contact, and walk it.

@@ -24,7 +24,7 @@ def built_in(incomplete: str) -> list[str]:
 
 
 class Method(StrEnum):
-    """Ways through time, as every command calls them, the usual one first."""
+    """Simulation methods, as every command calls them, the usual one first."""
 
     TIME_STEPPING = "time-stepping"
     EVENT_DRIVEN = "event-driven"
@@ -38,8 +38,8 @@ class Method(StrEnum):
 
 
 METHODS = tuple(each.value for each in Method)
-METHOD = "Way through time: one of three, a law of compliant ground, or a scheme of time stepping."
-SEVERAL = "Way through time; repeat the option to see several side by side."
+METHOD = "Simulation method: one of three, a law of compliant ground, or a scheme of time stepping."
+SEVERAL = "Simulation method; repeat the option to see several side by side."
 USUAL_METHOD = f"{Method.TIME_STEPPING}; {Method.EVENT_DRIVEN} without motors"
 
 
@@ -75,8 +75,8 @@ Pushed = Annotated[
 ]
 LAW = "LAW|MODULE:NAME|FILE.py:NAME"
 OWN_LAW = (
-    "Law that moves the joints, by its name; or one of yours, a class or function of "
-    "(robot, gait), whose code is then run."
+    "Control law by its name, or one of yours: a class or function of (robot, gait). Its code "
+    "is run."
 )
 Steps = Annotated[int, typer.Option(min=1, help="Steps to walk.")]
 Step = Annotated[float, typer.Option(help="Time step in s of the methods that have one.")]
@@ -90,7 +90,11 @@ class Reading:
     """How a robot's file is read."""
 
     floating: Annotated[
-        bool, typer.Option("--floating", help="Let a trunk float in the plane that the file holds.")
+        bool,
+        typer.Option(
+            "--floating",
+            help="Let the trunk float in the plane, although the file fixes it.",
+        ),
     ] = False
     projected: Annotated[
         bool, typer.Option("--projected", help="Lock the joints that leave the x–z plane.")
@@ -98,7 +102,8 @@ class Reading:
     forward: Annotated[
         Way | None,
         typer.Option(
-            help="Where the robot looks in its file.", show_default="the plane it moves in"
+            help="Axis along which the robot looks in its file.",
+            show_default="the plane it moves in",
         ),
     ] = None
     pose: Annotated[
@@ -110,15 +115,15 @@ class Reading:
         ),
     ] = None
     mirror: Annotated[
-        bool, typer.Option("--mirror", help="Make left and right equal, which nearly are.")
+        bool, typer.Option("--mirror", help="Make left and right equal where they differ slightly.")
     ] = False
     package_path: Annotated[
         list[Path] | None,
         typer.Option(
             exists=True,
             file_okay=False,
-            help="Folder of ROS packages or Gazebo models, for files that the robot names; repeat "
-            "the option for more.",
+            help="Folder of ROS packages or Gazebo models whose files the robot names; repeat the "
+            "option for more.",
             show_default="around the file",
         ),
     ] = None
@@ -126,16 +131,16 @@ class Reading:
         bool,
         typer.Option(
             "--xacro",
-            help="Expand the macros of the robot's file first, which runs what it says: for files "
-            "of people whom you trust.",
+            help="Expand the macros of the robot's file first. This runs code from the file: use "
+            "it only for files that you trust.",
         ),
     ] = False
     xacro_arg: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME:=VALUE",
-            help="Value of an argument of a xacro file; with it --xacro need not be said. Repeat "
-            "the option for more.",
+            help="Value of an argument of a xacro file; implies --xacro. Repeat the option for "
+            "more.",
         ),
     ] = None
 

@@ -54,7 +54,7 @@ def report(
         list[str],
         typer.Argument(
             metavar="ROBOT|RUN.nc...",
-            help="A robot that is walked for it, by its name or file; or the files of runs.",
+            help="A robot to walk, by its name or file; or files of runs.",
         ),
     ],
     out: Annotated[Path, typer.Option(dir_okay=False, help="Page to write.")] = Path("report.html"),
@@ -83,15 +83,13 @@ def report(
     check_page(out)
     files = [each for each in what if each.endswith(".nc")]
     if files and len(files) < len(what):
-        raise typer.BadParameter(
-            "files of runs are reported side by side, or one robot is walked; not both"
-        )
+        raise typer.BadParameter("give either files of runs, or one robot to walk; not both")
     if files:
         _refuse_options_of_a_walk(context)
         runs, followed = _read(files, walking.gait)
         tried: dict[str, tuple[Tried, ...]] = dict.fromkeys(runs, (NO_CONTROLLER,))
     elif len(what) > 1:
-        raise typer.BadParameter("one robot is walked at a time; repeat --method for several ways")
+        raise typer.BadParameter("give one robot; repeat --method to compare methods")
     else:
         asked = asked_for(what[0], how, walking, steps=steps)
         methods = methods_asked(asked, method or (), step)
@@ -122,7 +120,8 @@ def _refuse_options_of_a_walk(context: typer.Context) -> None:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
             raise typer.BadParameter(
-                "it says how a robot walks, and a run that is read has walked",
+                "this option is for a robot that is walked, and files of runs were "
+                "given: leave it out",
                 param_hint=f"--{name.replace('_', '-')}",
             )
 

@@ -32,7 +32,8 @@ def simulate(
     hold: Annotated[
         bool,
         typer.Option(
-            "--hold/--drop", help="Hold the posture with springs and dampers, or let all go limp."
+            "--hold/--drop",
+            help="Hold the posture with springs and dampers, or drop the robot without torques.",
         ),
     ] = True,
     kp: Annotated[float, typer.Option(help="Stiffness that holds it, N m/rad.")] = 200.0,
@@ -53,17 +54,20 @@ def simulate(
     ] = None,
     how: Reading,
     out: Annotated[
-        Path, typer.Option(file_okay=False, help="For the results; files of the same names go.")
+        Path,
+        typer.Option(
+            file_okay=False, help="Folder of the results; files of the same names are replaced."
+        ),
     ] = Path("simulation"),
     animation: Annotated[Animation, typer.Option(help="Kind of animation.")] = Animation.MP4,
     as_json: AsJson = False,
 ) -> None:
     """Drop a robot in space, or let it hold its posture, and write data, a film and a page.
 
-    Any robot is taken in three dimensions. Gains are less where the inertia of a joint over the
-    step bears no more. Writes run.nc, summary.json, run.html and run.mp4 (or .gif). The exit status
+    The robot moves in three dimensions. Gains are reduced on joints with too little inertia for
+    the step. Writes run.nc, summary.json, run.html and run.mp4 (or .gif). The exit status
     is 0 if the robot did not fall, 1 if it did or the simulation failed, 2 if the request was
-    wrong, 130 after Ctrl-C, which keeps what there is.
+    wrong, 130 after Ctrl-C, which keeps the results so far.
     """
     with stage("loading"):
         from heelstrike.control.spatial.gains import bearable_gains

@@ -64,13 +64,13 @@ def train(
         ),
     ] = None,
     decisions: Annotated[int, typer.Option(min=1, help="Decisions to learn from.")] = 1_000_000,
-    seed: Annotated[int, typer.Option(min=0, help="Of everything that is random.")] = 0,
-    lanes: Annotated[int, typer.Option(min=1, help="Robots that learn at once.")] = 64,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")] = 0,
+    lanes: Annotated[int, typer.Option(min=1, help="Robots simulated at the same time.")] = 64,
     threads: Annotated[int, typer.Option(min=1, help="Threads that move them.")] = 1,
     out: Annotated[
         Path | None,
         typer.Option(
-            file_okay=False, help="Folder of what is learned; gone on with from there.",
+            file_okay=False, help="Folder of the results; training resumes from it.",
             show_default="train-ROBOT",
         ),
     ] = None,
@@ -84,8 +84,8 @@ def train(
 ) -> None:  # fmt: skip
     """Learn to run, or to walk at a commanded speed, by proximal policy optimisation.
 
-    Everything is kept in training.npz from time to time: after Ctrl-C, or worse, the same command
-    goes on, and what it comes to is the same. Writes policy.npz, for hs.Policy; curve.csv and
+    The state is saved in training.npz from time to time. After Ctrl-C, or if the process is killed,
+    the same command resumes, with the same result. Writes policy.npz, for hs.Policy; curve.csv and
     curve.svg; and run.mp4 and run.html of a run.
     """
     with stage("loading"):

@@ -27,11 +27,15 @@ def transfer(
         Path,
         typer.Argument(dir_okay=False, help="File of a policy, as heelstrike train writes it."),
     ],
-    episodes: Annotated[int, typer.Option(min=2, help="Episodes in each world.")] = 100,
-    seed: Annotated[int, typer.Option(min=0, help="Of the noise that they begin with.")] = 0,
+    episodes: Annotated[
+        int, typer.Option(min=2, help="Episodes for each method and for MuJoCo.")
+    ] = 100,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Seed of the noise in their initial states.")
+    ] = 0,
     as_json: AsJson = False,
 ) -> None:
-    """Try one policy under several ways through time, and in MuJoCo.
+    """Try one policy under several simulation methods, and in MuJoCo.
 
     Time stepping at several steps, event-driven, compliant ground, and Gymnasium's own environment
     if the task is one of its: mean return with its interval of 95 %, share of falls, decisions and

@@ -72,7 +72,9 @@ def walk(
     how: Reading,
     out: Annotated[
         Path,
-        typer.Option(file_okay=False, help="For the results; those of an earlier walk go."),
+        typer.Option(
+            file_okay=False, help="Folder of the results; those of an earlier walk are deleted."
+        ),
     ] = Path("walk"),
     animation: Annotated[Animation, typer.Option(help="Kind of animation.")] = Animation.MP4,
     html: Annotated[

@@ -37,14 +37,14 @@ def watch(
         list[str] | None,
         typer.Argument(
             metavar="ROBOT",
-            help="Built-in robots, and MJCF, URDF or SDF files; the first walks at first.",
+            help="Built-in robots, and MJCF, URDF or SDF files; the first one starts.",
             show_default="bravo7",
             autocompletion=built_in,
         ),
     ] = None,
     gait: Annotated[
         list[Path] | None,
-        typer.Option(help="Saved gait of one of the robots, to walk by; repeat it for more."),
+        typer.Option(help="Saved gait of one of the robots; repeat the option for more."),
     ] = None,
     controller: Annotated[
         list[str] | None,
@@ -58,7 +58,7 @@ def watch(
     step: Annotated[float, typer.Option(help="Time step h in s.")] = 1e-3,
     ground: OnGround = "flat",
     friction: Friction = 0.75,
-    speed: Annotated[float, typer.Option(help="Simulated seconds a second, at first.")] = 1.0,
+    speed: Annotated[float, typer.Option(help="Simulated seconds a second at the start.")] = 1.0,
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port of 127.0.0.1.", show_default="a free one")
     ] = 0,
@@ -67,11 +67,11 @@ def watch(
     ] = True,
     how: Reading,
 ) -> None:
-    """Walk a robot live, in the browser: watch it, halt it, take it back, push it.
+    """Walk a robot live in the browser: watch, pause, rewind and push it.
 
-    Needs `pip install 'heelstrike[watch]'`. The page is served on 127.0.0.1 only, to whoever has
-    the address that is printed. Robots, gaits and laws that are named here are in its lists, beside
-    those that are built in. Ctrl-C ends it.
+    Needs `pip install 'heelstrike[watch]'`. The page is served on 127.0.0.1 only, and needs the
+    printed address. Its lists offer the robots, gaits and laws named here beside the built-in
+    ones. Ctrl-C ends it.
     """
     with stage("loading"):
         from heelstrike.view.live.server import check_installed

@@ -32,14 +32,16 @@ def zoo(
     disturbances: Annotated[
         str | None, typer.Option(help="Disturbances, with commas between.", show_default="all")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of phases of pushes and of rough ground.")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, help="Seed of the phases of pushes and of rough ground.")
+    ] = 0,
     trials: Annotated[
         int | None,
         typer.Option(
             min=1, help="Phases of a push, and shapes of rough ground.", show_default="4; quick 1"
         ),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="A coarse table, for a try.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="A coarse and fast table.")] = False,
     method: Annotated[Method, typer.Option(help=METHOD)] = Method.TIME_STEPPING,
     step: Step = 1e-3,
     workers: Annotated[
@@ -49,7 +51,7 @@ def zoo(
     out: Annotated[
         Path,
         typer.Option(
-            file_okay=False, help="For what is found, and gaits; gone on with from there."
+            file_okay=False, help="Folder of the results and gaits; the search resumes from it."
         ),
     ] = Path("zoo"),
     page: Annotated[
@@ -71,7 +73,7 @@ def zoo(
 ) -> None:
     """Find how large a disturbance each controller withstands on each robot.
 
-    Every cell that is finished is kept in zoo.json: after Ctrl-C the same command goes on. Writes
+    Every finished cell is saved in zoo.json; after Ctrl-C the same command resumes. Writes
     zoo.csv, a page and a figure, too. The options of reading are for files.
     """
     with stage("loading"):

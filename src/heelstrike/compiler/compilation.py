@@ -35,7 +35,7 @@ CompileError = (numba.errors.NumbaError, RuntimeError, TypeError)
 
 
 class CompilerWarning(UserWarning):
-    """Numba is not one that this package knows how to hurry; all else is as ever."""
+    """The internals of this Numba are not known here: compiling takes longer."""
 
 
 @cache
@@ -48,8 +48,8 @@ def numba_in_use() -> DocumentedNumba:
         private.test()
     except Exception as error:
         warnings.warn(
-            f"Numba {numba.__version__} is not one that heelstrike knows how to hurry: kernels "
-            f"take about twice as long to compile, and compute the same. ({error!r})",
+            f"heelstrike does not know the internals of Numba {numba.__version__}: kernels take "
+            f"about twice as long to compile. Results are the same. ({error!r})",
             CompilerWarning,
             stacklevel=2,
         )

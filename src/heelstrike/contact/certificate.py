@@ -1,7 +1,7 @@
 """Certificates: what a contact solve is worth, measured on the original data.
 
-The yardstick is the size of the data, never that of the answer: an impulse of 1e16 would prove
-itself. Row i has the weight ``g_i = sqrt(G_ii)``, and the data have the size::
+Residuals are relative to the size of the data, never that of the answer: otherwise an impulse of
+1e16 would prove itself. Row i has the weight ``g_i = sqrt(G_ii)``, and the data have the size::
 
     beta = max_j |b_j| / g_j                [m/s kg^(1/2)]
 
@@ -28,8 +28,8 @@ from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
     Floats,
+    Scaling,
     Settings,
-    Yardstick,
 )
 from heelstrike.field_texts import dataclass
 
@@ -98,30 +98,30 @@ class Certificate:
 
 @kernel
 def certify(
-    problem: ContactProblem, settings: Settings, yardstick: Yardstick, answer: ContactAnswer
+    problem: ContactProblem, settings: Settings, scaling: Scaling, answer: ContactAnswer
 ) -> float:
     """Compute the velocity an impulse gives and the residuals; return the largest of them.
 
     The residuals are complementarity, cone and non-penetration, scaled as in :class:`Certificate`;
-    what is returned includes rounding. ``yardstick.slope`` is not zero where a contact is
+    what is returned includes rounding. ``scaling.slope`` is not zero where a contact is
     prescribed to slide; its friction then lies on the given edge and its tangential velocity is not
     constrained.
 
-    Writes ``velocity``, ``residual`` and ``rest`` of the answer, and the rest of the yardstick.
+    Writes ``velocity``, ``residual`` and ``rest`` of the answer, and the rest of the scaling.
     """
     count = problem.count
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
-    root, slope = yardstick.root, yardstick.slope
-    weigh(problem, settings, impulse, yardstick)
-    unit = yardstick.unit
-    rounding = (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + yardstick.effort)
+    root, slope = scaling.root, scaling.slope
+    weigh(problem, settings, impulse, scaling)
+    unit = scaling.unit
+    rounding = (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + scaling.effort)
     sharply = rounding > VISIBLE
     if not sharply:
         sum_velocities(problem, impulse, velocity)
     else:
-        rounding = sum_velocities_sharply(problem, impulse, yardstick, velocity)
-    yardstick.rounding = rounding
-    answer.rest = REST_TOLERANCE * unit * (1.0 + yardstick.effort)
+        rounding = sum_velocities_sharply(problem, impulse, scaling, velocity)
+    scaling.rounding = rounding
+    answer.rest = REST_TOLERANCE * unit * (1.0 + scaling.effort)
     inverse = 1.0 / unit if unit > 0.0 else 0.0
     complementarity = cone = non_penetration = 0.0
     first, end = problem.first, 0
@@ -166,7 +166,7 @@ def certify(
         slips = max(min(speed, lower * force_scale), min(-speed, upper * force_scale))
         complementarity = max(complementarity, slips)
     # Impulses without any cause in the data count as much as numbers that are none.
-    if nothing != 0.0 or not yardstick.effort + rounding < math.inf:
+    if nothing != 0.0 or not scaling.effort + rounding < math.inf:
         non_penetration = math.inf
     residual[0] = complementarity
     residual[1] = cone
@@ -193,11 +193,9 @@ def sign(value: float) -> float:
 
 
 @kernel
-def weigh(
-    problem: ContactProblem, settings: Settings, impulse: Floats, yardstick: Yardstick
-) -> None:
+def weigh(problem: ContactProblem, settings: Settings, impulse: Floats, scaling: Scaling) -> None:
     """Write the weights of the rows, the size of the data, beta, and the effort."""
-    delassus, root = problem.delassus, yardstick.root
+    delassus, root = problem.delassus, scaling.root
     unit = settings.floor
     skewed = settings.skewed != 0
     effort = 0.0
@@ -212,8 +210,8 @@ def weigh(
         effort += root[i] * abs(impulse[i])
     if effort > 0.0:
         effort = effort / unit if unit > 0.0 else math.inf
-    yardstick.effort = effort
-    yardstick.unit = unit
+    scaling.effort = effort
+    scaling.unit = unit
 
 
 @kernel
@@ -256,15 +254,15 @@ def sum_velocities(problem: ContactProblem, impulse: Floats, velocity: Floats) -
 
 @kernel
 def sum_velocities_sharply(
-    problem: ContactProblem, impulse: Floats, yardstick: Yardstick, velocity: Floats
+    problem: ContactProblem, impulse: Floats, scaling: Scaling, velocity: Floats
 ) -> float:
     """Write ``velocity = G impulse + free`` in twice the precision; return what rounding is left.
 
-    What is left is relative to the data's velocities. ``yardstick.effort`` becomes the
+    What is left is relative to the data's velocities. ``scaling.effort`` becomes the
     largest sum of magnitudes of any row, in the same unit.
     """
     rows, delassus, free = problem.first[problem.count], problem.delassus, problem.free
-    root, unit = yardstick.root, yardstick.unit
+    root, unit = scaling.root, scaling.unit
     terms = 2.0 * problem.count + 1.0
     effort = 0.0
     rounding = 0.0
@@ -290,12 +288,12 @@ def sum_velocities_sharply(
             rounding = max(rounding, left / size)
         elif not magnitude < math.inf:
             rounding = math.inf
-    if yardstick.effort < math.inf:
-        yardstick.effort = effort
+    if scaling.effort < math.inf:
+        scaling.effort = effort
     return rounding
 
 
-def velocity_error(worst: float, friction: Floats, yardstick: Yardstick) -> Floats:
+def velocity_error(worst: float, friction: Floats, scaling: Scaling) -> Floats:
     """How far the velocities just certified may be from a solution's; see :class:`Certificate`.
 
     To make the answer exact, let every residual vanish. Velocities that are no larger than the
@@ -310,7 +308,7 @@ def velocity_error(worst: float, friction: Floats, yardstick: Yardstick) -> Floa
         Largest residual, rounding included.
     friction : (nc,) float
         Friction coefficients of contacts that have a tangent all.
-    yardstick : Yardstick
+    scaling : Scaling
         As :func:`certify` left it.
 
     Returns
@@ -318,11 +316,11 @@ def velocity_error(worst: float, friction: Floats, yardstick: Yardstick) -> Floa
     (nc, 2) float
         In the unit of the free velocity.
     """
-    root = yardstick.root[: 2 * friction.size]
+    root = scaling.root[: 2 * friction.size]
     lever = np.zeros(friction.size)
     np.divide(friction * root[1::2], root[::2], out=lever, where=root[::2] > 0.0)
     if not worst < 1.0:
         return np.full((friction.size, 2), math.inf)
     moved = worst * (1.0 + np.sum(2.0 + lever))
-    bound: Floats = (moved * yardstick.unit * root).reshape(friction.size, 2)
+    bound: Floats = (moved * scaling.unit * root).reshape(friction.size, 2)
     return bound

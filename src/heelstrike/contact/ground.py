@@ -134,7 +134,7 @@ class Ground(ShownInNotebooks):
     def _check_shape(self, shape: GroundShape) -> None:
         if not isinstance(shape, GroundShape):
             raise SimulationError(
-                f"shape must be a GroundShape(...), got {shape!r}; corners are given as profile"
+                f"shape must be a GroundShape(...), got {shape!r}; for corners use profile="
             )
         if self.slope != 0.0 or self.profile is not None:
             raise SimulationError("give the ground a shape, or a slope or a profile, not both")

@@ -61,16 +61,16 @@ def solve_contact_kernel(
         always finite if the data are; modes are told by the velocity, and a contact prescribed to
         slide keeps its mode or becomes ``OPEN``.
     """
-    tally, settings, yardstick = work.tally, work.settings, work.yardstick
+    tally, settings, scaling = work.tally, work.settings, work.scaling
     tally.solves += 1
     tally.iterations = 0
     tally.last_fallbacks = 0
     tally.solver = WARM_START
     for contact in range(problem.count):
-        yardstick.slope[contact] = 0.0
+        scaling.slope[contact] = 0.0
         if problem.set[contact] == INTERVAL:
             press(contact, problem)
-    if settings.skewed == 0 and repeat(problem, settings, work.sticking, yardstick, answer):
+    if settings.skewed == 0 and repeat(problem, settings, work.sticking, scaling, answer):
         tally.shortcuts += 1
         return SOLVED
     return int(call_at(work.solvers[0], (problem, order, work, answer)))
@@ -249,7 +249,7 @@ def run_solvers(
     work = _memory(count)
     work.settings.tolerance = tolerance
     work.settings.floor = np.ldexp(floor, offset_shift - matrix_shift // 2)
-    work.settings.amendments = 0  # nobody has guessed the modes
+    work.settings.corrections = 0  # nobody has guessed the modes
     work.settings.patient = 1
     work.settings.skewed = 0 if semidefinite else 1
     problem = contact_problem(
@@ -259,8 +259,8 @@ def run_solvers(
     answer = ContactAnswer.allocate(nc=count, mode=mode)
     status = SolveStatus(solve_contact_kernel(order, problem, work, answer))
     # The solvers leave in the workspace what belongs to the last candidate, not to the best one.
-    worst = certify(problem, work.settings, work.yardstick, answer)
-    error = velocity_error(worst, friction, work.yardstick)
+    worst = certify(problem, work.settings, work.scaling, answer)
+    error = velocity_error(worst, friction, work.scaling)
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
     with np.errstate(over="ignore"):
         impulse = np.ldexp(impulse, matrix_shift - offset_shift)
@@ -278,7 +278,7 @@ def run_solvers(
         complementarity=float(residual[0]),
         cone=float(residual[1]),
         non_penetration=float(residual[2]),
-        rounding=work.yardstick.rounding,
+        rounding=work.scaling.rounding,
         tolerance=float(tolerance),
         velocity_error=error,
     )

@@ -54,7 +54,7 @@ class ContactAnswer(Bundle):
     residual: Floats = array(3)
     """Complementarity, cone and penetration, relative (see ``Certificate``)."""
     rest: float = cell(float)
-    """Velocities below this times the yardstick's ``root`` count as zero."""
+    """Velocities below this times the scaling's ``root`` count as zero."""
 
 
 class Settings(Bundle):
@@ -64,8 +64,8 @@ class Settings(Bundle):
     """Largest residual that is certified, 1e-9 unless changed."""
     floor: float = cell(float)
     """Smallest size of the data that residuals are set against, zero unless changed."""
-    amendments: int = cell(int)
-    """How often the modes of the answer are amended before a solver is asked; zero where they are
+    corrections: int = cell(int)
+    """How often the modes of the answer are corrected before a solver is asked; zero where they are
     no guess."""
     patient: int = cell(int)
     """Not zero if an answer that is certified, and not clean, is compared with those of all
@@ -94,7 +94,7 @@ class Tally(Bundle):
     counts."""
 
 
-class Yardstick(Bundle):
+class Scaling(Bundle):
     """What a certificate measures with, and found out about rounding."""
 
     slope: Floats = array("nc")
@@ -242,14 +242,14 @@ class ContactWorkspace(Bundle):
     settings: Settings = part(Settings)
     tally: Tally = part(Tally)
     """settings, tally: What the caller may choose and read."""
-    yardstick: Yardstick = part(Yardstick)
+    scaling: Scaling = part(Scaling)
     sticking: StickingRows = part(StickingRows)
     reduced: ReducedProblem = part(ReducedProblem)
     equations: Equations = part(Equations)
     lemke: Dictionary = part(Dictionary)
     iteration: Iteration = part(Iteration)
     combinations: Combinations = part(Combinations)
-    """yardstick, sticking, reduced, equations, lemke, iteration, combinations: Memory of the
+    """scaling, sticking, reduced, equations, lemke, iteration, combinations: Memory of the
     certificate and of each way to solve."""
     trial: ContactAnswer = part(ContactAnswer)
     """Modes under trial, and their answer."""

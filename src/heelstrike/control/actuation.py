@@ -12,7 +12,7 @@ import math
 from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.around import Around, Shell, Shown, copy, copy_contacts, own_period
+from heelstrike.control.around import Around, Shown, Wrapper, copy, copy_contacts, own_period
 from heelstrike.control.sensing import periods
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats
@@ -94,7 +94,7 @@ def act(
     memory.calls += 1
 
 
-ACTUATED = Shell("actuated", look, act, Parameters, Memory, Log)
+ACTUATED = Wrapper("actuated", look, act, Parameters, Memory, Log)
 
 
 class Actuated(Around):
@@ -163,7 +163,8 @@ class Actuated(Around):
         )
         if self.commands_voltage and efficiency < 1.0:
             raise ControllerError(
-                f"controller {self.function.name!r} commands voltages, of which gears take no "
-                "share: leave efficiency out, and let the motor's numbers be those at the joint"
+                f"controller {self.function.name!r} commands voltages, to which efficiency "
+                "does not apply: leave efficiency out, and give the motor's numbers at "
+                "the joint"
             )
         self.delay, self.bandwidth, self.efficiency = delay, bandwidth, efficiency

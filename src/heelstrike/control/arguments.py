@@ -47,9 +47,9 @@ def check_gait(robot: Robot, gait: Gait) -> None:
         raise ControllerError(str(error)) from None
     if gait.robot != robot.name:
         raise ControllerError(
-            f"this gait is one of robot {gait.robot!r}, not of {robot.name!r}, whose joints are "
-            "called the same. Design one for it with optimize_gait; if it is the same robot with "
-            f"other numbers, call it the same: dataclasses.replace(robot, name={gait.robot!r})"
+            f"this gait is one of robot {gait.robot!r}, not of {robot.name!r}, which has the same "
+            "joint names. Design one for it with optimize_gait; if it is the same robot with "
+            f"other numbers, give it the same name: dataclasses.replace(robot, name={gait.robot!r})"
         )
 
 

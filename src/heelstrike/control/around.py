@@ -1,14 +1,14 @@
 """Laws around laws: what stands between a controller and its robot.
 
-A shell is two kernels, one before the controller inside is asked and one after it, with parameters,
-memory and log of its own. Of shell and controller one law is made: compiled, if the controller is,
-and asked in Python, if it is an object. The bundles of both are parts of its own::
+A wrapper is two kernels, one before the controller inside is asked and one after it, with
+parameters, memory and log of its own. Wrapper and controller make one law: compiled, if the
+controller is, and asked in Python, if it is an object. The bundles of both are parts of its own::
 
     before(t, state, contacts, robot, own parameters, own memory, own log)
-    inside(t, memory.own.state, memory.own.contacts, …)    # what it sees is the shell's to say
+    inside(t, memory.own.state, memory.own.contacts, …)    # what it sees is the wrapper's to say
     after(t, state, robot, own parameters, own memory, own log, torque)
 
-The shell keeps time by its own period; a controller inside that is called less often is, and its
+The wrapper keeps time by its own period; a controller inside that is called less often is, and its
 torques are held meanwhile.
 """
 
@@ -35,7 +35,7 @@ ROBOTS = frozenset(("nq", "nv", "nu", "nc", "nl", "nj", "nf", "axes", "component
 """Extents that are the robot's."""
 
 PERIOD = 1e-3
-"""Seconds between two calls of a shell around a controller that names no period."""
+"""Seconds between two calls of a wrapper around a controller that names no period."""
 
 
 @kernel
@@ -59,7 +59,7 @@ class Turn(Bundle):
     """When the controller inside is called."""
 
     every: int = number(int)
-    """Calls of the shell for one of the controller inside."""
+    """Calls of the wrapper for one of the controller inside."""
     period: float = number(float)
     inside: float = number(float)
     """period, inside: Seconds between two calls of either."""
@@ -69,11 +69,11 @@ class Held(Bundle):
     """What the controller inside asked for last."""
 
     calls: int = cell(int)
-    """Calls of the shell."""
+    """Calls of the wrapper."""
     torque: Floats = array("nu")
 
 
-class Shell(NamedTuple):
+class Wrapper(NamedTuple):
     """What stands between a controller and its robot.
 
     Attributes
@@ -95,7 +95,7 @@ class Shell(NamedTuple):
 
 
 class Shown(Bundle):
-    """What the controller inside a shell is shown: a base of the memories of shells."""
+    """What the controller inside a wrapper is shown: a base of the memories of wrappers."""
 
     state: ControlState = part(ControlState)
     contacts: Contacts = part(Contacts)
@@ -150,7 +150,7 @@ class AskedInPython(ControllerFunction):
 
 
 def own_period(name: str, controller: Controller, period: float | None) -> float:
-    """Return the seconds between two calls of a shell: by default the controller's, 1 ms at most.
+    """Return the seconds between two calls of a wrapper: by default the controller's, 1 ms at most.
 
     Raises
     ------
@@ -165,19 +165,19 @@ def own_period(name: str, controller: Controller, period: float | None) -> float
 
 
 class Around(Law):
-    """A shell with a controller inside: a law like any other.
+    """A wrapper with a controller inside: a law like any other.
 
     Parameters
     ----------
-    shell : Shell
+    wrapper : Wrapper
     controller : Controller
         What is inside.
     own : Bundle
-        Parameters of the shell.
+        Parameters of the wrapper.
     period : float, optional
-        Seconds between two calls of the shell.
+        Seconds between two calls of the wrapper.
     extents : dict of str to int
-        Of the shell's memory.
+        Of the wrapper's memory.
     late : bool
         Whether joints move on before what they did has come back as torque. Then schemes are not
         told the gains of the controller: at the end of a step they would act without delay.
@@ -191,19 +191,19 @@ class Around(Law):
     keeps_period = True
 
     def __init__(
-        self, shell: Shell, controller: Controller, own: Bundle, *, period: float | None,
+        self, wrapper: Wrapper, controller: Controller, own: Bundle, *, period: float | None,
         extents: dict[str, int], late: bool = False,
     ) -> None:  # fmt: skip
         law = inside(controller)
-        period = own_period(shell.name, controller, period)
+        period = own_period(wrapper.name, controller, period)
         inner = period if law.period is None else law.period
         every = round(inner / period)
         if every < 1 or abs(every * period - inner) > 1e-9 * inner:
             raise ControllerError(
-                f"controller {law.function.name!r} is to be called every {inner} s, which is no "
-                f"whole number of periods of {period} s: give {shell.name!r} another period"
+                f"controller {law.function.name!r} is called every {inner} s, which is "
+                f"not a multiple of {period} s: give {wrapper.name!r} another period"
             )
-        function = composed(shell, law.function)
+        function = composed(wrapper, law.function)
         parts: Any = function.parameters.declared
         numbers = parts["inside"].kind(**law.parameters.members())
         turn = Turn(every=every, period=period, inside=inner)
@@ -213,13 +213,13 @@ class Around(Law):
             damping=None if late else law.damping, commands_voltage=law.commands_voltage,
         )  # fmt: skip
         self.inside = law
-        self._shell, self._extents, self._late = shell, dict(extents), late
+        self._wrapper, self._extents, self._late = wrapper, dict(extents), late
 
     def __reduce__(self) -> Any:
-        """Copies are made again of shell and controller: their bundles have no name."""
+        """Copies are made again of wrapper and controller: their bundles have no name."""
         numbers: Any = self.parameters
         more = {name: each for name, each in vars(self).items() if name not in _MADE}
-        made_of = self._shell, self.inside, numbers.own, self.period, self._extents, self._late
+        made_of = self._wrapper, self.inside, numbers.own, self.period, self._extents, self._late
         return _again, (type(self), made_of, more)
 
     def with_parameters(self, parameters: Bundle) -> Law:
@@ -231,7 +231,7 @@ class Around(Law):
         return found
 
     def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
-        """Return parameters and memory of shell and controller."""
+        """Return parameters and memory of wrapper and controller."""
         extents = extents_of(robot) | self._extents
         _, remembered = self.inside.numbers(robot)
         kind: Any = self.function.memory.settable()
@@ -247,7 +247,7 @@ class Around(Law):
         return parameters(**self.parameters.members()), memory
 
     def new_log(self, robot: Robot) -> Bundle:
-        """Return logs of shell and controller."""
+        """Return logs of wrapper and controller."""
         kind: Any = self.function.log.settable()
         own = kind.declared["own"].kind.allocate(extents_of(robot) | self._extents)
         log: Bundle = kind(own=own, inside=self.inside.new_log(robot))
@@ -256,30 +256,32 @@ class Around(Law):
 
 _MADE = (
     "function", "parameters", "memory", "robot", "period", "stiffness", "damping",
-    "commands_voltage", "inside", "_asked", "_shell", "_extents", "_late",
+    "commands_voltage", "inside", "_asked", "_wrapper", "_extents", "_late",
 )  # fmt: skip
 
 
 def _again(kind: type[Around], made_of: tuple[Any, ...], more: dict[str, Any]) -> Around:
-    """Make a shell of what it is made of."""
-    shell, controller, own, period, extents, late = made_of
+    """Make a wrapper of what it is made of."""
+    wrapper, controller, own, period, extents, late = made_of
     law = kind.__new__(kind)
-    Around.__init__(law, shell, controller, own, period=period, extents=extents, late=late)
+    Around.__init__(law, wrapper, controller, own, period=period, extents=extents, late=late)
     vars(law).update(more)
     return law
 
 
 class Composed(ControllerFunction):
-    """The function of a shell and of the controller inside."""
+    """The function of a wrapper and of the controller inside."""
 
-    def __init__(self, shell: Shell, function: ControllerFunction, text: Any, scope: Any) -> None:
-        self._made_of = shell, function
+    def __init__(
+        self, wrapper: Wrapper, function: ControllerFunction, text: Any, scope: Any
+    ) -> None:
+        self._made_of = wrapper, function
         super().__init__(text, function.compiles, scope, function.endings)
         self.is_ours = function.is_ours
         self.partner = function.partner
 
     def __reduce__(self) -> Any:
-        """Copies are made again of shell and function."""
+        """Copies are made again of wrapper and function."""
         return composed, self._made_of
 
     def begin(self) -> None:
@@ -287,18 +289,18 @@ class Composed(ControllerFunction):
 
 
 @lru_cache
-def composed(shell: Shell, function: ControllerFunction) -> Composed:
-    """Return the function of a shell and of the controller inside."""
+def composed(wrapper: Wrapper, function: ControllerFunction) -> Composed:
+    """Return the function of a wrapper and of the controller inside."""
     parameters: Any = _bundle(
-        "Parameters", turn=part(Turn), own=part(shell.parameters),
+        "Parameters", turn=part(Turn), own=part(wrapper.parameters),
         inside=part(function.parameters.settable()),
     )  # fmt: skip
     memory: Any = _bundle(
-        "Memory", own=part(shell.memory), held=part(Held),
+        "Memory", own=part(wrapper.memory), held=part(Held),
         inside=part(function.memory.settable()),
     )  # fmt: skip
     log: Any = _bundle(
-        "Log", own=part(shell.log, flat=True), inside=part(function.log.settable(), flat=True)
+        "Log", own=part(wrapper.log, flat=True), inside=part(function.log.settable(), flat=True)
     )
     shown = {
         "state": "memory.own.state", "contacts": "memory.own.contacts",
@@ -306,7 +308,7 @@ def composed(shell: Shell, function: ControllerFunction) -> Composed:
         "torque": "held",
     }  # fmt: skip
     given = ", ".join(shown.get(name, name) for name in function.arguments)
-    name = re.sub(r"\W", "_", f"{shell.name}_{function.name}")  # a lambda has none
+    name = re.sub(r"\W", "_", f"{wrapper.name}_{function.name}")  # a lambda has none
     text = f"""
 def {name}({", ".join(ARGUMENTS)}):
     before(t, state, contacts, robot, parameters.own, memory.own, log.own)
@@ -325,7 +327,7 @@ def {name}({", ".join(ARGUMENTS)}):
     if function.compiles:
         inner = kernel(inner) if is_ours(python) else within_bounds(inner)
     scope: dict[str, Any] = {
-        "before": shell.before, "after": shell.after, "inside": inner,
+        "before": wrapper.before, "after": wrapper.after, "inside": inner,
         "__name__": python.__module__,
     }  # fmt: skip
     # Machine code is kept beside the file of the controller.
@@ -334,9 +336,9 @@ def {name}({", ".join(ARGUMENTS)}):
     made = scope[name]
     if place is not None:  # Numba looks for source text there: it must be that of a function
         made.__code__ = made.__code__.replace(co_firstlineno=place.co_firstlineno)
-    made.__qualname__ = f"{shell.name}({python.__qualname__})"
+    made.__qualname__ = f"{wrapper.name}({python.__qualname__})"
     made.__annotations__ = {"parameters": parameters, "memory": memory, "log": log}
-    return Composed(shell, function, made, {})
+    return Composed(wrapper, function, made, {})
 
 
 def _bundle(name: str, **members: Any) -> type[Bundle]:

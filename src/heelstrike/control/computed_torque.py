@@ -301,8 +301,8 @@ def _check_reach(robot: Robot) -> None:
             robot.joint_names[j] for j in joints[np.abs(free).max(axis=1) > UNREACHED]
         )
         raise ControllerError(
-            f"computed torque needs motors that reach every joint, by closed loops or couplings if "
-            f"not their own; in robot {robot.name!r} nothing drives {names}"
+            "computed torque needs every joint driven, by a motor of its own or through "
+            f"closed loops and couplings; in robot {robot.name!r} nothing drives {names}"
         )
 
 

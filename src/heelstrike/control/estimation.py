@@ -24,7 +24,7 @@ import numpy as np
 from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.around import Around, Shell, Shown, copy, copy_contacts, own_period
+from heelstrike.control.around import Around, Shown, Wrapper, copy, copy_contacts, own_period
 from heelstrike.dynamics.held import (
     HeldRows,
     Reaction,
@@ -253,7 +253,7 @@ def keep(
         memory.torque[i] = min(max(torque[i], lower[i]), upper[i])
 
 
-ESTIMATED = Shell("estimated", estimate, keep, Parameters, Memory, Log)
+ESTIMATED = Wrapper("estimated", estimate, keep, Parameters, Memory, Log)
 
 
 class Estimated(Around):
@@ -307,8 +307,8 @@ class Estimated(Around):
         super().__init__(ESTIMATED, controller, own, period=period, extents={})
         if self.commands_voltage:
             raise ControllerError(
-                f"controller {self.function.name!r} commands voltages: the estimator predicts by "
-                "the torques that are asked for, and cannot tell those"
+                f"controller {self.function.name!r} commands voltages, but the estimator "
+                "needs torques to predict with: use a law that commands torques"
             )
         self.bandwidth = bandwidth
 

@@ -63,7 +63,9 @@ class PreviewControl:
         """
         wanted = np.asarray(reference, dtype=np.float64)
         if wanted.ndim != 1 or not len(wanted) or not np.all(np.isfinite(wanted)):
-            raise ControllerError("a reference of the zero moment point is a row of finite numbers")
+            raise ControllerError(
+                "a reference of the zero moment point is a one-dimensional array of finite numbers"
+            )
         transition, jerk, zero_moment = _cart(self.period, self.height, self.gravity)
         # As seen from the beginning: the sums of the servo begin at rest there.
         away = wanted - wanted[0]

@@ -15,7 +15,7 @@ import numpy as np
 from heelstrike.arguments import check_fields, takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.around import Around, Shell, Shown, copy, own_period
+from heelstrike.control.around import Around, Shown, Wrapper, copy, own_period
 from heelstrike.control.noise import normal, seeded
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
@@ -36,7 +36,7 @@ class Encoders:
     """noise, bias: Standard deviation of each reading, and of the constant error of each joint,
     which is drawn once (rad)."""
     rate: float | None = None
-    """Readings a second, at most one a period of the shell; by default one each."""
+    """Readings a second, at most one a period of the wrapper; by default one each."""
     cutoff: float | None = None
     """Cut-off frequency of the first-order filter of the differences (Hz); none by default."""
 
@@ -58,7 +58,7 @@ class InertialUnit:
     rate_bias: float = 0.0
     """rate_noise, rate_bias: The same of its rate (rad/s)."""
     rate: float | None = None
-    """Readings a second; by default one a period of the shell."""
+    """Readings a second; by default one a period of the wrapper."""
 
     def __post_init__(self) -> None:
         _check(self)
@@ -80,7 +80,7 @@ class FootSensors:
     """Whether there is only a switch under each point: the normal force reads 1 or 0, the
     tangential one 0."""
     rate: float | None = None
-    """Readings a second; by default one a period of the shell."""
+    """Readings a second; by default one a period of the wrapper."""
 
     def __post_init__(self) -> None:
         _check(self)
@@ -309,7 +309,7 @@ def leave(
     """Leave the torques as they are."""
 
 
-SENSED = Shell("sensed", sense, leave, Parameters, Memory, Log)
+SENSED = Wrapper("sensed", sense, leave, Parameters, Memory, Log)
 
 
 class Sensed(Around):

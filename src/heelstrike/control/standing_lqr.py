@@ -102,7 +102,7 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
 
     refuse_loops(robot, "a regulator of standing", ControllerError, loops=False)
     if not robot.nu:
-        raise ControllerError(f"robot {robot.name!r} has no motors to stand by")
+        raise ControllerError(f"robot {robot.name!r} has no motors, so no regulator can hold it")
     q, rest = numbers_of("posture", posture), np.zeros(robot.nv)
     if q.shape != (robot.nq,) or not np.all(np.isfinite(q)):
         raise ControllerError(f"a posture is of {robot.nq} finite numbers, got {q.tolist()}")
@@ -141,8 +141,7 @@ def _refuse_what_floats(robot: Robot, gap: Floats) -> None:
     side = "above" if gap.min() > 0.0 else "below"
     raise ControllerError(
         f"robot {robot.name!r} does not stand in this posture: its lowest contact point is "
-        f"{abs(gap.min()):.3g} m {side} the ground. In robot.standing(hs.Ground()).q its feet are "
-        "on it"
+        f"{abs(gap.min()):.3g} m {side} the ground. Use robot.standing(hs.Ground()).q"
     )
 
 
@@ -264,13 +263,13 @@ def _regulator(
             poles = np.log(np.linalg.eigvals(A - B @ gain).astype(complex)) / period
     except (np.linalg.LinAlgError, ValueError) as error:
         raise ControllerError(
-            f"no regulator makes robot {robot.name!r} stand in this posture: its motors do not "
-            f"reach what falls, or weights leave it without cost ({error})"
+            f"no regulator stabilises robot {robot.name!r} in this posture: its motors do not "
+            f"control the fall, or the weights give it no cost ({error})"
         ) from None
     if not np.all(poles.real < 0.0):
         raise ControllerError(
-            f"no regulator makes robot {robot.name!r} stand in this posture: its motors do not "
-            "reach what falls"
+            f"no regulator stabilises robot {robot.name!r} in this posture: its motors do not "
+            "control the fall"
         )
     order = np.argsort(poles.real)[::-1]
     return gain, poles[order].astype(complex)

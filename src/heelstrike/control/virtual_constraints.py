@@ -290,5 +290,5 @@ def _outputs(robot: Robot, outputs: ArrayLike | None) -> Floats:
             f"an output and a column an actuator; got {outputs!r}"
         )
     if np.linalg.cond(matrix) > 1e8:
-        raise ControllerError("outputs must tell all joints apart: their matrix is singular")
+        raise ControllerError("outputs must be independent of each other: their matrix is singular")
     return matrix

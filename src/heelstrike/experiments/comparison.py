@@ -1,4 +1,4 @@
-"""The same robot and controller under several ways through time, and how far they differ."""
+"""The same robot and controller under several simulation methods, and how far they differ."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def compare(
     robot, controller, state, duration, ground, control_period, pushes, on_error
         As in :func:`heelstrike.simulate`.
     methods : sequence of Method, or mapping of names to them
-        Ways through time; a sequence is named after their classes and options.
+        Simulation methods; a sequence is named after their classes and options.
     reference : str, optional
         Name of the method to hold the others against; the first by default.
 
@@ -235,9 +235,9 @@ def _named(methods: Sequence[Method] | Mapping[str, Method]) -> dict[str, Method
     pairs = methods if isinstance(methods, Mapping) else {str(each): each for each in methods}
     named = dict(pairs)
     if len(named) < len(methods):
-        raise SimulationError("two of the methods to compare are the same")
+        raise SimulationError("two of the methods to compare are the same: give each once")
     if not named:
-        raise SimulationError("there is no method to compare")
+        raise SimulationError("give at least one method to compare")
     return named
 
 

@@ -65,9 +65,10 @@ def passive_walk(robot: Robot, ground: Ground) -> LimitCycle:
     start = _STARTS.get(robot.name)
     if start is None:
         raise LimitCycleError(
-            f"robot {robot.name!r} has no motors, and where its walk begins is not known here, as "
-            f"it is of {', '.join(_STARTS)}. hs.find_limit_cycle finds a walk that repeats from "
-            "a state near it, and hs.simulate starts there."
+            f"robot {robot.name!r} has no motors, and no start of its walk is known, as "
+            f"for {', '.join(_STARTS)}. Find a walk that repeats with "
+            "hs.find_limit_cycle, from a state near it, and simulate from there with "
+            "hs.simulate."
         )
     descent = -ground.slope
     if ground.profile is not None or ground.shape is not None or not descent > 0.0:
@@ -80,7 +81,7 @@ def passive_walk(robot: Robot, ground: Ground) -> LimitCycle:
         return find_limit_cycle(robot, start(robot, descent), ground=ground, method=METHOD)
     except LimitCycleError as error:
         raise LimitCycleError(
-            f"no walk of {robot.name!r} was found that repeats on a slope of "
+            f"found no walk of {robot.name!r} that repeats on a slope of "
             f"-{np.rad2deg(descent):.4g} degrees with friction {friction:g}: "
             f"{str(error).rstrip('.')}. There is one on {_ground_for(robot)}, with friction 0.75."
         ) from error

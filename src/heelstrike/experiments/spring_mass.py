@@ -247,7 +247,10 @@ class SpringMass:
             events=falling,
         )  # fmt: skip
         if not len(run.t_events[0]):
-            raise LimitCycleError("the spring-mass model falls, or flies on: no step is completed")
+            raise LimitCycleError(
+                "the spring-mass model falls or flies on before it completes a step; try "
+                "another stiffness, angle or energy"
+            )
         # Newton's method on the length of the last phase: events of dense output are less exact.
         end, time = self._refined(start, feet, event, float(run.t_events[0][0]))
         if phases is not None:

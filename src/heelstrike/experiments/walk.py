@@ -227,7 +227,7 @@ def walk(
         What moves the joints; by default computed torque with its usual gains, nothing on a limit
         cycle.
     method : Method, optional
-        Way through time.
+        Simulation method.
     ground : Ground, optional
         The ground, on which the robot is put as :func:`beginning` says.
     pushes : sequence of Push

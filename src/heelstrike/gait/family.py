@@ -299,7 +299,7 @@ def _go_on(
     """Take over what a file holds of a family."""
     same = list(family.axes) == list(saved.axes) and dict(family.asked) == dict(saved.asked)
     if not same or any(not np.array_equal(a, saved.axes[k]) for k, a in family.axes.items()):
-        raise GaitError("the file holds a family over other axes, or asked otherwise; name another")
+        raise GaitError("the file holds a family with other axes or arguments; give another file")
     gaits.update(saved.gaits)
     gaps.update(saved.gaps)
 

@@ -140,8 +140,9 @@ class Request:
         self._check_step()
         if flat and self.zmp_margin >= self.stance.half_length:
             raise GaitError(
-                f"zmp_margin = {self.zmp_margin:g} m leaves nothing of the sole, which reaches "
-                f"{self.stance.half_length:g} m to each side of its middle."
+                f"zmp_margin = {self.zmp_margin:g} m is too large: the sole reaches only "
+                f"{self.stance.half_length:g} m to each side of its middle. Ask for "
+                "less."
             )
         if self.force_margin >= robot.weight:
             raise GaitError(

@@ -282,7 +282,7 @@ class RobotBuilder:
         first = self._index(link, "a loop joins")
         second = -1 if other is None else self._index(other, "a loop joins")
         if first == second:
-            raise self._error(f"a loop joins link {link!r} to itself, which says nothing.")
+            raise self._error(f"a loop joins link {link!r} to itself: name two links.")
         try:
             x, z = _pair("at", at)
             if other_at is None:
@@ -315,7 +315,7 @@ class RobotBuilder:
         """
         places = self._joint(joint), -1 if leader is None else self._joint(leader)
         if places[0] == places[1]:
-            raise self._error(f"joint {joint!r} follows itself, which says nothing.")
+            raise self._error(f"joint {joint!r} cannot follow itself.")
         if any(places[0] == follower for (follower, _), _ in self._couplings):
             raise self._error(f"joint {joint!r} follows another already.")
         if not 1 <= len(polynomial) <= POWERS:
@@ -384,7 +384,9 @@ class RobotBuilder:
         if place in self._brakes:
             raise self._error(f"joint {joint!r} has a brake already.")
         if not limit > 0.0:
-            raise self._error(f"the brake of joint {joint!r} must hold something, got {limit!r}.")
+            raise self._error(
+                f"the limit of the brake of joint {joint!r} must be positive, got {limit!r}."
+            )
         self._brakes[place] = float(limit)
 
     def build(self) -> Robot:

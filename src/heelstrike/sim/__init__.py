@@ -1,4 +1,4 @@
-"""simulate(), the ways through time, and the run they leave behind.
+"""simulate(), the simulation methods, and the run they leave behind.
 
 What a method from outside is made of is here too, imported under its own name: the bundles that
 its kernels are handed, and the kernels that those of this package call.

@@ -1,4 +1,4 @@
-"""What a way through time is: the contract that a new one fulfils.
+"""What a simulation method is: the contract that a new one fulfils.
 
 A method is a frozen dataclass of its settings. It says what it cannot do (:meth:`Method.check`),
 makes the bundle that it works with (:meth:`Method.new_work`) and names the kernels that the frame
@@ -33,7 +33,7 @@ from heelstrike.sim.setting import OPEN_LOOP, Setting
 
 
 class Method(ABC):
-    """A way through time: :class:`~heelstrike.TimeStepping` and its like.
+    """A simulation method: :class:`~heelstrike.TimeStepping` and its like.
 
     A new one is a frozen dataclass, and may live outside this package. It has
 

@@ -152,16 +152,16 @@ class SolverCount:
     """Steps that were asked for less than to leave the ground and to bounce: in a wedge."""
 
     def __str__(self) -> str:
-        backed = f" with {self.fallbacks} fallbacks" if self.fallbacks else ""
-        counts = {
-            "by the modes of the step before": self.shortcuts,
-            f"by {self.name}{backed}": self.solves - self.shortcuts - self.failures,
-            "unsolved": self.failures,
-            "by combinations of modes, or not even so": self.combinations,
-            "steps left in a wedge": self.relaxed,
+        if not self.solves:
+            return "none"
+        notes = {
+            "not certified": self.failures,
+            "needed another solver": self.fallbacks,
+            "by trying combinations of contact modes": self.combinations,
+            "steps with a wedged point left in place": self.relaxed,
         }
-        parts = ", ".join(f"{count} {how}" for how, count in counts.items() if count)
-        return f"{self.solves}: {parts}" if parts else "none"
+        told = [f"{count} {what}" for what, count in notes.items() if count]
+        return ", ".join([str(self.solves), *([] if self.failures else ["all certified"]), *told])
 
 
 @dataclass(frozen=True)

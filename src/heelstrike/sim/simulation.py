@@ -94,7 +94,7 @@ class Simulation:
         Where the robot starts; or a simulation to go on with, such as ``run.final``: its time,
         contact modes, pushes, ground and the memory of its controller are those of the snapshot.
     method : Method
-        Way through time; ``TimeStepping()`` by default.
+        Simulation method; ``TimeStepping()`` by default.
     ground : Ground
         The ground; flat with μ = 0.75 and no restitution by default.
     control_period : float, optional
@@ -332,10 +332,10 @@ class Simulation:
             at = contact_kinematics(self.robot, self._memory.q, self._memory.v, ground)
             point = int(np.argmax(deep))
             raise SimulationError(
-                f"this ground would lie {deep[point]:.3g} m above contact point "
+                f"this ground would be {deep[point]:.3g} m above contact point "
                 f"{self.robot.contact_names[point]!r}; lower it by "
-                f"{float(np.max(deep / at.normal[:, 1])):.3g} m, or lay it before "
-                "the robot is there"
+                f"{float(np.max(deep / at.normal[:, 1])):.3g} m, or raise "
+                "the robot first"
             )
         self._check(replace(self._setting, ground=ground, state=self.state))
         mine, its = self._ground.numbers(), ground.numbers()
@@ -441,8 +441,8 @@ class Simulation:
         for each in added:
             if each.end < self.time:
                 raise SimulationError(
-                    f"the push on {each.link!r} would be over since t = {each.end:.6g} s: now is "
-                    f"{self._now}. Let it start later"
+                    f"the push on {each.link!r} ends at t = {each.end:.6g} s, before the present "
+                    f"time, {self._now}: let it start later"
                 )
         self._pushes += added
         pushes = pushes_on(self.robot, self._pushes)
@@ -498,7 +498,9 @@ class Simulation:
             self.method.check_span(self._setting, max(until - self.time, 0.0))
             instant = self.method.instant(self._clock, until)
         if instant < self.time:
-            raise SimulationError(f"until must be a time from now, {self._now}, on; got {until}")
+            raise SimulationError(
+                f"until must not be before the present time, {self._now} s; got {until}"
+            )
         return self._advance(instant, NEVER, progress)
 
     def _advance(
@@ -720,7 +722,10 @@ class Simulation:
             record = allocate_record(self.robot, rows, 256 + 2 * clock.event_margin, words)
         except MemoryError as error:
             if not self._records:
-                raise SimulationError("there is no memory left to record anything in") from error
+                raise SimulationError(
+                    "there is no memory left for the record; use a larger record_every, or "
+                    "the simulation's forget() from time to time"
+                ) from error
             self.error = error
             return (
                 f"stopped at {self._now}: there is no memory left to record more; what was "
@@ -746,8 +751,8 @@ class Simulation:
                 setting = replace(setting, control_period=own_period)
         elif law is not None and law.keeps_period and setting.control_period != law.period:
             raise ControllerError(
-                f"controller {law.function.name!r} keeps time by its own period of {law.period} s: "
-                f"leave control_period = {setting.control_period} s out, or make it with that one"
+                f"controller {law.function.name!r} has its own period of {law.period} s: leave "
+                f"control_period = {setting.control_period} s out, or give it that period"
             )
         python: Any = controller if law is None else None
         if law is not None and controller is not None:
@@ -760,8 +765,8 @@ class Simulation:
         ready = ReadyLaw(robot, compiled, memory.equations.tree, memory.contacts, begin)
         if self._records and self._records[-1].log.shape[1] != ready.control.logged.size:
             raise SimulationError(
-                "this controller logs other things than the one before, and rows are recorded: "
-                "begin another simulation with it, from state=simulation.state"
+                "this controller has another log than the one before, and rows are recorded: "
+                "start a new simulation with it, from state=simulation.state"
             )
         ready.control.function[:] = compiled.function.words
         _ = ready.control.address
@@ -1083,7 +1088,7 @@ def check_duration(duration: float) -> None:
 
 
 def checked_method(method: Method | None) -> Method:
-    """Return a way through time, time stepping if none is asked for, or refuse what is none."""
+    """Return a simulation method, time stepping if none is asked for, or refuse what is none."""
     if method is None:
         return _USUAL
     if isinstance(method, UnknownMethod):
@@ -1093,7 +1098,7 @@ def checked_method(method: Method | None) -> Method:
         )
     if not isinstance(method, Method):
         raise SimulationError(
-            f"method must be a way through time such as TimeStepping(), got {method!r}"
+            f"method must be a simulation method such as TimeStepping(), got {method!r}"
             + (f"; write {method.__name__}()" if isinstance(method, type) else "")
         )
     return method

@@ -137,5 +137,5 @@ def test_trials_that_are_refused() -> None:
     with pytest.raises(hs.SimulationError, match="trunk that floats; 'compass_gait'"):
         dataclasses.replace(trial(), robot=hs.load_robot("compass_gait"))
     stairs = hs.Ground.stairs(rise=0.01, tread=0.3, count=2)
-    with pytest.raises(hs.SimulationError, match="own ground must be level"):
+    with pytest.raises(hs.SimulationError, match="ground of a trial must be level"):
         hs.largest_slope(dataclasses.replace(trial(), ground=stairs), uphill=True)

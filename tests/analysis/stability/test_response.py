@@ -175,7 +175,7 @@ def test_disturbances_that_are_none(given: Any, said: str) -> None:
 def test_a_fixed_step_does_not_tell_durations() -> None:
     """Touchdowns fall on its steps: any small disturbance would seem to do nothing to them."""
     robot, cycle = compass()
-    with pytest.raises(hs.SimulationError, match="touchdowns fall on steps"):
+    with pytest.raises(hs.SimulationError, match="touchdown times are rounded to steps"):
         hs.disturbance_response(
             robot, cycle.state, disturbances={"push": (pushed, 1e-4)}, ground=RAMP,
             method=hs.TimeStepping(),

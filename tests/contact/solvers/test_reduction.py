@@ -16,8 +16,8 @@ def reduced_to(delassus: Floats, free: Floats, friction: Floats, mode: Integers)
     """Write the scaled problem with its matrix."""
     count, work = len(friction), contact_workspace(len(friction))
     problem = contact_problem(count, count=count, delassus=delassus, free=free, friction=friction)
-    uncompiled(reduce_problem)(problem, mode, work.yardstick.slope, work.reduced)
-    uncompiled(scale_matrix)(problem, work.yardstick.slope, work.reduced)
+    uncompiled(reduce_problem)(problem, mode, work.scaling.slope, work.reduced)
+    uncompiled(scale_matrix)(problem, work.scaling.slope, work.reduced)
     return work.reduced
 
 

@@ -192,9 +192,9 @@ def test_snapshots_take_the_clock_along() -> None:
     [
         ({"margin": 0.1}, "less than half the sole of robot 'bravo7', 0.1 m"),
         ({"margin": -0.01}, "margin must be"),
-        ({"slowest": 1.5}, "must lie about 1"),
+        ({"slowest": 1.5}, "slowest must be from 0 to 1"),
         ({"slowest": -0.5}, "never goes back"),
-        ({"fastest": 0.5}, "must lie about 1"),
+        ({"fastest": 0.5}, "slowest must be from 0 to 1"),
         ({"returning": 0.0}, "returning must be a positive number"),
         ({"hurry": np.inf}, "hurry must be a positive number"),
         ({"friction": -1.0}, "friction must be a positive number"),

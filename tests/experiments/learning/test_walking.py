@@ -103,7 +103,7 @@ def test_a_policy_in_the_loop_does_what_it_does_in_the_course(tmp_path: Any) -> 
     with pytest.raises(hs.ControllerError, match="observes"):
         hs.Policy(loaded, hs.load_robot("rabbit"))
     plain = Network((layer,), 0.01, np.ones(nu), np.zeros(size), np.ones(size))
-    with pytest.raises(hs.ControllerError, match="told a speed"):
+    with pytest.raises(hs.ControllerError, match="no speed to set"):
         hs.Policy(plain, speed=0.3)
 
 

@@ -77,7 +77,7 @@ def test_both_planners_at_a_given_height(bravo7: hs.Robot) -> None:
         ({"corrections": -1}, "whole number from 0 to 10"),
         ({"step_length": 1.9}, "too short for steps of 1.9 m"),
         ({"height": 1.2}, "do not reach with the centre of mass at 1.2 m"),
-        ({"friction": 0.02}, "the ground would have to pull, or to hold more than friction"),
+        ({"friction": 0.02}, "the ground would have to pull, or friction to exceed"),
     ],
 )
 def test_what_cannot_be_is_said(bravo7: hs.Robot, change: dict[str, Any], words: str) -> None:
@@ -87,5 +87,5 @@ def test_what_cannot_be_is_said(bravo7: hs.Robot, change: dict[str, Any], words:
 
 def test_other_robots_are_refused() -> None:
     for name in ("rabbit", "compass_gait"):
-        with pytest.raises(hs.GaitError, match=f"robot '{name}' is another"):
+        with pytest.raises(hs.GaitError, match=f"robot '{name}' differs"):
             hs.plan_motion(hs.load_robot(name), **STEP)

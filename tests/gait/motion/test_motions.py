@@ -229,7 +229,7 @@ def test_saved_and_read_back_unchanged(
         ({"phases": [hs.ContactPhase("right_paw")]}, "no foot or contact point 'right_paw'"),
         ({"phases": [hs.ContactPhase()]}, "in which something stands"),
         ({"repeat": "sometimes"}, "'mirrored', 'same', 'never'"),
-        ({"repeat": "never", "speed": None}, "needs the state at its start"),
+        ({"repeat": "never", "speed": None}, "needs start, and may have end"),
         ({"speed": None}, "give the distance or the speed"),
         ({"speed": -1.0}, "speed must be positive"),
         ({"duration": 0.4, "distance": 0.3}, "not all three"),

@@ -1,4 +1,4 @@
-"""Compliant ground as a way through time: walks, events, endings, arguments."""
+"""Compliant ground as a simulation method: walks, events, endings, arguments."""
 
 from __future__ import annotations
 

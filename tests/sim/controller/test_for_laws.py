@@ -158,7 +158,7 @@ def test_a_checked_law_computes_the_same_in_python_and_when_queries_are_compiled
         (2, "writes to memory.short[2, 0], beyond its shape (2, 9)"),
         (3, "reads state.joint_position[6], beyond its shape (6,)"),
         (4, "writes to memory.jacobian[3, 0], beyond its shape (3, 9)"),
-        (5, "writes to contacts.position[1][0]: only its torque and its memory are its own"),
+        (5, "writes to contacts.position[1][0]: it may write only to torque, memory, log and"),
     ],
 )
 def test_a_checked_law_is_caught_at_its_300th_call(fault: int, words: str) -> None:

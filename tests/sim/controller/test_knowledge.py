@@ -60,7 +60,7 @@ def test_a_stock_law_keeps_to_the_robot_it_was_made_for() -> None:
 
 def test_a_robot_built_otherwise_is_refused() -> None:
     robot = walking.bravo7()
-    with pytest.raises(hs.ControllerError, match="built otherwise"):
+    with pytest.raises(hs.ControllerError, match="structure differs"):
         hs.simulate(
             robot, bears(robot=hs.load_robot("rabbit")), state=robot.reference_state(), duration=0.1
         )

@@ -1,4 +1,4 @@
-"""EventDriven as a way through time: its options, controllers, records, and bravo7's walk."""
+"""EventDriven as a simulation method: its options, controllers, records, and bravo7's walk."""
 
 from __future__ import annotations
 

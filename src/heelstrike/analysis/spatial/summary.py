@@ -233,14 +233,14 @@ LINES = {
     "friction use": "{s.friction_use_max:.3} of the cone",
     "slip": "{s.slip_max_m:.2} m",
     "penetration": "{s.penetration_max_m:.2} m",
-    "contact problems": "{s.solver.solves} solved, {s.solver.shortcuts} by known modes, "
-    "{s.solver.fallbacks} by another way, {s.solver.failures} failed; residual {s.residual_max:.2}",
-    "steps not certified": "{s.uncertified} to 1e-9; {s.halved} halved; {s.relaxed} not asked to "
-    "leave the ground (in wedges)",
-    "energy made by impacts": "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
+    "contact problems": "{s.solver.solves}, {s.solver.failures} not certified, "
+    "{s.solver.fallbacks} needed another way; residual {s.residual_max:.2}",
+    "steps not certified": "{s.uncertified} to 1e-9; {s.halved} halved; {s.relaxed} with a wedged "
+    "point left in place",
+    "energy created by impacts": "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
     "torque cost": "{s.torque_cost_N2m2s:.4} N²m²s",
     "cost of transport": "{s.cost_of_transport:.3} "
-    "({s.cost_of_transport_positive:.3} positive work)",
+    "({s.cost_of_transport_positive:.3} by positive work alone)",
     "torques at their limit": "{s.saturations}",
     "computing time": "{s.wall_s:.3} s ({s.real_time_factor:.3} × real time), "
     "compilation {s.compile_s:.3} s",
@@ -251,7 +251,7 @@ def spatial_lines(s: SpatialSummary) -> list[tuple[str, str]]:
     """Label and value of every line of the table a person reads."""
     write = Words().format
     needless = {
-        "energy made by impacts": not s.energy_gain_J > 0.0,
+        "energy created by impacts": not s.energy_gain_J > 0.0,
         "turn": not np.isfinite(s.turn_rad),
     }
     return [

@@ -152,7 +152,7 @@ def floquet_multipliers(
     ground : Ground
         Level or sloping ground; ``Ground()`` by default.
     method : Method
-        Way through time; ``TimeStepping()`` by default.
+        Simulation method; ``TimeStepping()`` by default.
     control_period : float, optional
         As of :func:`~heelstrike.simulate`.
     settling : int

@@ -277,7 +277,7 @@ def _walks_on(trial: Trial, ground: Ground, *, same_speed: bool) -> bool:
 def _friction(trial: Trial) -> float:
     friction = trial.ground.model().friction
     if len(friction) > 1:
-        raise SimulationError("a trial's own ground must be level: disturbances lay other ground")
+        raise SimulationError("the ground of a trial must be level: the disturbances change it")
     return float(friction[0])
 
 

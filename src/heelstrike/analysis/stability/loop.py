@@ -152,7 +152,7 @@ class ClosedLoop:
         chosen = [first + k * feet for k in range(returns + 1)]
         if len({landings[place][1] for place in chosen}) > 1:
             raise LimitCycleError(
-                f"the feet of {self.robot.name!r} do not come down in turn, so that no step repeats"
+                f"the feet of {self.robot.name!r} do not land in turn, so no step repeats"
             )
         simulation, begins = self.fresh(), []
         middle = self.sampled(0.5 * (landings[first][0] + landings[first + 1][0]))
@@ -192,8 +192,9 @@ class ClosedLoop:
                 return steps
             if len(steps) == before:
                 raise LimitCycleError(
-                    f"robot {self.robot.name!r} takes no step from t = "
-                    f"{simulation.time - longest:.6g} s on, in {longest:.6g} s (longest_step)"
+                    f"robot {self.robot.name!r} takes no step within {longest:g} s from t "
+                    f"= {simulation.time - longest:.4g} s on; if its steps are longer, "
+                    "raise longest_step"
                 )
 
 

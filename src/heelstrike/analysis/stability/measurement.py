@@ -112,10 +112,10 @@ def measure(
         off = (found[0].matrix @ found[0].begins - hardly)[: section.of_robot]
         if np.linalg.norm(off) > SAME * np.linalg.norm(found[0].begins[: section.of_robot]):
             raise LimitCycleError(
-                f"disturbances of {size:.3g} are too large for the samples of the controller, "
-                f"every {loop.grid:.3g} s. The walk keeps step with them: of being early by less "
-                "than one nothing stays, of being early by one everything, and disturbances of "
-                f"this size are both. disturbance={min(SMOOTH, 0.1 * size):.3g} tells how small "
-                "errors die"
+                f"a disturbance of {size:g} is too large: the controller is called every "
+                f"{loop.grid:g} s, and the walk keeps step with these calls. It corrects "
+                "an error in time of less than one call, and keeps an error of one "
+                "call; this disturbance mixes both. Use "
+                f"disturbance={min(SMOOTH, 0.1 * size):g}"
             )
     return Measurement(size, section, found, stays_early(loop, section, walk), hardly is not None)

@@ -95,8 +95,8 @@ class Monodromy:
         last = self.motion.arrival
         if last is None:
             raise SimulationError(
-                "several contact points come down at once at the end of this step: what a higher "
-                "foothold does to it has no derivative"
+                "several contact points land at once at the end of this step, so its "
+                "response to a higher foothold has no derivative"
             )
         crossing = float(last.gradient @ last.before)
         struck = last.impact.reset @ last.before
@@ -157,7 +157,7 @@ def monodromy(
     ground : Ground
         Flat or sloping ground; ``Ground()`` by default.
     method : EventDriven
-        Way through time, ``EventDriven(rtol=1e-12, atol=1e-13)`` by default.
+        Simulation method, ``EventDriven(rtol=1e-12, atol=1e-13)`` by default.
     landing, symmetry, longest_step
         As of :func:`~heelstrike.find_limit_cycle`.
 

@@ -68,7 +68,9 @@ def step_duration(run: Run) -> float:
     """
     steps = steps_of(run.robot, run.events, float(run.time[0]))
     if len(steps) < 2:
-        raise LimitCycleError("a disturbed walk has not taken two steps in a return")
+        raise LimitCycleError(
+            "a disturbed walk took fewer than two steps in a return; use a smaller disturbance"
+        )
     return steps[-1][0] - steps[-2][0]
 
 
@@ -276,9 +278,9 @@ def disturbance_response(
     counts_steps = loop.simulation.method.step_length is not None
     if counts_steps and indicator is step_duration:
         raise SimulationError(
-            "with a fixed step touchdowns fall on steps, and their times do not tell small "
-            "disturbances: simulate with method=hs.EventDriven(), or give an indicator= that "
-            "does not count steps"
+            "with a fixed step, touchdown times are rounded to steps and do not show "
+            "small disturbances: use method=hs.EventDriven(), or give an indicator= "
+            "that does not count steps"
         )
     walk = loop.follow(settling, returns, longest_step)
     found = measure(loop, walk, disturbance, indicator=indicator)

@@ -61,7 +61,7 @@ class Trial:
     """step_length, step_duration: Of a step of that walk, in m and s. Of a robot that stands the
     length is zero; the duration then counts the time before a disturbance, and its phase."""
     method: Method = field(default_factory=lambda: TimeStepping(step=1e-3))
-    """Way through time; ``TimeStepping(step=1e-3)`` by default."""
+    """Simulation method; ``TimeStepping(step=1e-3)`` by default."""
     ground: Ground = field(default_factory=Ground)
     """The ground it walks on undisturbed, level."""
     undisturbed: int = 2
@@ -82,8 +82,8 @@ class Trial:
         check_fields(self, SimulationError)
         if not self.robot.floating:
             raise SimulationError(
-                f"trials of balance need a robot with a trunk that floats; {self.robot.name!r} is "
-                "none"
+                "a trial of balance needs a robot with a floating trunk; "
+                f"{self.robot.name!r} has none"
             )
         for name in ("step_duration", "settling", "pitch"):
             value = getattr(self, name)
@@ -91,8 +91,8 @@ class Trial:
                 raise SimulationError(f"{name} of a trial must be positive, got {value!r}")
         if not (np.isfinite(self.step_length) and self.step_length >= 0.0):
             raise SimulationError(
-                f"step_length of a trial must not be negative, got {self.step_length!r}; zero is "
-                "that of a robot that stands"
+                f"step_length of a trial must not be negative, got {self.step_length!r}; "
+                "use zero for a robot that stands"
             )
 
     @property
@@ -150,9 +150,7 @@ class Trial:
             bounce = self.ground.restitution if restitution is None else restitution
             return replace(self.ground, friction=mu, restitution=bounce)
         if len(own.friction) > 1:
-            raise SimulationError(
-                "a trial's own ground must be level: disturbances lay other ground"
-            )
+            raise SimulationError("the ground of a trial must be level: the disturbances change it")
         if not abs(slope) < 0.5 * np.pi:
             raise SimulationError(f"the slope must lie within ±π/2 rad, got {slope}")
         mu = float(own.friction[0]) if friction is None else friction

@@ -292,7 +292,8 @@ def chosen_numbers(names: Sequence[str]) -> tuple[tuple[str, ...], bool]:
     wrong = [name for name in names if name not in known]
     if wrong or len(set(names)) < len(names):
         raise SimulationError(
-            f"derivatives are known by {', '.join(known)}, each once; got {', '.join(names)}"
+            f"derivatives exist with respect to {', '.join(known)}, each named once; got "
+            f"{', '.join(names)}"
         )
     return tuple(name for name in names if name != FRICTION), FRICTION in names
 

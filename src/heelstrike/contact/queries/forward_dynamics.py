@@ -154,8 +154,8 @@ def _touching(robot: Robot, kinematics: ContactKinematics) -> list[int]:
     coming = [robot.contact_names[i] for i in np.flatnonzero(touches & (speed < -STANDING_SPEED))]
     if coming:
         raise ContactProblemError(
-            f"robot {robot.name!r}: {', '.join(coming)} come down on the ground. That is an "
-            "impact, and there is no acceleration at it; simulate it, or ask for a state before "
-            "or after."
+            f"robot {robot.name!r}: {', '.join(coming)} would land on the ground. That is "
+            "an impact, which has no acceleration; simulate it, or ask for a state "
+            "before or after."
         )
     return [int(i) for i in np.flatnonzero(touches & (speed <= STANDING_SPEED))]

@@ -121,7 +121,7 @@ def _lift(robot: Robot) -> int:
         if slides and model.axis[joint, 1] == 0.0 and carried and all(carried):
             return joint
     raise RobotError(
-        f"robot {robot.name!r} cannot be put on the ground, for it "
+        f"robot {robot.name!r} cannot be put on the ground: it "
         + ("has no joint that lifts all of it." if robot.nc else "has no contact points.")
     )
 

@@ -30,9 +30,9 @@ from heelstrike.contact.workspace import (
     Floats,
     Integers,
     ReducedProblem,
+    Scaling,
     Settings,
     Tally,
-    Yardstick,
 )
 from heelstrike.dynamics.dense import eliminate
 
@@ -137,7 +137,7 @@ def expand(
 @kernel
 def evaluate(
     problem: ContactProblem, settings: Settings, reduced: ReducedProblem, tally: Tally,
-    yardstick: Yardstick, equations: Equations, trial: ContactAnswer,
+    scaling: Scaling, equations: Equations, trial: ContactAnswer,
 ) -> float:  # fmt: skip
     """Find the impulse of the modes under trial and return its largest residual.
 
@@ -147,7 +147,7 @@ def evaluate(
     for contact in range(problem.count):
         if problem.set[contact] == LINE:
             trial.mode[contact] = STICK
-    assemble(problem, trial.mode, yardstick.slope, reduced, equations)
+    assemble(problem, trial.mode, scaling.slope, reduced, equations)
     symmetric = settings.skewed == 0
     for j in range(equations.size):
         symmetric = symmetric and equations.lean[j] == 0.0
@@ -163,24 +163,24 @@ def evaluate(
     held = not symmetric  # whether directions that change a velocity are held back
     if singular:
         held = split(problem, trial.mode, held, reduced, tally, equations)
-    worst = prove(problem, settings, reduced.tangent, point, yardstick, trial)
-    if singular and held and not worst < PROMISING * (1.0 + yardstick.effort):
+    worst = prove(problem, settings, reduced.tangent, point, scaling, trial)
+    if singular and held and not worst < PROMISING * (1.0 + scaling.effort):
         # The slip speed is not unique, and what the elimination left it at does not do.
         split(problem, trial.mode, False, reduced, tally, equations)
-        worst = prove(problem, settings, reduced.tangent, point, yardstick, trial)
+        worst = prove(problem, settings, reduced.tangent, point, scaling, trial)
     for _ in range(REFINEMENTS):
-        if worst < max(SHARP, 4.0 * yardstick.rounding):
+        if worst < max(SHARP, 4.0 * scaling.rounding):
             break
-        if not worst < PROMISING * (1.0 + yardstick.effort):
+        if not worst < PROMISING * (1.0 + scaling.effort):
             break
         for j in range(equations.size):
             before[j] = point[j]
         refine(reduced, trial.velocity, equations)
-        sharper = prove(problem, settings, reduced.tangent, point, yardstick, trial)
+        sharper = prove(problem, settings, reduced.tangent, point, scaling, trial)
         if not sharper < worst:
             for j in range(equations.size):
                 point[j] = before[j]
-            return prove(problem, settings, reduced.tangent, point, yardstick, trial)
+            return prove(problem, settings, reduced.tangent, point, scaling, trial)
         worst = sharper
     return worst
 
@@ -188,11 +188,11 @@ def evaluate(
 @kernel
 def prove(
     problem: ContactProblem, settings: Settings, tangent: Integers, point: Floats,
-    yardstick: Yardstick, trial: ContactAnswer,
+    scaling: Scaling, trial: ContactAnswer,
 ) -> float:  # fmt: skip
     """Write the point out as an impulse and certify it; return its largest residual."""
-    expand(problem, point, yardstick.slope, tangent, trial)
-    return certify(problem, settings, yardstick, trial)
+    expand(problem, point, scaling.slope, tangent, trial)
+    return certify(problem, settings, scaling, trial)
 
 
 @kernel
@@ -230,14 +230,14 @@ def slip_of(problem: ContactProblem, contact: int, root: Floats, answer: Contact
 
 @kernel
 def label(
-    problem: ContactProblem, tangent: Integers, yardstick: Yardstick, answer: ContactAnswer
+    problem: ContactProblem, tangent: Integers, scaling: Scaling, answer: ContactAnswer
 ) -> bool:
     """Name every contact's mode from its velocity; return whether that is another problem.
 
     A contact that a solver calls open or slipping, but whose velocity is zero, may carry any
     impulse in its cone. Only with all of these admitted is the least-norm split unique.
     """
-    mode, velocity, root, rest = answer.mode, answer.velocity, yardstick.root, answer.rest
+    mode, velocity, root, rest = answer.mode, answer.velocity, scaling.root, answer.rest
     changed = False
     for contact in range(problem.count):
         row = problem.first[contact]
@@ -253,7 +253,7 @@ def label(
 
 
 @kernel
-def amend(
+def correct_modes(
     problem: ContactProblem, tangent: Integers, root: Floats, equations: Equations,
     trial: ContactAnswer,
 ) -> int:  # fmt: skip

@@ -24,7 +24,7 @@ from heelstrike.contact.modes import (
     UNDECIDABLE,
     WARM_START,
 )
-from heelstrike.contact.solvers.active_set import amend, evaluate, label
+from heelstrike.contact.solvers.active_set import correct_modes, evaluate, label
 from heelstrike.contact.solvers.combinations import (
     begin_combinations,
     next_combination,
@@ -47,18 +47,18 @@ from heelstrike.contact.workspace import (
     Integers,
     Iteration,
     ReducedProblem,
+    Scaling,
     Settings,
     StickingRows,
     Tally,
-    Yardstick,
 )
 
 NEARLY_SINGULAR = 1e-10
 """Pivots of the unit-diagonal matrix below this allow of impulses 1e5 times the data."""
 
-AMENDMENTS = 4
-"""How often modes that were guessed are amended before a solver is asked: for a sixth of its price,
-and six in seven guesses of feet that are set down and lifted come right."""
+MODE_CORRECTIONS = 4
+"""How often modes that were guessed are corrected before a solver is asked: for a sixth of its
+price, and six in seven guesses of feet that are set down and lifted come right."""
 
 ROUNDS = 6
 """How often modes are named after the velocities and tried again."""
@@ -78,19 +78,19 @@ def keep(problem: ContactProblem, trial: ContactAnswer, answer: ContactAnswer) -
 
 
 @kernel
-def is_doubtful(count: int, worst: float, tolerance: float, yardstick: Yardstick) -> bool:
+def is_doubtful(count: int, worst: float, tolerance: float, scaling: Scaling) -> bool:
     """Whether an answer fails its certificate only because its impulses cannot be written down.
 
     Rounding them changes velocities by more than the tolerance, and they miss by no more than that.
     """
-    rounding = UNIT_ROUNDOFF * yardstick.effort
+    rounding = UNIT_ROUNDOFF * scaling.effort
     return tolerance < worst and tolerance < rounding and worst <= count * rounding
 
 
 @kernel
-def is_clean(count: int, worst: float, settings: Settings, yardstick: Yardstick) -> bool:
+def is_clean(count: int, worst: float, settings: Settings, scaling: Scaling) -> bool:
     """Whether no better answer is to be had: the residual is nil, or the impulses are rounded."""
-    rounding = count * UNIT_ROUNDOFF * yardstick.effort if settings.patient == 0 else 0.0
+    rounding = count * UNIT_ROUNDOFF * scaling.effort if settings.patient == 0 else 0.0
     return worst <= min(settings.tolerance, max(CLEAN, rounding))
 
 
@@ -179,7 +179,7 @@ def seek(
 ) -> tuple[int, float]:
     """Try what a solver proposes until an answer is certified, and keep the best.
 
-    Of modes that were guessed and amended, or if patient, the answer has to be clean. Returns how
+    Of modes that were guessed and corrected, or if patient, the answer has to be clean. Returns how
     it ended, and the residual of the answer, which was ``best`` so far.
     """
     settings, tally, reduced = work.settings, work.tally, work.reduced
@@ -189,9 +189,11 @@ def seek(
     while True:
         if solver == WARM_START and call > 0:
             outcome = ITERATION_LIMIT
-            if call <= settings.amendments:
+            if call <= settings.corrections:
                 tally.iterations += 1
-                outcome = amend(problem, reduced.tangent, work.yardstick.root, equations, trial)
+                outcome = correct_modes(
+                    problem, reduced.tangent, work.scaling.root, equations, trial
+                )
         elif solver != WARM_START:
             outcome = propose(
                 solver, call, problem.count, best, answer.mode, reduced, tally, work.lemke,
@@ -200,7 +202,7 @@ def seek(
         if outcome != SOLVED:
             return outcome, best
         call += 1
-        worst = evaluate(problem, settings, reduced, tally, work.yardstick, equations, trial)
+        worst = evaluate(problem, settings, reduced, tally, work.scaling, equations, trial)
         if solver == COMBINATIONS:
             note_residual(problem.count, worst, trial.mode, work.combinations)
         # What a guess came to and was not believed for gives way, even if its residual is less.
@@ -210,7 +212,7 @@ def seek(
             keep(problem, trial, answer)
         if certified:
             return SOLVED, best
-        if is_clean(problem.count, worst, settings, work.yardstick):
+        if is_clean(problem.count, worst, settings, work.scaling):
             return SOLVED, best
 
 
@@ -224,14 +226,14 @@ def release(
     a candidate that is not quite a solution may become one. Returns whether the modes are those of
     the answer now, and its residual.
     """
-    reduced, yardstick, trial = work.reduced, work.yardstick, work.trial
+    reduced, scaling, trial = work.reduced, work.scaling, work.trial
     for _ in range(ROUNDS):
-        if not label(problem, reduced.tangent, yardstick, answer):
+        if not label(problem, reduced.tangent, scaling, answer):
             return True, best
         for contact in range(problem.count):
             trial.mode[contact] = answer.mode[contact]
         worst = evaluate(
-            problem, work.settings, reduced, work.tally, yardstick, work.equations, trial
+            problem, work.settings, reduced, work.tally, scaling, work.equations, trial
         )
         if not (worst < best or worst <= AS_GOOD):
             break
@@ -250,7 +252,7 @@ def try_solvers(
     """
     tally, reduced, tolerance = work.tally, work.reduced, work.settings.tolerance
     patient = work.settings.patient != 0
-    begin(problem, work.yardstick.slope, work.reduced, work.trial, answer)
+    begin(problem, work.scaling.slope, work.reduced, work.trial, answer)
     status = UNCERTIFIED
     best = math.inf
     with_fallbacks = order.shape[0] > 1
@@ -259,7 +261,7 @@ def try_solvers(
         if attempt >= 0:
             solver = order[attempt] if attempt < order.shape[0] else COMBINATIONS
         if attempt == 0:
-            scale_matrix(problem, work.yardstick.slope, reduced)
+            scale_matrix(problem, work.scaling.slope, reduced)
         elif attempt > 0 and status != SOLVED:
             tally.fallbacks += 1
             tally.last_fallbacks += 1
@@ -283,8 +285,8 @@ def try_solvers(
             status = outcome if outcome != SOLVED else UNCERTIFIED
     if status != SOLVED:
         tally.failures += 1
-        worst = certify(problem, work.settings, work.yardstick, answer)
-        if is_doubtful(problem.count, worst, tolerance, work.yardstick) or (
+        worst = certify(problem, work.settings, work.scaling, answer)
+        if is_doubtful(problem.count, worst, tolerance, work.scaling) or (
             with_fallbacks and nearly_singular(problem, reduced)
         ):
             status = UNDECIDABLE
@@ -336,5 +338,5 @@ def contact_workspace(capacity: int, *, ready: bool = True) -> ContactWorkspace:
         solvers=try_solvers.address,
     )
     work.settings.tolerance = 1e-9
-    work.settings.amendments = AMENDMENTS
+    work.settings.corrections = MODE_CORRECTIONS
     return work

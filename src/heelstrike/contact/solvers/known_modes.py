@@ -20,9 +20,9 @@ from heelstrike.contact.workspace import (
     ContactProblem,
     Floats,
     Integers,
+    Scaling,
     Settings,
     StickingRows,
-    Yardstick,
 )
 from heelstrike.dynamics.dense import solve_positive
 from heelstrike.tolerances import NO_PIVOT
@@ -327,7 +327,7 @@ def share_impulses(problem: ContactProblem, rows: StickingRows, answer: ContactA
 
 @dissolved_kernel
 def name_by_velocity(
-    problem: ContactProblem, pulled: Integers, yardstick: Yardstick, answer: ContactAnswer
+    problem: ContactProblem, pulled: Integers, scaling: Scaling, answer: ContactAnswer
 ) -> int:
     """Name what contacts do; return how many were open but at rest, or -1 if one slips.
 
@@ -336,7 +336,7 @@ def name_by_velocity(
     parts, nor where it comes nearer by so little that the answer is clean.
     """
     mode, velocity = answer.mode, answer.velocity
-    root, rest, first = yardstick.root, answer.rest, problem.first
+    root, rest, first = scaling.root, answer.rest, problem.first
     pressed, end = 0, 0
     for contact in range(problem.count):
         normal, end = end, row_of(contact + 1, first)
@@ -346,7 +346,7 @@ def name_by_velocity(
                 return -1
             continue
         if mode[contact] == OPEN and problem.set[contact] != LINE:
-            size = yardstick.unit * root[normal]
+            size = scaling.unit * root[normal]
             moves = velocity[normal] >= -CLEAN * size and abs(velocity[normal]) > BARELY * size
             pressed += not (moves and pulled[contact] == 1)
         mode[contact] = STICK
@@ -362,7 +362,7 @@ def repeat(
     problem: ContactProblem,
     settings: Settings,
     rows: StickingRows,
-    yardstick: Yardstick,
+    scaling: Scaling,
     answer: ContactAnswer,
 ) -> bool:
     """Solve the contact problem if its contacts do nearly what their modes say; return success.
@@ -384,8 +384,8 @@ def repeat(
         if changed < 0:
             return False
         if changed == 0:
-            worst = certify(problem, settings, yardstick, answer)
-            changed = name_by_velocity(problem, rows.pulled, yardstick, answer)
+            worst = certify(problem, settings, scaling, answer)
+            changed = name_by_velocity(problem, rows.pulled, scaling, answer)
             if changed == 0 and worst <= min(settings.tolerance, AS_GOOD):
                 return True
             if changed <= 0 and solved != MAY_DRIFT:

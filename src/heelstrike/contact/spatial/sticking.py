@@ -123,7 +123,7 @@ def hold(size: int, scaled: ScaledBlocks, newton: NewtonSystem, x: Floats) -> bo
 
 
 @kernel
-def amend_modes(problem: BlockProblem, iterate: Iterate) -> int:
+def correct_modes(problem: BlockProblem, iterate: Iterate) -> int:
     """Open what pulls and close what sinks; return how many blocks changed."""
     changed = 0
     for block in range(problem.count):
@@ -156,6 +156,6 @@ def try_sticking(
         look(problem, scaled, iterate)
         if iterate.worst <= STUCK:
             return True
-        if amend_modes(problem, iterate) == 0:
+        if correct_modes(problem, iterate) == 0:
             return False
     return False

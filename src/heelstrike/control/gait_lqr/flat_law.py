@@ -177,8 +177,9 @@ class FlatGaitLQR(Law):
         orbit = FlatOrbit(robot, gait)
         if not orbit.misses < REPEATS:
             raise ControllerError(
-                f"the impact of robot {robot.name!r} at the end of this gait misses its beginning "
-                f"by {orbit.misses:.2g} rad or rad/s; design one with optimize_gait"
+                f"the impact of robot {robot.name!r} at the end of this gait does not lead "
+                f"to its start: it is {orbit.misses:.2g} rad or rad/s off. Design a gait "
+                "with optimize_gait"
             )
         duration = gait.step_duration
         count = None if period is None else _calls(period, duration)
@@ -191,7 +192,9 @@ class FlatGaitLQR(Law):
         self.multipliers: NDArray[np.complex128] = multipliers_of(orbit.jump @ step)
         self.either = tuple(float(abs(multipliers_of(each @ step)[0])) for each in orbit.jumps)
         if not np.all(np.abs(self.multipliers) < 1.0):
-            raise ControllerError("no regulator makes this walk repeat; try other weights")
+            raise ControllerError(
+                "no stabilising regulator was found for this walk; try other weights"
+            )
         mirror = robot.mirror
         assert mirror is not None  # see pitch_of
         driven = mirror.among(robot.model.actuator_joint)

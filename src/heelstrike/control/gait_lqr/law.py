@@ -209,7 +209,9 @@ class GaitLQR(Law):
         step = fine.over_a_step(gains(fine.theta) @ fine.basis)
         self.multipliers = multipliers_of(step)
         if not np.all(np.abs(self.multipliers) < 1.0):
-            raise ControllerError("no regulator makes this walk repeat; try other weights")
+            raise ControllerError(
+                "no stabilising regulator was found for this walk; try other weights"
+            )
         self.gait = gait
         size = robot.nv - 2
         whole = np.zeros((NODES, robot.nu, 2 * robot.nv))

@@ -108,8 +108,8 @@ def orbit_of(gait: PhasedGait) -> Orbit:
     speed = gait.joints(end.after, order=1) - end.velocity[driven] / end.rate
     if max(np.abs(place).max(), np.abs(speed).max()) > INVARIANT:
         raise ControllerError(
-            f"the impact of robot {gait.robot.name!r} at the end of this gait does not lead to its "
-            "beginning: hs.make_invariant(gait) changes it so that it does"
+            f"the impact of robot {gait.robot.name!r} at the end of this gait does not "
+            "lead to its start; hs.make_invariant(gait) corrects that"
         )
     first, last = end.after, end.before
     theta = nodes(first, last)

@@ -39,4 +39,7 @@ def over_all_steps(jump: Floats, sweep: Callable[[Floats], tuple[Floats, Floats]
         if abs(size - before) <= SETTLED * size:
             return kept
         before = size
-    raise ControllerError("no regulator makes this walk repeat: its motors do not reach enough")
+    raise ControllerError(
+        "no regulator stabilises this walk: its motors do not control all of its errors. "
+        "Design another gait"
+    )

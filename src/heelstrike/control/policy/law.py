@@ -298,7 +298,9 @@ class Policy(Law):
                 )
         reference = network.reference
         if speed is not None and reference is None:
-            raise ControllerError("this policy follows no motion: it cannot be told a speed")
+            raise ControllerError(
+                "this policy follows no motion, so it has no speed to set: leave speed out"
+            )
         if speed is None:
             speed = 0.0 if reference is None else float(reference.speed[0])
         if not (np.isfinite(speed) and np.isfinite(phase)):

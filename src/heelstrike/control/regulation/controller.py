@@ -148,8 +148,8 @@ def _check_numbers(
         )
     if not 0.0 <= rates[0] <= 1.0 <= rates[1]:
         raise ControllerError(
-            f"the clock's rate is 1 as it begins, and the clock never goes back; slowest and "
-            f"fastest must lie about 1, from 0 on, got {rates[0]!r} and {rates[1]!r}"
+            f"slowest must be from 0 to 1 and fastest at least 1, since the clock starts at rate 1 "
+            f"and never goes back; got {rates[0]!r} and {rates[1]!r}"
         )
     for name, value in chosen.items():
         positive(name, value)

@@ -61,7 +61,7 @@ def drive_of(robot: Robot) -> Drive:
         if model.loops + model.couplings:
             raise RobotError(
                 f"robot {robot.name!r}: every joint has a motor, and "
-                f"{', '.join([*robot.loop_names, *robot.coupling_names])} bind them to each other."
+                f"{', '.join([*robot.loop_names, *robot.coupling_names])} connect them."
             )
         return Drive(driven, (), ())
     from scipy.linalg import qr  # for robots with such joints alone
@@ -74,13 +74,13 @@ def drive_of(robot: Robot) -> Drive:
     whole = int(np.linalg.matrix_rank(jacobian, tol=INDEPENDENT * max(size.max(initial=1.0), 1.0)))
     if rank < len(following):
         raise RobotError(
-            f"robot {robot.name!r}: without a motor: {names}. The robot's closed loops and "
+            f"robot {robot.name!r}: these joints have no motor: {names}. Closed loops and "
             f"couplings leave {len(following) - rank} of them free."
         )
     if whole > rank:
         raise RobotError(
-            f"robot {robot.name!r}: the closed loops and couplings bind joints with motors to each "
-            f"other, beside those without: {names}."
+            f"robot {robot.name!r}: closed loops and couplings connect driven joints with each "
+            f"other, and not only with those without a motor: {names}."
         )
     return Drive(driven, following, tuple(sorted(order[:rank].tolist())))
 

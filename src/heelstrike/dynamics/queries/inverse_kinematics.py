@@ -79,8 +79,8 @@ def inverse_kinematics(
     joints = leg_joints(robot)[index]
     if not joints:
         raise RobotError(
-            f"robot {robot.name!r}: no actuated joint moves foot {robot.feet[index].name!r} alone; "
-            "there is no leg whose joints could be found"
+            f"robot {robot.name!r}: no actuated joint moves foot {robot.feet[index].name!r} "
+            "alone, so it has no leg to solve for"
         )
     pose = np.full(3, np.nan)
     given = np.asarray(target, dtype=np.float64)

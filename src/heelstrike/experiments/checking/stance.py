@@ -69,7 +69,10 @@ def placed(robot: Robot, motion: RecordedMotion) -> Placed:
         raise GaitError(f"robot {robot.name!r}: a check needs two feet, and all joints driven")
     soles = [sole(robot, foot) for foot in (0, 1)]
     if not all(each.flat for each in soles):
-        raise GaitError(f"robot {robot.name!r}: a check needs flat feet, which hold the trunk")
+        raise GaitError(
+            f"robot {robot.name!r}: a check needs flat feet; on point feet the trunk does not "
+            "follow from the joints"
+        )
     count = max(int(motion.time[-1] / SPACING), 2) + 1
     time = np.linspace(0.0, float(motion.time[-1]), count)
     stance = _stance(robot, CubicSpline(motion.time, motion.position)(time), time)

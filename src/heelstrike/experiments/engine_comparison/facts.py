@@ -33,7 +33,7 @@ class Facts:
 
 FACTS: dict[str, Facts] = {
     "heelstrike": Facts(
-        "Python", "own, three ways through time", "Matplotlib, browser", "Apache-2.0",
+        "Python", "own, three methods", "Matplotlib, browser", "Apache-2.0",
         "Linux, macOS, Windows", "yes", "yes",
         "hard, complementarity; or compliant", "exact", "yes",
         "residuals of every solve, from its data",

@@ -40,7 +40,7 @@ class SceneRow:
     scene: str
     """Name of the scene."""
     engine: str
-    """Name of the row's engine, or of our way through time."""
+    """Name of the row's engine, or of our simulation method."""
     title: str
     """What tables call it."""
     error: float | None

@@ -405,7 +405,7 @@ def our_scene_error(scene: Scene, method: Method) -> float:
     scene : Scene
         The scene.
     method : Method
-        The way through time.
+        The simulation method.
     """
     run = scene.scenario.run(method)
     return scene.measured(run.position[-1], run.velocity[-1]) - scene.exact

@@ -60,10 +60,10 @@ def links(robot: Robot, *, least_radius: float = 0.0) -> list[Link]:
     model = robot.model
     refuse_loops(robot, "what hands robots over to other engines", InvalidRunError)
     if np.any(model.friction_scale != 1.0):
-        raise InvalidRunError("friction of single contact points is not handed over")
+        raise InvalidRunError("this engine is not given friction of single contact points")
     for name in ("stiffness", "dry_friction"):
         if np.any(getattr(model, name)):
-            raise InvalidRunError(f"{name} of joints is not handed over")
+            raise InvalidRunError(f"this engine is not given {name.replace('_', ' ')} of joints")
 
     def points(link: int) -> tuple[tuple[Floats, float], ...]:
         found = []

@@ -165,11 +165,11 @@ class MuJoCoPeer(Peer):
 
 def _spec(scenario: Scenario) -> Any:
     if scenario.robot.model.latches:
-        raise InvalidRunError("latches of joints are not handed over")
+        raise InvalidRunError("this engine is not given latches of joints")
     if scenario.robot.model.brakes:
-        raise InvalidRunError("brakes of joints are not handed over")
+        raise InvalidRunError("this engine is not given brakes of joints")
     if np.any(scenario.robot.model.friction_scale != 1.0):
-        raise InvalidRunError("friction of single contact points is not handed over")
+        raise InvalidRunError("this engine is not given friction of single contact points")
     with tempfile.TemporaryDirectory() as folder:
         file = scenario.robot.save(Path(folder) / "robot.xml")
         spec = mujoco.MjSpec.from_file(str(file))

@@ -47,7 +47,7 @@ class Scenario:
         Parameters
         ----------
         method : Method
-            Way through time.
+            Simulation method.
         controller : controller, optional
             Instead of the scenario's own law.
         record_every : int

@@ -292,7 +292,7 @@ class ScriptedPeer(ServedPeer):
 
     def __init__(self, scenario: Scenario, step: float, **settings: Any) -> None:
         if not scenario.robot.floating:
-            raise InvalidRunError("only robots that float are handed over to this engine")
+            raise InvalidRunError("this engine is given robots with a floating trunk only")
         python, _ = other_python(self.module)
         if not python:
             raise InvalidRunError(f"no Python here has the module {self.module}")

@@ -71,8 +71,8 @@ def told_task(about: Mapping[str, str]) -> LearningTask:
     file = about.get("task")
     if file is None:
         raise SimulationError(
-            "this policy does not tell what it was trained for: its file has no about.task, such "
-            "as the text gymnasium:walker2d_v5.xml"
+            "the file of this policy does not say what it was trained for: it has no "
+            "about.task, such as the text gymnasium:walker2d_v5.xml"
         )
     if file == WALK:
         return WalkTask.told(about)
@@ -93,7 +93,7 @@ def course_of(
     threads : int
         Threads that move them.
     method : Method, optional
-        Way through time; time stepping at the step of the task by default.
+        Simulation method; time stepping at the step of the task by default.
 
     Returns
     -------

@@ -36,7 +36,7 @@ class RunningCourse(Course):
     threads : int
         Threads that move them.
     method : Method, optional
-        Way through time; time stepping at the step of the task by default.
+        Simulation method; time stepping at the step of the task by default.
     """
 
     def __init__(

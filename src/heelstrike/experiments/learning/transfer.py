@@ -84,7 +84,7 @@ def worlds_of(task: LearningTask) -> dict[str, Method]:
     Returns
     -------
     dict
-        Ways through time by name.
+        Simulation methods by name.
     """
     period, worlds = task.decision_period, dict[str, Method]()
     for part in (0.25, 0.5, 1.0, 2.0):
@@ -108,7 +108,7 @@ def episodes(
     task : RunningTask or WalkTask
         The task.
     method : Method
-        Way through time.
+        Simulation method.
     count : int
         Episodes.
     seed : int
@@ -260,7 +260,7 @@ def transfer(
     """
     task = told_task(network.about)
     if any(layer.kind != "dense" for layer in network.layers):
-        raise SimulationError("only policies of dense layers are tried in several worlds")
+        raise SimulationError("transfer tries policies of dense layers only")
     for world, method in worlds_of(task).items():
         progress(world)
         yield episodes(network, task, method, count, seed=seed, world=world)

@@ -139,7 +139,9 @@ class WalkTask:
             given: dict[str, Any] = json.loads(about[WALK])
             return cls(**given | {"speeds": tuple(given["speeds"])})
         except (KeyError, TypeError, ValueError) as error:
-            raise SimulationError(f"this policy does not tell its task: {error}") from error
+            raise SimulationError(
+                f"the file of this policy does not say its task: {error}"
+            ) from error
 
     def robot(self) -> Robot:
         """Load the robot.

@@ -43,7 +43,7 @@ class WalkingCourse(Course):
     threads : int
         Threads that move them.
     method : Method, optional
-        Way through time; time stepping at the step of the task by default.
+        Simulation method; time stepping at the step of the task by default.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class WalkingCourse(Course):
         )  # fmt: skip
         nu, step = robot.nu, batch.method.step_length
         if step is None and task.randomise.delay is not None:
-            raise SimulationError("delays are steps: take a method that has a fixed step")
+            raise SimulationError("a delay is a number of steps: use a method with a fixed step")
         self._step = step or task.step
         size = robot.nq + robot.nv - SKIPPED + OBSERVED
         super().__init__(task, batch, size, TERMS, gear, np.ones(nu))

@@ -52,7 +52,7 @@ def moments_of(motion: BodyMotion, forces: RecordedForces) -> Moments:
     """
     robot, time = motion.robot, motion.time + motion.begin
     if len(motion.sides) < 2:
-        raise GaitError("moments need both legs: the other one was not recorded")
+        raise GaitError("moments need both legs, but only one was recorded")
     if time[0] < forces.time[0] - 1.0 / LEAST or time[-1] > forces.time[-1] + 1.0 / LEAST:
         raise GaitError(
             f"the forces last from {forces.time[0]:.3g} to {forces.time[-1]:.3g} s, the motion "

@@ -197,7 +197,7 @@ def residual_of(robot: Robot, motion: Motion) -> float:
     from heelstrike.gait.polynomials import gauss
 
     if motion.slope:
-        raise GaitError("residuals are told of motions on level ground")
+        raise GaitError("residuals need a motion on level ground")
     idle = np.setdiff1d(np.arange(robot.nv), robot.model.actuator_joint)
     largest, ground = 0.0, Ground(friction=motion.friction)
     for phase in motion.phases:

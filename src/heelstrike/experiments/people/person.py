@@ -144,6 +144,7 @@ def _flat(markers: RecordedMarkers, side: str) -> np.ndarray[tuple[int], np.dtyp
     flat = seen & (above < FLAT)
     if np.count_nonzero(flat) < FEWEST:
         raise GaitError(
-            f"the {side} foot is never flat on the ground: where its markers are on it is not told"
+            f"the {side} foot is never flat on the ground, so the place of its markers "
+            "on the sole is unknown; use a recording in which it stands flat"
         )
     return flat

@@ -99,11 +99,11 @@ def retargeted(stride: Stride, robot: Robot) -> Retargeted:
     whole = sorted(joint for leg in legs for joint in leg)
     if [len(leg) for leg in legs] != [3, 3] or whole != list(range(3, robot.nq)):
         raise GaitError(
-            f"robot {robot.name!r} cannot do what people do: it needs two legs of hip, knee and "
-            "ankle, all driven, on a trunk that floats"
+            f"robot {robot.name!r} cannot follow a person: it needs two legs of hip, knee "
+            "and ankle, all driven, on a trunk that floats"
         )
     if not np.all(np.abs(model.axis[whole, 0]) == 1.0):
-        raise GaitError(f"robot {robot.name!r} cannot do what people do: a joint of it slides")
+        raise GaitError(f"robot {robot.name!r} cannot follow a person: it has a sliding joint")
     left = ["left" in foot.name for foot in robot.feet]
     if left == [True, False]:
         legs = legs[::-1]

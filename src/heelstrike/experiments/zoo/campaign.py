@@ -78,7 +78,7 @@ def zoo(
     settings : Settings
         Seed, trials, and how finely sizes are searched; its method is the name of `method`.
     method : Method, optional
-        Way through time; ``TimeStepping(step=1e-3)`` by default.
+        Simulation method; ``TimeStepping(step=1e-3)`` by default.
     folder : Path, optional
         Where ``zoo.json`` is kept, with every cell that is finished, and gaits. What is there
         already is not done again; cells that are not asked for stay in the file.

@@ -40,7 +40,7 @@ class Settings:
     halvings: int = 3
     """strides, halvings: How finely sizes are searched."""
     method: str = ""
-    """Way through time."""
+    """Simulation method."""
     version: str = __version__
     """Version of heelstrike."""
 

@@ -18,6 +18,7 @@ from rich.text import Text
 
 from heelstrike.experiments.zoo.disturbances import Disturbance
 from heelstrike.experiments.zoo.results import STANDS, Animal, Cell, Results
+from heelstrike.wording import counted
 
 NOTHING = "–"
 """What stands where there is no number."""
@@ -198,8 +199,8 @@ def _measure(results: Results, share: float) -> list[str]:
         f"from every smaller size tried: up to {settings.strides} sizes upwards to the first "
         f"failure, then {settings.halvings} bisections. ≥ means that the largest size tried was "
         "withstood, < that the smallest was not. Pushes begin at "
-        f"{_counted(settings.trials, 'phase', 'phases')} of a step, and rough ground has "
-        f"{_counted(settings.trials, 'shape', 'shapes')}, drawn from the seed, the same for all. "
+        f"{counted(settings.trials, 'phase', 'phases')} of a step, and rough ground has "
+        f"{counted(settings.trials, 'shape', 'shapes')}, drawn from the seed, the same for all. "
         "The tables give the size withstood in all of them; with "
         f"{SURE:.0%} confidence it is withstood at {share:.0%} of all phases or shapes at least. "
         "Everything else has one trial.",
@@ -208,10 +209,6 @@ def _measure(results: Results, share: float) -> list[str]:
         "or strays from its speed. Standing controllers meet pushes and masses only, and have no "
         "price.",
     ]
-
-
-def _counted(number: int, one: str, many: str) -> str:
-    return f"{number} {one if number == 1 else many}"
 
 
 def _line(*cells: str) -> str:

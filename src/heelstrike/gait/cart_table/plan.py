@@ -156,8 +156,9 @@ def _check_robot(robot: Robot) -> None:
     flat = all(sole(robot, foot).toe > sole(robot, foot).heel for foot in robot.feet)
     if not (flat and [len(leg) for leg in legs] == [3, 3] and robot.nv == 9 and robot.floating):
         raise GaitError(
-            "a walk is planned for a trunk on two legs of three driven joints with flat feet, and "
-            f"no other joints; robot {robot.name!r} is another. Use hs.optimize_motion for it."
+            "a planned walk needs a trunk on two legs of three driven joints with flat "
+            f"feet, and no other joints; robot {robot.name!r} differs. Use "
+            "hs.optimize_motion for it."
         )
 
 
@@ -232,9 +233,10 @@ def _unknowns(program: MotionProgram, planned: Planned, friction: float) -> Floa
             if force is None:
                 there = zero_moment_point(step.robot, *(each[None] for each in state))[0]
                 raise InfeasibleGaitError(
-                    f"at {t:.3g} s of the step the ground would have to pull, or to hold more than "
-                    f"friction does: the zero moment point is {there:.3g} m ahead of the middle of "
-                    "the front foot. Ask for slower or shorter steps, or for more corrections."
+                    f"at {t:.3g} s of the step the ground would have to pull, or "
+                    f"friction to exceed its limit: the zero moment point is {there:.3g} "
+                    "m ahead of the middle of the front foot. Ask for slower or shorter "
+                    "steps, or for more corrections."
                 )
             found.append(force)
         forces.append(np.array(found).T)

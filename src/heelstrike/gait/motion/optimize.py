@@ -182,7 +182,9 @@ def checked_request(
     """Check what is asked; raise a `GaitError` that says what cannot be."""
     refuse_loops(robot, "motion design", GaitError)
     if robot.constraints:
-        raise GaitError("motion design knows no constraints from outside; leave them out")
+        raise GaitError(
+            "motion design does not support constraints from outside: use the robot without them"
+        )
     if not robot.floating:
         raise GaitError(f"motion design needs a floating robot; robot {robot.name!r} is not one")
     try:
@@ -208,8 +210,8 @@ def checked_request(
     fixed = goes_on is Repeat.NEVER
     if fixed != (others["start"] is not None) or (others["end"] is not None and not fixed):
         raise GaitError(
-            "a motion that never repeats needs the state at its start, and may have one at its "
-            "end; one that repeats has neither"
+            "a motion that never repeats needs start, and may have end; one that "
+            "repeats takes neither"
         )
     if fixed and (speed is not None or distance is not None):
         raise GaitError("a motion that never repeats has no speed or distance; give start and end")

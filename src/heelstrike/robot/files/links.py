@@ -262,7 +262,7 @@ def _brakes(file: MujocoFile) -> Iterator[tuple[int, float]]:
         limit = float(file.model.numeric_data[first + 1]) if size > 1 else math.inf
         if not limit > 0.0:
             raise file.error(
-                f"the brake {joint!r} in <custom> must hold something: its data are 1, and perhaps "
-                f"the torque beyond which it slips, which is {limit:g}."
+                f"the brake {joint!r} in <custom> needs a positive limit: its data are 1 and, if "
+                f"it slips, the torque at which it does, which is {limit:g}."
             )
         yield place[joint], limit

@@ -110,7 +110,9 @@ def load_robot(
     if dimension == 3 and how.get("projected"):
         raise RobotError("projected=True makes a robot of two dimensions, and dimension is 3.")
     if dimension == 3 and how.get("mirror") is not None:
-        raise RobotError("left and right are made equal in the plane only: leave out mirror.")
+        raise RobotError(
+            "left and right are made equal in the plane only: leave out mirror, or use dimension=2."
+        )
     planar = bool(how.get("projected")) or dimension == 2
     return _loaded(name_or_path, 2 if planar else dimension, how)
 

@@ -68,7 +68,7 @@ class Batch:
     ground : Ground, or sequence of n
         The ground; flat with μ = 0.75 and no restitution by default.
     method : Method
-        Way through time of all lanes; ``TimeStepping()`` by default.
+        Simulation method of all lanes; ``TimeStepping()`` by default.
     control_period, stop_when_fallen
         See :class:`~heelstrike.Simulation`.
     latched : joints, or sequence of n of them or None, optional
@@ -163,7 +163,9 @@ class Batch:
         if lanes is not None and len(plans) == 1:
             plans *= lanes
         if lanes is not None and lanes != len(plans):
-            raise SimulationError(f"lanes is {lanes}, and the arguments are for {len(plans)}")
+            raise SimulationError(
+                f"lanes is {lanes}, but the other arguments are for {len(plans)} lanes"
+            )
         self.robot, self.method = plans[0].setting.robot, method
         self._lay_out(plans, checked_threads(threads, len(plans)))
 
@@ -457,7 +459,9 @@ class Batch:
         with naming(index, 2):
             plans, _ = planned(self.method, self._setup, **about)
             if len(plans) != 1:
-                raise SimulationError(f"one lane is laid at once, got arguments for {len(plans)}")
+                raise SimulationError(
+                    f"lay changes one lane at a time, got arguments for {len(plans)}"
+                )
             self._lanes.refuse_others(plans)
             commanded_width(plans, (self.command.shape[1],))
             compile_all(self.method, plans)

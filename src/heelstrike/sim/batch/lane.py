@@ -56,7 +56,7 @@ class Lane(Simulation):
     plan : Plan
         What it is to be.
     method : Method
-        Way through time.
+        Simulation method.
     memory, clock : Memory and Clock
         As they are allocated for its robot and pushes.
     events : (kinds,) int
@@ -189,7 +189,7 @@ class Lane(Simulation):
 _NOT_KEPT = (
     "memory.pushes.", "memory.solver.sticking.", "memory.solver.reduced.",
     "memory.solver.equations.", "memory.solver.lemke.", "memory.solver.iteration.",
-    "memory.solver.combinations.", "memory.solver.trial.", "memory.solver.yardstick.",
+    "memory.solver.combinations.", "memory.solver.trial.", "memory.solver.scaling.",
     "memory.jacobian", "memory.half", "control.parameters",
 )  # fmt: skip
 """Scratch, which is written again before it is read; parameters, which are the user's."""

@@ -36,7 +36,7 @@ class Lanes:
     plans : sequence of Plan
         What they are to be.
     method : Method
-        Way through time of all.
+        Simulation method of all.
     threads : int
         Threads that will work on them.
     keep_rows : bool
@@ -90,8 +90,8 @@ class Lanes:
         wanted = self._block.shape[1] - self._clock_mold.size
         if any(_mold(plan.setting.robot).size != wanted for plan in plans):
             raise SimulationError(
-                "the robots of a batch must be built alike, joint by joint: the memory of one is "
-                "laid out otherwise than that of the others. simulate_batch takes such robots"
+                "the robots of a batch must have the same structure, joint by joint; one of these "
+                "differs. Use simulate_batch for such robots"
             )
 
     def find(self, index: int) -> None:

@@ -59,7 +59,7 @@ def planned(
     Parameters
     ----------
     method : Method
-        Way through time.
+        Simulation method.
     setup : mapping
         What is the same for all.
     robot, controller, state, parameters, pushes, ground, latched, braked
@@ -161,8 +161,8 @@ def _listed(value: Any) -> Sequence[Any]:
 def _states(state: State | Snapshot | Sequence[State]) -> Sequence[State]:
     if any(isinstance(each, Snapshot) for each in _listed(state)):
         raise SimulationError(
-            "a batch starts again, from states: simulate(state=snapshot) goes on where a snapshot "
-            "was taken"
+            "a batch starts from states, not from snapshots; to continue one snapshot "
+            "use simulate(state=snapshot)"
         )
     if isinstance(state, Sequence):
         return state

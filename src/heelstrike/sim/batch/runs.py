@@ -189,7 +189,7 @@ def simulate_batch(
     ground : Ground, or sequence of n
         The ground; flat with μ = 0.75 and no restitution by default.
     method : Method
-        Way through time of all runs; ``TimeStepping()`` by default.
+        Simulation method of all runs; ``TimeStepping()`` by default.
     control_period : float, optional
         Time between two calls of the controller; see :func:`~heelstrike.simulate`.
     record_every : int, optional

@@ -1,1 +1,1 @@
-"""What every way through time asks of contacts: where they are, and what they do to the robot."""
+"""What every simulation method asks of contacts: where they are, and what they do to the robot."""

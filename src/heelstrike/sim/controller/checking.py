@@ -208,8 +208,8 @@ class _Shown(np.ndarray[Any, np.dtype[Any]]):
     def __setitem__(self, index: Any, value: Any) -> None:
         if not self.flags.writeable:
             raise ControllerError(
-                f"controller {self.controller!r} writes to {self.name}[{_text(index)}]: only its "
-                f"torque and its memory are its own, and robot.estimate is free to use"
+                f"controller {self.controller!r} writes to {self.name}[{_text(index)}]: it may "
+                f"write only to torque, memory, log and robot.estimate"
             )
         try:
             super().__setitem__(index, value)

@@ -254,8 +254,8 @@ def believes_in_another(law: Law, robot: Robot) -> bool:
         its, ours = getattr(known, what), getattr(robot, what)
         if its != ours:
             raise ControllerError(
-                f"controller {law.function.name!r} knows robot {known.name!r}, which is built "
-                f"otherwise than {robot.name!r}: its {what.replace('_', ' ')} are "
+                f"controller {law.function.name!r} knows robot {known.name!r}, whose structure "
+                f"differs from that of {robot.name!r}: its {what.replace('_', ' ')} are "
                 f"{', '.join(its)}, not {', '.join(ours)}. Only numbers may differ"
             )
     mine, its = robot.model.members(), known.model.members()

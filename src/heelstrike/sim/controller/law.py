@@ -71,7 +71,7 @@ class ControllerFunction:
             raise ControllerError(refusal("a controller", function, ("Callable",)))
         several = isinstance(endings, Sequence) and not isinstance(endings, str)
         if not several or not all(isinstance(each, str) for each in endings):
-            raise ControllerError(f"endings are several texts, got {shown(endings)}")
+            raise ControllerError(f"endings must be several texts, got {shown(endings)}")
         self.python: Callable[..., None] = getattr(function, "py_func", function)
         update_wrapper(self, self.python)
         self.function = function

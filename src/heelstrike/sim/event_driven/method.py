@@ -100,7 +100,9 @@ class EventDriven(Method):
             if not (value is None and name == "output_period") and not 0.0 < value < np.inf:
                 raise SimulationError(f"{name} must be a positive number, got {value}")
         if self.rtol < 1e-14:
-            raise SimulationError(f"rtol = {self.rtol} is below what floating point can hold")
+            raise SimulationError(
+                f"rtol = {self.rtol} is too small for floating point: give 1e-14 or more"
+            )
         solver_order(self.solver)
 
     @property
@@ -152,7 +154,7 @@ class EventDriven(Method):
             needed = float(np.max(-at.gap[inside] / at.normal[inside, 1]))
             raise SimulationError(
                 f"contact point {robot.contact_names[deepest]!r}{others} begins "
-                f"{-at.gap[deepest]:.3g} m deep in the ground. EventDriven knows no way out of it: "
+                f"{-at.gap[deepest]:.3g} m deep in the ground. EventDriven cannot push it out: "
                 f"raise the robot by {needed:.3g} m, begin on the ground that the state was made "
                 f"for, or use TimeStepping or Compliant, which push it out"
             )
@@ -162,8 +164,8 @@ class EventDriven(Method):
         if beyond[joint] > ON_THE_GROUND:
             raise SimulationError(
                 f"joint {robot.joint_names[joint]!r} begins at {state.q[joint]:.6g}, beyond its "
-                f"range of {model.lower[joint]:.6g} to {model.upper[joint]:.6g}. EventDriven knows "
-                f"no way back: begin within the range, or use TimeStepping or Compliant"
+                f"range of {model.lower[joint]:.6g} to {model.upper[joint]:.6g}. EventDriven "
+                f"cannot push it back: begin within the range, or use TimeStepping or Compliant"
             )
 
     def check_span(self, setting: Setting, duration: float) -> None:
@@ -216,8 +218,8 @@ def begin(model: Model, ground: GroundModel, memory: Memory, work: Motion, recor
     step, modes, loops = work.step, work.phase.modes, memory.loops
     q, v, rows, equations = memory.q, memory.v, memory.rows, memory.equations
     # Modes that are guessed here are those of another instant: where forces or accelerations are
-    # not unique, what comes of amending them need not be what the solvers would say.
-    memory.solver.settings.amendments = 0
+    # not unique, what comes of correcting them need not be what the solvers would say.
+    memory.solver.settings.corrections = 0
     memory.solver.settings.patient = 1
     if rows_of(loops) > 0:
         if not close_loops(model, equations, loops, q):

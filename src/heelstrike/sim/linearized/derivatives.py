@@ -246,7 +246,7 @@ def step_derivatives(
     """
     stepper = _stepper(simulation, numbers, gains, answers)
     if modes is not None and not (until is None and isinstance(stepper, _TimeSteps)):
-        raise SimulationError("the other side of a change of mode is that of one time step")
+        raise SimulationError("modes is for one step of time stepping only: leave it out")
     return stepper.until(until, modes)
 
 
@@ -371,7 +371,7 @@ def _one_step(simulation: Simulation) -> None:
     """Take a step that is one."""
     status = simulation.step()
     if status is not RunStatus.COMPLETED:
-        raise SimulationError(f"there is no derivative of what ends a run: {simulation.message}")
+        raise SimulationError(f"a step that ends the run has no derivative: {simulation.message}")
 
 
 def _at_limits(simulation: Simulation, asked: Floats) -> NDArray[np.bool_]:
@@ -398,7 +398,7 @@ class _Flows:
         beside = self._again(now)
         beside.advance(end)
         if beside.status is not RunStatus.COMPLETED:
-            raise SimulationError(f"there is no derivative of what ends a run: {beside.message}")
+            raise SimulationError(f"a step that ends the run has no derivative: {beside.message}")
         run = whole(beside.record)
         controller = simulation.controller
         variation = Variation(self._again(now), controller, self._inputs, answers=self._answers)

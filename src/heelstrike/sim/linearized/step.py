@@ -156,8 +156,8 @@ def _refuse(robot: Robot, run: Run, period: float) -> None:
         )
     if run.saturations:
         raise SimulationError(
-            "torques were clipped at the limits of the motors: a law that cannot do what it asks "
-            "for is not linearised here; hs.find_limit_cycle takes differences instead"
+            "torques reached the limits of the motors, where a law cannot be "
+            "linearised; hs.find_limit_cycle takes differences instead"
         )
     for event in run.events:
         if event.kind in NOT_SMOOTH and event.time <= period:

@@ -1,4 +1,4 @@
-"""What every way through time does around its step: events, rows and worst values."""
+"""What every simulation method does around its step: events, rows and worst values."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.compliant import Compliant
 from heelstrike.sim.run import Run
+from heelstrike.wording import counted
 
 CERTIFIED = 1e-9
 """Largest residual of a certified contact problem, relative to the size of its data."""
@@ -22,10 +23,14 @@ def light_of(run: Run | None) -> dict[str, str]:
     residual = max(worst.complementarity, worst.cone, worst.non_penetration)
     solver = run.solver
     if solver.failures or run.status is RunStatus.SOLVER_FAILED:
-        return {"level": "bad", "text": f"{solver.failures} contact problems without a solution"}
-    text = f"{solver.solves} contact problems certified, residual ≤ {residual:.1g}"
+        return {"level": "bad", "text": f"{_problems(solver.failures)} without a solution"}
+    text = f"{_problems(solver.solves)} certified, residual ≤ {residual:.1g}"
     if not residual <= CERTIFIED:
         return {"level": "bad", "text": f"residual {residual:.2g} of a contact problem"}
     if solver.fallbacks:
         return {"level": "warn", "text": f"{text}; {solver.fallbacks} by another solver"}
     return {"level": "good", "text": text}
+
+
+def _problems(number: int) -> str:
+    return counted(number, "contact problem", "contact problems")

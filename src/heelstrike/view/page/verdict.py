@@ -19,6 +19,7 @@ from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Run
 from heelstrike.view.style import in_words
+from heelstrike.wording import counted
 
 SHOWN = 4
 """Links of the chain of a fall that its sentence has."""
@@ -98,7 +99,7 @@ def _does(run: Run, fall: Fall | None) -> str:
     if not len(run.time):
         return f"{name} did not begin: {run.message}."
     steps, last = len(walking_steps(run)), float(run.time[-1])
-    went = f"{steps} step{'' if steps == 1 else 's'}, {distance_travelled(run):.3g} m"
+    went = f"{counted(steps, 'step', 'steps')}, {distance_travelled(run):.3g} m"
     if run.completed:
         if fall is not None:
             return f"{name} is falling when its time is up at {last:.3g} s, after {went}."
@@ -212,8 +213,8 @@ def _advice(
     """What to change, the change that was seen to work first."""
     if run.solver.failures:
         yield (
-            f"{run.solver.failures} contact problems have no certified solution: try another "
-            "solver or a smaller step before believing this run."
+            f"{counted(run.solver.failures, 'contact problem has', 'contact problems have')} no "
+            "certified solution: try another solver or a smaller step before you trust this run."
         )
     if run.doubt:
         yield f"{run.doubt}."

@@ -123,7 +123,7 @@ class Tree:
             and all(link["mass"] == 0.0 for link in first[:2])
         )
         if not floats:
-            raise ValueError("only a trunk that floats, with hinges, is handed over")
+            raise ValueError("this engine is given a floating trunk with hinges only")
         self.bodies = list(range(2, self.count))
         self.turns = [link["axis"][0] if link["hinge"] else 0.0 for link in self.links]
 

@@ -50,7 +50,7 @@ class Robot:
         self.asked, self.settings = asked, settings
         self.tree = Tree(asked["links"])
         if any(point[3] for link in self.tree.links for point in link["points"]):
-            raise ValueError("its contacts are points: discs are not handed over")
+            raise ValueError("this engine is given contact points, not discs")
         mass = sum(link["mass"] for link in self.tree.links)
         self.weight = mass * math.hypot(*self.tree.gravity)
         self.turns = [-turn if turn else 1.0 for turn in self.tree.turns]

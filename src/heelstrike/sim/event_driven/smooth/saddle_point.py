@@ -64,7 +64,7 @@ SWEEPS = 4
 """How often rows and columns are scaled: the largest entries are within a tenth of 1 then."""
 
 ROUNDS = 12
-"""How often contact modes are amended."""
+"""How often contact modes are corrected."""
 
 
 @kernel
@@ -258,7 +258,9 @@ def unit_of(row: int, nv: int, jacobian: Floats, scale: Floats) -> float:
 
 
 @kernel
-def amended(place: int, slide: int, data: float, nv: int, assembly: Assembly, scale: Floats) -> int:
+def corrected_mode(
+    place: int, slide: int, data: float, nv: int, assembly: Assembly, scale: Floats
+) -> int:
     """Mode of a candidate that does not contradict its impulse and velocity as the one it has does.
 
     What closes goes on sliding as it did, by ``slide``, or sticks to begin with.
@@ -290,7 +292,7 @@ def amended(place: int, slide: int, data: float, nv: int, assembly: Assembly, sc
 
 
 @kernel
-def amend_modes(
+def correct_modes(
     total: int, accelerations: bool, nv: int, data: float, slides: Integers, scale: Floats,
     assembly: Assembly,
 ) -> bool:  # fmt: skip
@@ -300,7 +302,7 @@ def amend_modes(
         if assembly.problem.set[place] == LINE:
             continue
         slide = slides[assembly.candidate[place]] if accelerations else 0
-        mode = amended(place, slide, data, nv, assembly, scale)
+        mode = corrected_mode(place, slide, data, nv, assembly, scale)
         changed = changed or mode != assembly.answer.mode[place]
         assembly.answer.mode[place] = mode
     return changed
@@ -366,7 +368,7 @@ def solve_by_saddle_point(
             count, total, matrix, assembly.jacobian, assembly.problem, assembly.answer, held, saddle
         )
         data = size_of_data(total, nv, assembly.jacobian, saddle)
-        if not amend_modes(total, accelerations, nv, data, slide, scale, assembly):
+        if not correct_modes(total, accelerations, nv, data, slide, scale, assembly):
             return is_proven(size, total, data, matrix, held.row, saddle, assembly)
     return False
 
@@ -462,7 +464,7 @@ def solve_contacts(
         memory.solver,
     )  # fmt: skip
     solved = status == SOLVED
-    if solved and not memory.solver.yardstick.effort > STRAINED:
+    if solved and not memory.solver.scaling.effort > STRAINED:
         return status
     if accelerations:
         state_accelerations(
