@@ -189,8 +189,8 @@ class Dimension(ABC):
         """Forget what touches the ground, because another has been laid."""
 
     @abstractmethod
-    def unsolved(self, memory: Any) -> str:
-        """Say what the contact problem is like that nothing could certify."""
+    def unsolved(self, now: str, memory: Any) -> str:
+        """Say that nothing could certify a contact problem, and what it is like."""
 
     def ground_of(self, numbers: Mapping[str, NDArray[Any]]) -> Any:
         """Make a ground of its numbers."""

@@ -202,9 +202,10 @@ class Plane(Dimension):
     def laid(self, memory: Memory) -> None:
         """Nothing: methods remember what touches in their own bundles."""
 
-    def unsolved(self, memory: Memory) -> str:
-        """Say what the contact problem is like that nothing could certify."""
-        return f"; residuals {memory.assembly.answer.residual.tolist()}"
+    def unsolved(self, now: str, memory: Memory) -> str:
+        """Say that nothing could certify a contact problem, and what it is like."""
+        residual = memory.assembly.answer.residual.tolist()
+        return f"no contact solver could certify a solution at {now}; residuals {residual}"
 
 
 _MOLDS: WeakKeyDictionary[Robot, Mold[Memory]] = WeakKeyDictionary()

@@ -661,8 +661,8 @@ class Simulation:
         if outcome is Outcome.SOLVER_FAILED:
             reason = self._way.reason(self._work)
             return RunStatus.SOLVER_FAILED, (
-                f"no contact solver could certify a solution at {self._now}"
-                f"{self._dimension.unsolved(self._memory)}{reason and f'. {reason}'}{self._doubts}"
+                f"{self._dimension.unsolved(self._now, self._memory)}{reason and f'. {reason}'}"
+                f"{self._doubts}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
 

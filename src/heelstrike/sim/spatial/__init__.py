@@ -1,12 +1,18 @@
 """Time stepping of robots in space, and the run it leaves behind."""
 
-from heelstrike.sim.closed_sets import EventKind as SpatialEventKind
-from heelstrike.sim.run import Event as SpatialEvent
-from heelstrike.sim.run import SolverCount as SpatialSolverCount
-from heelstrike.sim.snapshot import Snapshot as SpatialSnapshot
+from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.spatial.controlled import SpatialControlledRobot, SpatialControlState
-from heelstrike.sim.spatial.run import SpatialCertificates, SpatialRun
+from heelstrike.sim.spatial.record import SpatialEventKind
+from heelstrike.sim.spatial.run import (
+    SpatialCertificates,
+    SpatialEvent,
+    SpatialRun,
+    SpatialSolverCount,
+)
 from heelstrike.sim.spatial.simulation import SpatialSimulation
+
+SpatialSnapshot = Snapshot
+"""That of the plane."""
 
 __all__ = [
     "SpatialCertificates",

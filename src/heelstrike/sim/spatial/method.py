@@ -193,7 +193,7 @@ def decide(
     scene: Scene, control: SpatialControl, memory: SpatialMemory, work: SpatialStepping,
     record: SpatialRecord, clock: Clock,
 ) -> int:  # fmt: skip
-    """Find the state at the end of the step, and note what happens in it.
+    """Find the state at the end of the step.
 
     The robot itself stays where it is: a step may be decided that is not taken.
     """
@@ -204,16 +204,6 @@ def decide(
     for k in range(model.nv):
         memory.kept_v[k] = v[k]
     done = take_step(model, scene.ground, clock.time, work.step, work.resolves == 1, memory)
-    if done:
-        end = clock.start + (clock.index + 1) * work.step
-        note_spatial_events(
-            clock.time, end, work.step, memory.tally.steps == 0, v, memory.reaction.slip,
-            memory.blocks, memory.reported, record,
-        )  # fmt: skip
-        if step.uncertified == 1:
-            log_spatial_event(end, UNCERTIFIED, -1, NO_IMPULSE, record)
-        if step.energy_gain > 0.0:
-            log_spatial_event(end, ENERGY_GAIN, -1, NO_IMPULSE, record)
     for i in range(model.nq):
         step.q[i] = q[i]
         q[i] = memory.kept_q[i]
@@ -240,8 +230,17 @@ def move(
     scene: Scene, control: SpatialControl, memory: SpatialMemory, work: SpatialStepping,
     record: SpatialRecord, clock: Clock,
 ) -> int:  # fmt: skip
-    """Take the step that was decided."""
+    """Take the step that was decided, and note what happens in it."""
     step, tally = memory.step, memory.tally
+    end = clock.start + (clock.index + 1) * work.step
+    note_spatial_events(
+        clock.time, end, work.step, tally.steps == 0, step.v, memory.reaction.slip,
+        memory.blocks, memory.reported, record,
+    )  # fmt: skip
+    if step.uncertified == 1:
+        log_spatial_event(end, UNCERTIFIED, -1, NO_IMPULSE, record)
+    if step.energy_gain > 0.0:
+        log_spatial_event(end, ENERGY_GAIN, -1, NO_IMPULSE, record)
     for i in range(memory.q.shape[0]):
         memory.q[i] = step.q[i]
     for k in range(memory.v.shape[0]):
@@ -251,7 +250,7 @@ def move(
     tally.halved += step.halved
     tally.relaxed += step.relaxed
     tally.energy_gain += step.energy_gain
-    clock.time = clock.start + (clock.index + 1) * work.step
+    clock.time = end
     return DONE
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats
+from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.record.record import RowsAndEvents, rows_of_quantities
 from heelstrike.sim.record.recording import (
     JOINT_SLIP,
@@ -20,6 +21,9 @@ from heelstrike.sim.record.recording import (
 from heelstrike.sim.spatial.memory import SpatialReported, SpatialTally
 from heelstrike.sim.spatial.run import RECORDED
 from heelstrike.sim.spatial.table import DRY_JOINT, POINT, WALL, BlockTable
+
+SpatialEventKind = EventKind
+"""What happens in space is among what may happen in the plane."""
 
 NO_IMPULSE = (0.0, 0.0, 0.0)
 """Impulse of an event that has none."""

@@ -12,12 +12,16 @@ from heelstrike.contact.spatial.ground import SpatialGround
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.robot import SpatialRobot
-from heelstrike.sim.run import AnyRun, quantities_of, recorded
+from heelstrike.sim.run import AnyRun, Event, SolverCount, quantities_of, recorded
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from heelstrike.analysis.spatial.summary import SpatialSummary
+
+
+SpatialEvent, SpatialSolverCount = Event, SolverCount
+"""Those of the plane: an event has three components of impulse in space."""
 
 
 @dataclass(frozen=True)

@@ -217,11 +217,11 @@ class Space(Dimension):
         stays = np.isin(table.kind, (STOP, BALL_STOP))
         table.touching[~stays] = NEVER_TOUCHED
 
-    def unsolved(self, memory: SpatialMemory) -> str:
-        """Say what the contact problem is like that nothing could certify."""
+    def unsolved(self, now: str, memory: SpatialMemory) -> str:
+        """Say that nothing could certify a contact problem, and what it is like."""
         return (
-            f", nor in parts of the step: residual {memory.tally.unsolved:.3g}. A smaller step may "
-            "get past it"
+            f"no contact impulses could be certified at {now}, nor in parts of the step: "
+            f"residual {memory.tally.unsolved:.3g}. A smaller step may get past it"
         )
 
 
