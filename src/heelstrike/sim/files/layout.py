@@ -69,6 +69,16 @@ class Layout(ABC):
         """Whether a quantity is one of what most robots have nothing of, and not told then."""
         return False
 
+    def left_out(self, robot: Any) -> tuple[str, ...]:
+        """Quantities that files of a robot do not hold, because they follow from others."""
+        del robot
+        return ()
+
+    def following(self, robot: Any, ground: Any, rows: Mapping[str, Any]) -> dict[str, Any]:
+        """Return those of all rows."""
+        del robot, ground, rows
+        return {}
+
     @abstractmethod
     def labels(self, robot: Any) -> dict[str, list[str]]:
         """Return what counts along the dimensions of a dataset."""

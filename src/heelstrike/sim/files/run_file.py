@@ -141,7 +141,8 @@ def _image(run: AnyRun) -> io.BytesIO:
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
-    dataset = to_dataset(run)
+    layout = layout_of(run)
+    dataset = to_dataset(run).drop_vars(layout.left_out(run.robot))
     compression = {"zlib": True, "complevel": 1, "shuffle": True}
     encoding = {
         name: {"_FillValue": None, **(compression if dataset[name].size > 1000 else {})}
@@ -151,7 +152,7 @@ def _image(run: AnyRun) -> io.BytesIO:
     image = io.BytesIO()
     with h5netcdf.File(image, "w") as file:
         dataset.dump_to_store(H5NetCDFStore(file, mode="w"), encoding=encoding)
-        robot = layout_of(run).robot_to_dataset(run.robot)
+        robot = layout.robot_to_dataset(run.robot)
         robot.dump_to_store(H5NetCDFStore(file, group=ROBOT_GROUP, mode="a"))
     line = seal(image.getbuffer())
     image.seek(0, io.SEEK_END)

@@ -25,7 +25,7 @@ from heelstrike.sim.files.logs import Extents
 from heelstrike.sim.files.robot_dataset import FEET, feet_of, told_feet
 from heelstrike.sim.files.variables import DamageError, Stored, Variable
 from heelstrike.sim.spatial.run import SpatialRun
-from heelstrike.sim.spatial.space import SPACE
+from heelstrike.sim.spatial.space import SPACE, SpatialLook
 
 if TYPE_CHECKING:
     import xarray
@@ -67,6 +67,12 @@ _SOLIDS = {
 }
 
 
+MANY_POINTS = 64
+"""Contact points from which on files do not hold where they are: that follows from the positions,
+and would be most of the file."""
+PLACES = ("contact_point", "contact_normal", "gap")
+
+
 class _Space(Layout):
     dimension = SPACE
     axes = SPATIAL
@@ -86,6 +92,26 @@ class _Space(Layout):
             for name, shape in OF_A_BOX.items()
         },
     }
+
+    def left_out(self, robot: SpatialRobot) -> tuple[str, ...]:
+        return PLACES if robot.nc > MANY_POINTS else ()
+
+    def following(
+        self, robot: SpatialRobot, ground: SpatialGround, rows: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        look, count = SpatialLook(robot), len(rows["position"])
+        found = {
+            "contact_point": np.empty((count, robot.nc, 3)),
+            "contact_normal": np.empty((count, robot.nc, 3)),
+            "gap": np.empty((count, robot.nc)),
+        }
+        states = zip(rows["position"], rows["velocity"], strict=True)
+        for row, (q, v) in enumerate(states):
+            seen = look.in_state(ground, q, v)
+            found["contact_point"][row] = seen.position
+            found["contact_normal"][row] = seen.normal
+            found["gap"][row] = seen.gap
+        return found
 
     def labels(self, robot: SpatialRobot) -> dict[str, list[str]]:
         return {

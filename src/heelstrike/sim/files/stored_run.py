@@ -116,16 +116,25 @@ def _run(stored: Stored, layout: Layout, robot: AnyRobot, classes: Sequence[type
     if not np.all(np.diff(time) >= 0.0):
         raise DamageError("'time' goes backwards")
     allowed = "" if status in _ENDED_WELL else "anything"
-    rows = {name: each._replace(allowed=allowed) for name, each in layout.rows().items()}
+    lacking = [name for name in layout.left_out(robot) if name not in stored.contents]
+    rows = {
+        name: each._replace(allowed=allowed)
+        for name, each in layout.rows().items()
+        if name not in lacking
+    }
+    ground = layout.stored_ground(stored, sizes, known)
+    arrays = stored.arrays(rows, sizes)
+    if lacking:
+        arrays |= layout.following(robot, ground, arrays)
     dimension = layout.dimension
     return dimension.run(
         robot=robot,
-        ground=layout.stored_ground(stored, sizes, known),
+        ground=ground,
         method=stored_method(stored, known),
         status=status,
         message=stored.text("message"),
         time=time,
-        **stored.arrays(rows, sizes),
+        **arrays,
         events=_events(stored, layout, robot, sizes),
         certificates=_counted(stored, "worst", dimension.certificates),
         solver=_counted(stored, "solver", SolverCount),
