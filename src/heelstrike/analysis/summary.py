@@ -6,6 +6,7 @@ import enum
 import json
 import math
 import string
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,60 @@ if TYPE_CHECKING:
 UNKNOWN = float("nan")
 
 
+class Figures(ShownInNotebooks):
+    """Figures of a run, in the plane or in space: how they are told."""
+
+    robot: str
+    status: str
+    message: str
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Label and value of every line of the table a person reads."""
+        raise NotImplementedError
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain dictionaries, lists and numbers, with None for what does not exist."""
+        own: Any = self
+        found: dict[str, Any] = plain(asdict(own))
+        return found
+
+    def to_json(self, *, indent: int | None = 2) -> str:
+        """Return the summary as JSON text.
+
+        Parameters
+        ----------
+        indent : int or None
+            Spaces of indentation; None for one line.
+
+        Returns
+        -------
+        str
+            What :meth:`to_dict` returns, as JSON.
+        """
+        return json.dumps(self.to_dict(), indent=indent, allow_nan=False, ensure_ascii=False)
+
+    def __str__(self) -> str:
+        rows = self.lines()
+        width = max(len(label) for label, _ in rows)
+        return "\n".join([self._title(), *(f"{label:<{width}}  {value}" for label, value in rows)])
+
+    def __rich__(self) -> Table:
+        from rich.table import Table
+
+        good = self.status == RunStatus.COMPLETED.value
+        table = Table(
+            title=self._title(), title_style="bold green" if good else "bold red", show_header=False
+        )
+        table.add_column(style="cyan", no_wrap=True)
+        table.add_column()
+        for label, value in self.lines():
+            table.add_row(label, value)
+        return table
+
+    def _title(self) -> str:
+        return f"{self.robot}: {self.message}"
+
+
 @dataclass(frozen=True)
 class GaitFigures:
     """The gait that a run followed."""
@@ -44,7 +99,7 @@ class GaitFigures:
 
 
 @dataclass(frozen=True)
-class Summary(ShownInNotebooks):
+class Summary(Figures):
     """Figures of a run. Those that do not exist for it are NaN (null in JSON)."""
 
     robot: str
@@ -108,46 +163,14 @@ class Summary(ShownInNotebooks):
         """Mean speed of the centre of mass along x, in m/s."""
         return self.distance_m / self.duration_s if self.duration_s > 0.0 else UNKNOWN
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain dictionaries, lists and numbers, with None for what does not exist."""
-        found: dict[str, Any] = plain(asdict(self))
-        return found
-
-    def to_json(self, *, indent: int | None = 2) -> str:
-        """Return the summary as JSON text.
-
-        Parameters
-        ----------
-        indent : int or None
-            Spaces of indentation; None for one line.
-
-        Returns
-        -------
-        str
-            What :meth:`to_dict` returns, as JSON.
-        """
-        return json.dumps(self.to_dict(), indent=indent, allow_nan=False, ensure_ascii=False)
-
-    def __str__(self) -> str:
-        rows = lines(self)
-        width = max(len(label) for label, _ in rows)
-        return "\n".join([self._title(), *(f"{label:<{width}}  {value}" for label, value in rows)])
-
-    def __rich__(self) -> Table:
-        from rich.table import Table
-
-        good = self.status == RunStatus.COMPLETED.value
-        table = Table(
-            title=self._title(), title_style="bold green" if good else "bold red", show_header=False
-        )
-        table.add_column(style="cyan", no_wrap=True)
-        table.add_column()
-        for label, value in lines(self):
-            table.add_row(label, value)
-        return table
-
-    def _title(self) -> str:
-        return f"{self.robot}: {self.message}"
+    def lines(self) -> list[tuple[str, str]]:
+        """Label and value of every line of the table a person reads."""
+        needless = dict.fromkeys(OF_A_GAIT, self.gait is None) | {
+            OF_A_GAIN: not self.energy_gain_J > 0.0,
+            "first cause": not self.first_cause,
+            "doubt": not self.doubt,
+        }
+        return in_lines(self, LINES, needless)
 
 
 def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
@@ -260,14 +283,13 @@ OF_A_GAIT = ("gait", "joint tracking error")
 OF_A_GAIN = "energy created by impacts"
 
 
-def lines(s: Summary) -> list[tuple[str, str]]:
-    """Label and value of every line of the table a person reads."""
+def in_lines(
+    figures: Figures, lines: Mapping[str, str], needless: Mapping[str, bool]
+) -> list[tuple[str, str]]:
+    """Write figures into lines by their labels, those left out that are needless."""
     write = Words().format
     return [
-        (label, write(line, s=s))
-        for label, line in LINES.items()
-        if (s.gait is not None or label not in OF_A_GAIT)
-        and (s.energy_gain_J > 0.0 or label != OF_A_GAIN)
-        and (s.first_cause or label != "first cause")
-        and (s.doubt or label != "doubt")
+        (label, write(line, s=figures))
+        for label, line in lines.items()
+        if not needless.get(label, False)
     ]

@@ -74,14 +74,14 @@ def simulate(
         from heelstrike.control.spatial.hold_posture import HoldPosture
         from heelstrike.robot.library import load_robot
         from heelstrike.robot.spatial.robot import SpatialRobot
-        from heelstrike.sim import RunStatus, TimeStepping
+        from heelstrike.sim import RunStatus, TimeStepping, simulate
         from heelstrike.sim.spatial.placing import placed_in_space
-        from heelstrike.sim.spatial.simulation import simulate_in_space, spatial_ground
+        from heelstrike.sim.spatial.space import SPACE
         from heelstrike.whole_file import write_whole
 
         if not duration > 0.0:
             raise typer.BadParameter("must be longer than zero", param_hint="--duration")
-        surface = spatial_ground(ground_called(ground, friction=friction))
+        surface = SPACE.checked_ground(ground_called(ground, friction=friction))
         pushes = spatial_pushes_called(push)
         method = TimeStepping(step=step)
         loaded = load_robot(robot, dimension=3, **how.keywords())
@@ -93,7 +93,7 @@ def simulate(
         state = placed_in_space(loaded, surface, above=above)
         out.mkdir(parents=True, exist_ok=True)
     with stage(f"simulating {duration:g} s", when_slow=FIRST_TIME) as going:
-        run = simulate_in_space(
+        run = simulate(
             loaded, law, state=state, duration=duration, ground=surface, method=method,
             pushes=pushes, progress=lambda t: going.reached(t / duration),
         )  # fmt: skip

@@ -89,6 +89,10 @@ class EventKind(enum.IntEnum):
     ``CONSTRAINT_HOLDS``, ``CONSTRAINT_LETS_GO``
         A constraint from outside came to hold, as a cable that becomes taut, with its impulse; or
         it let go. The event's `contact` is its place among the robot's constraints.
+    ``UNCERTIFIED``
+        Of a robot in space: a step went on although its contact problem is solved to 1e-6 only, not
+        to 1e-9. It happens at no point; the event's `contact` is −1, as that of ``ENERGY_GAIN`` is
+        there. ``JOINT_SLIP`` and ``JOINT_STICK`` have the index of the velocity there.
     """
 
     TOUCHDOWN = 0
@@ -109,6 +113,7 @@ class EventKind(enum.IntEnum):
     JOINT_BRAKE = 15
     CONSTRAINT_HOLDS = 16
     CONSTRAINT_LETS_GO = 17
+    UNCERTIFIED = 18
 
     @property
     def of_joint(self) -> bool:

@@ -27,18 +27,21 @@ from numba import types
 
 from heelstrike.compiler.bundle_type import Fixed
 from heelstrike.compiler.compilation import AddressedLoop, dissolved_kernel
+from heelstrike.compiler.separate_kernel import SeparateKernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.solvers.certified_solve import try_solvers
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.controller.asking import ask
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.law import controller_in
 from heelstrike.sim.controller.motors import limit_torque
+from heelstrike.sim.dimension import AnyRobot
 from heelstrike.sim.memory import Memory
-from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.record import Record, RowsAndEvents
 from heelstrike.sim.record.recording import center_height, note_log, sound
 
 
@@ -84,13 +87,40 @@ class Scene(NamedTuple):
     ----------
     controller : function
         To be asked by :func:`~heelstrike.sim.controller.asking.ask`.
-    model : Model
-    ground : GroundModel
+    model : Model or SpatialModel
+    ground : GroundModel or SpatialGroundModel
     """
 
     controller: Any
-    model: Model
-    ground: GroundModel
+    model: Any
+    ground: Any
+
+
+@dataclass(frozen=True)
+class Common:
+    """What all methods of the plane have in common, or those of space."""
+
+    kinds: tuple[Any, ...]
+    """Classes of model, ground, control, memory and record."""
+    sound: Callable[..., bool]
+    """Kernel ``sound(memory)``: whether the state is finite and not absurd."""
+    ask: Callable[..., None]
+    """Kernel ``ask(controller, time, q, v, model, memory, control, command)``: ask the
+    controller."""
+    limit_torque: Callable[..., bool]
+    """Kernel ``limit_torque(model, control, memory)``: find the torques of the commands; returns
+    whether all of these are finite."""
+    center_height: Callable[..., float]
+    """Kernel ``center_height(model, ground, tree)``: height of the centre of mass over the
+    ground."""
+    solver: SeparateKernel
+    """What solves contact problems."""
+
+
+IN_THE_PLANE = Common(
+    (Model, GroundModel, Control, Memory, Record), sound, ask, limit_torque, center_height,
+    try_solvers,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -113,10 +143,12 @@ class Kernels:
     """Kernel ``move(scene, control, memory, work, record, clock)``: bring state and ``clock.time``
     to the next instant; returns ``DONE`` or what is in the way. After ``RECORD_FULL`` or ``FORK``
     it is called again."""
+    common: Common = IN_THE_PLANE
+    """What it has in common with others."""
 
 
 @dissolved_kernel
-def is_full(record: Record, clock: Clock) -> bool:
+def is_full(record: RowsAndEvents, clock: Clock) -> bool:
     """Whether there may be no room for what an instant adds to the record."""
     rows = record.rows + clock.row_margin > record.time.shape[0]
     return bool(rows or record.events + clock.event_margin > record.event_time.shape[0])
@@ -133,12 +165,13 @@ def is_due(clock: Clock) -> bool:
 def frame(kernels: Kernels) -> Callable[..., int]:
     """Return the loop of a method."""
     begin, prepare, decide = kernels.begin, kernels.prepare, kernels.decide
-    report, move = kernels.report, kernels.move
+    report, move, common = kernels.report, kernels.move, kernels.common
+    is_sound, ask_law, limit = common.sound, common.ask, common.limit_torque
+    height = common.center_height
 
     def advance(
-        model: Model, ground: GroundModel, control: Control, memory: Memory, work: Any,
-        record: Record, clock: Clock,
-    ) -> int:  # fmt: skip
+        model: Any, ground: Any, control: Any, memory: Any, work: Any, record: Any, clock: Clock
+    ) -> int:
         """Advance a simulation until its time is up or something stops it; return what."""
         controller = controller_in(control.function)
         scene = Scene(controller, model, ground)
@@ -160,18 +193,18 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                         return DONE
                     if clock.index >= clock.pause:
                         return PAUSED
-                if not sound(memory):
+                if not is_sound(memory):
                     return DIVERGED
                 prepare(model, ground, memory, work)
                 if is_due(clock):
                     if control.in_python == 0:
                         q, v, command = memory.q, memory.v, memory.command
-                        ask(controller, clock.time, q, v, model, memory, control, command)
+                        ask_law(controller, clock.time, q, v, model, memory, control, command)
                     elif clock.answered == 0:
                         return ASKING
                     clock.answered = 0
                     clock.calls += 1
-                if not limit_torque(model, control, memory):
+                if not limit(model, control, memory):
                     return BAD_CONTROLLER
                 if control.robot.ending >= 0:
                     clock.finishing = 1
@@ -181,7 +214,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                 note_log(control.kept, control.logged, record)
                 if code != DONE:
                     return code
-                if center_height(model, ground, memory.equations.tree) < clock.fallen_height:
+                if height(model, ground, memory.equations.tree) < clock.fallen_height:
                     clock.moving = TOLD
                     return FELL
                 if control.robot.ending >= 0:
@@ -211,11 +244,13 @@ constraints from outside, profiles or curves.
 """
 
 
-def fixed_for(robot: Robot, ground: GroundModel, work: Any, usual: Mapping[str, int]) -> Fixed:
+def fixed_for(robot: AnyRobot, ground: Any, work: Any, usual: Mapping[str, int]) -> Fixed:
     """Return what the loop of a simulation can take for granted: all that is rare, or nothing.
 
-    Two loops a method are enough: each is compiled when it is first needed.
+    Two loops a method are enough: each is compiled when it is first needed. In space there is one.
     """
+    if isinstance(robot, SpatialRobot):
+        return ()
     plain = not has_rare_rows(robot) and ground.friction.size == 1 and ground.curved == 0
     if not (plain and all(getattr(work, name) == value for name, value in usual.items())):
         return ()
@@ -239,9 +274,10 @@ _RARE: WeakKeyDictionary[Robot, bool] = WeakKeyDictionary()
 def compiled_loop(kernels: Kernels, work: Any, fixed: Fixed = ()) -> tuple[AddressedLoop, float]:
     """Compile the loop of a method, or load it; return it with the seconds that took."""
     begin = perf_counter()
-    kinds = (Model, GroundModel, Control, Memory, work, Record, Clock)
+    model, ground, control, memory, record = kernels.common.kinds
+    kinds = (model, ground, control, memory, work, record, Clock)
     signature = types.int64(*(kind.compiled_type() for kind in kinds))
-    try_solvers.begin()
+    kernels.common.solver.begin()
     compiled = AddressedLoop(signature, frame(kernels), fixed)
-    try_solvers.finish()
+    kernels.common.solver.finish()
     return compiled, perf_counter() - begin

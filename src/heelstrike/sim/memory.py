@@ -44,8 +44,8 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-class Tally(Bundle):
-    """Counts and worst values of a simulation, over every step, recorded or not."""
+class CommonTally(Bundle):
+    """Counts and worst values of a simulation, in the plane or in space."""
 
     steps: int = cell(int)
     saturations: int = cell(int)
@@ -56,6 +56,11 @@ class Tally(Bundle):
     """One more than the actuator whose torque was not finite when asked for within a step."""
     penetration: float = cell(float)
     """Deepest penetration of a contact point (m)."""
+
+
+class Tally(CommonTally):
+    """Counts and worst values of a simulation, over every step, recorded or not."""
+
     complementarity: float = cell(float)
     cone: float = cell(float)
     non_penetration: float = cell(float)

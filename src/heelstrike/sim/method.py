@@ -92,6 +92,11 @@ class Method(ABC):
         return type(self).__name__
 
     @property
+    def asked_for(self) -> Method:
+        """The method that the user asked for: of robots in space it is wrapped."""
+        return self
+
+    @property
     @abstractmethod
     def solves_with(self) -> str:
         """What finds its contact forces: a solver, or the contact law."""

@@ -18,6 +18,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 
 
 @dataclass(frozen=True)
@@ -69,23 +70,24 @@ class Push:
         """When it ends, in s."""
         return self.start + self.duration
 
-    def place(self, robot: Robot) -> tuple[int, tuple[float, float]]:
+    def place(self, robot: Robot | SpatialRobot) -> tuple[int, tuple[float, ...]]:
         """Link of `robot` on which it acts, and the point in the axes of that link.
 
         Parameters
         ----------
-        robot : Robot
+        robot : Robot or SpatialRobot
             The robot.
 
         Returns
         -------
         tuple
-            Index of the link, and the point (x, z) in its axes (m).
+            Index of the link, and the point in its axes (m), (x, z) or (x, y, z).
 
         Raises
         ------
         SimulationError
-            If the robot has no such link.
+            If the robot has no such link, or force or point have not as many numbers as it has
+            axes.
         """
         if isinstance(self.link, str):
             # A body with several joints is a chain of links: the last one carries its mass.
@@ -98,16 +100,18 @@ class Push:
             index = named[-1]
         else:
             index = int(self.link)
-            if not 0 <= index < robot.nv:
+            if not 0 <= index < robot.nl:
                 raise SimulationError(
                     f"a push acts on link {index}, but robot {robot.name!r} has links 0 to "
-                    f"{robot.nv - 1}"
+                    f"{robot.nl - 1}"
                 )
-        _pair("force", self.force)
-        if self.point is not None:
-            return index, _pair("point", self.point)
-        x, z = robot.model.center_of_mass[index]
-        return index, (float(x), float(z))
+        center = robot.model.center_of_mass[index]
+        for name, value in (("force", self.force), ("point", self.point)):
+            if value is not None and len(value) != center.size:
+                raise SimulationError(
+                    f"the {name} of a push on a robot in {WHERE[center.size]}, got {value!r}"
+                )
+        return index, tuple(center.tolist()) if self.point is None else self.point
 
     def time_within(self, begin: Floats, end: Floats) -> Floats:
         """Seconds that it acts within each of the intervals from `begin` to `end`.
@@ -139,13 +143,8 @@ def _numbers(name: str, value: Sequence[float]) -> tuple[float, ...]:
     return numbers
 
 
-def _pair(name: str, value: tuple[float, ...]) -> tuple[float, float]:
-    """Return what a push has in the plane."""
-    if len(value) != 2:
-        raise SimulationError(
-            f"the {name} of a push on a robot in the plane is two numbers (x, z), got {value!r}"
-        )
-    return value[0], value[1]
+WHERE = {2: "the plane is two numbers (x, z)", 3: "space has three numbers (x, y, z)"}
+"""Where a robot lives that has so many axes, and what vectors have there."""
 
 
 class Pushes(Bundle):
@@ -163,23 +162,27 @@ class Pushes(Bundle):
     """How much of each push acts in the step being computed, 0 to 1."""
 
 
-def pushes_on(robot: Robot, pushes: Sequence[Push]) -> Pushes:
+def pushes_on(robot: Robot | SpatialRobot, pushes: Sequence[Push]) -> Pushes:
     """Return the arrays of some pushes on a robot."""
     numbers = numbers_of_pushes(robot, pushes)
     start, duration = numbers.pop("window").T.copy()
-    return Pushes.allocate(np=len(start), axes=2, start=start, end=start + duration, **numbers)
+    return Pushes.allocate(
+        np=len(start), axes=robot.model.axes, start=start, end=start + duration, **numbers
+    )
 
 
-def numbers_of_pushes(robot: Robot, pushes: Sequence[Push]) -> dict[str, Any]:
+def numbers_of_pushes(robot: Robot | SpatialRobot, pushes: Sequence[Push]) -> dict[str, Any]:
     """Return some pushes on a robot as arrays that :func:`pushes_of_numbers` makes them of."""
-    places = [push.place(robot) for push in pushes]
+    places, axes = [push.place(robot) for push in pushes], robot.model.axes
+
+    def rows(values: Sequence[Sequence[float]], length: int) -> Floats:
+        return np.array(values, dtype=np.float64).reshape(-1, length)
+
     return {
         "link": np.array([link for link, _ in places], dtype=np.int64),
-        "point": np.array([point for _, point in places], dtype=np.float64).reshape(-1, 2),
-        "force": np.array([push.force for push in pushes], dtype=np.float64).reshape(-1, 2),
-        "window": np.array([(p.start, p.duration) for p in pushes], dtype=np.float64).reshape(
-            -1, 2
-        ),
+        "point": rows([point for _, point in places], axes),
+        "force": rows([push.force for push in pushes], axes),
+        "window": rows([(push.start, push.duration) for push in pushes], 2),
     }
 
 

@@ -21,10 +21,10 @@ from heelstrike.contact.ground import Ground
 from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind, RunStatus
 from heelstrike.sim.contacts.constraint import constraint_names
-from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import Push
 from heelstrike.sim.snapshot import Snapshot
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from heelstrike.analysis.summary import Summary
     from heelstrike.gait.gait import Gait
     from heelstrike.sim.method import Method, UnknownMethod
-    from heelstrike.sim.record.record import Record
+    from heelstrike.sim.record.record import RowsAndEvents
     from heelstrike.view.notebook.cards import Film
 
 Floats = NDArray[np.float64]
@@ -45,7 +45,7 @@ Floats = NDArray[np.float64]
 class Quantity:
     """What is recorded of every row."""
 
-    shape: tuple[str, ...]
+    shape: tuple[str | int, ...]
     """Extents of the array of a row, by their names in :class:`~heelstrike.sim.memory.Memory`."""
     of: str
     """Where in the memory it is when a row is written."""
@@ -56,12 +56,12 @@ class Quantity:
     """Whether there are files that are older than it, and mean zero."""
 
     @property
-    def dimensions(self) -> tuple[str, ...]:
+    def dimensions(self) -> tuple[str | int, ...]:
         """Extents of what is recorded of it, a row an instant."""
         return ("nt", *self.shape)
 
 
-def recorded(*shape: str, of: str, unit: str, label: str, later: bool = False) -> Any:
+def recorded(*shape: str | int, of: str, unit: str, label: str, later: bool = False) -> Any:
     """Declare a recorded quantity; see :class:`Quantity`."""
     return field(metadata={"declared": Quantity(shape, of, unit, label, later)})
 
@@ -89,21 +89,21 @@ class Event:
     """Touchdown, lift-off, beginning of slip or of stick."""
     contact: int
     """Index of the contact point, of the joint of a ``JOINT_`` event, or of the constraint."""
-    impulse: tuple[float, float]
-    """Impulse (normal, tangent) on the robot over the step in which it happened, in N s. Of a
-    ``BRIDGE`` its length (s) and how far it may be wrong."""
+    impulse: tuple[float, ...]
+    """Impulse on the robot over the step in which it happened, in N s: (normal, tangent), or
+    (normal, t1, t2) in space. Of a ``BRIDGE`` its length (s) and how far it may be wrong."""
 
     @property
     def kind_in_words(self) -> str:
         """Its kind as people write it."""
         return self.kind.name.lower().replace("_", " ")
 
-    def place(self, robot: Robot) -> str:
+    def place(self, robot: Robot | SpatialRobot) -> str:
         """Name of the joint or contact point of a robot at which it happened; "" if at none.
 
         Parameters
         ----------
-        robot : Robot
+        robot : Robot or SpatialRobot
             The robot of the run.
 
         Returns
@@ -112,7 +112,10 @@ class Event:
             The name.
         """
         names: Sequence[str] = robot.joint_names if self.kind.of_joint else robot.contact_names
-        if self.kind.of_constraint:
+        if isinstance(robot, SpatialRobot):
+            rubs = self.kind in (EventKind.JOINT_SLIP, EventKind.JOINT_STICK)
+            names = robot.velocity_names if rubs else names
+        elif self.kind.of_constraint:
             names = constraint_names(robot)
         somewhere = self.kind is not EventKind.BRIDGE and 0 <= self.contact < len(names)
         return names[self.contact] if somewhere else ""
@@ -175,15 +178,15 @@ class Timing:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Run(ShownInNotebooks):
-    """Record of a simulation.
+class AnyRun(ShownInNotebooks):
+    """Record of a simulation, in the plane or in space: what both have.
 
     A row holds everything about one instant: the state, the torques decided in it, and the
     contact forces of the step that follows. Forces act on the robot.
     """
 
-    robot: Robot
-    ground: Ground
+    robot: Any
+    ground: Any
     method: Method | UnknownMethod
     """How it went through time; unknown if only its file told so."""
     status: RunStatus
@@ -214,7 +217,6 @@ class Run(ShownInNotebooks):
     contact_normal: Floats = recorded(
         "nc", "axes", of="contacts.normal", unit="1", label="ground normal under the contact points"
     )
-    """The tangent is (normal z, −normal x)."""
     gap: Floats = recorded(
         "nc", of="contacts.gap", unit="m", label="distance of the contact points to the ground"
     )
@@ -222,7 +224,112 @@ class Run(ShownInNotebooks):
         "nc", "components", of="contacts.force", unit="N",
         label="force on the robot at the contact points, mean over the step that follows",
     )  # fmt: skip
-    """Normal and tangent. An impact shows as a large force over one step."""
+    """An impact shows as a large force over one step."""
+    events: tuple[Event, ...]
+    certificates: Any
+    solver: SolverCount
+    steps: int
+    """Steps taken."""
+    saturations: int
+    """Times a torque was clipped to its limit, counted when the controller is called for good: at
+    every step or control period. What the speed-torque line of a motor holds back is counted at
+    every step. Of a controller that acts continuously, at the samples or ends of steps only; what
+    is clipped within them is not counted."""
+    timing: Timing
+    error: BaseException | None = field(default=None, repr=False)
+    """What the controller raised, if that ended the run; a ControllerError if it did what it may
+    not."""
+    pushes: tuple[Push, ...] = ()
+    """What pushed the robot."""
+    log: Mapping[str, Logged] = field(default_factory=dict, repr=False)
+    """What the controller told of itself, by name."""
+    final: Snapshot | None = field(default=None, repr=False)
+    """What a simulation goes on from, as if it had not stopped: hand it over as `state`. None of a
+    run from a file, or under a controller in Python that takes no part in snapshots."""
+
+    def __repr__(self) -> str:
+        last = self.time[-1] if len(self.time) else 0.0
+        return (
+            f"{type(self).__name__}({self.robot.name}, {self.method.name}, {last:.6g} s, "
+            f"{self.status.value}, {self.steps} steps)"
+        )
+
+    @property
+    def completed(self) -> bool:
+        """Whether the run lasted as long as it was asked to."""
+        return self.status is RunStatus.COMPLETED
+
+    @property
+    def final_state(self) -> State:
+        """State of the last row."""
+        return State(self.position[-1], self.velocity[-1])
+
+    def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write an animation of the run; see :func:`heelstrike.view.animation.animate`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.animation import animate
+
+        run: Any = self
+        return animate(run, path, **options)
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Return the run as a labelled dataset with units."""
+        from heelstrike.sim.files.dataset import to_dataset
+
+        return to_dataset(self)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the run as NetCDF (``.nc``), or as a table of text for other programs (``.csv``).
+
+        A NetCDF file is read again with :func:`heelstrike.load_run`. A table has a row for each
+        recorded time and a column for each number, headed by its name and unit as in
+        ``position left_knee [rad]``, and at last the events since the row before, in words. It
+        holds neither robot nor ground and cannot be loaded.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write, whose name ends in .nc or .csv.
+
+        Returns
+        -------
+        Path
+            The file. It appears whole or not at all.
+
+        Raises
+        ------
+        RunFileError
+            If the name ends in anything else or the file cannot be written. The run is as it was.
+        """
+        from heelstrike.sim.files.run_file import save
+
+        return save(self, path)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Run(AnyRun):
+    """Record of a simulation.
+
+    A row holds everything about one instant: the state, the torques decided in it, and the
+    contact forces of the step that follows. Forces act on the robot; those of contacts are normal
+    and tangent, which is (normal z, −normal x).
+    """
+
+    robot: Robot
+    ground: Ground
+    certificates: Certificates
     slip_velocity: Floats = recorded(
         "nc", of="reaction.slip", unit="m/s",
         label="tangential velocity of the contact points at the end of the step",
@@ -253,39 +360,6 @@ class Run(ShownInNotebooks):
         label="relative residuals of the contact problem",
     )  # fmt: skip
     """Complementarity, cone, non-penetration."""
-    events: tuple[Event, ...]
-    certificates: Certificates
-    solver: SolverCount
-    steps: int
-    """Steps taken."""
-    saturations: int
-    """Times a torque was clipped to its limit, counted when the controller is called for good: at
-    every step or control period. What the speed-torque line of a motor holds back is counted at
-    every step. Of a controller that acts continuously, at the samples or ends of steps only; what
-    is clipped within them is not counted."""
-    timing: Timing
-    error: BaseException | None = field(default=None, repr=False)
-    """What the controller raised, if that ended the run; a ControllerError if it did what it may
-    not."""
-    pushes: tuple[Push, ...] = ()
-    """What pushed the robot."""
-    log: Mapping[str, Logged] = field(default_factory=dict, repr=False)
-    """What the controller told of itself, by name."""
-    final: Snapshot | None = field(default=None, repr=False)
-    """What a simulation goes on from, as if it had not stopped: hand it over as `state`. None of a
-    run from a file, or under a controller in Python that takes no part in snapshots."""
-
-    def __repr__(self) -> str:
-        last = self.time[-1] if len(self.time) else 0.0
-        return (
-            f"Run({self.robot.name}, {self.method.name}, {last:.6g} s, "
-            f"{self.status.value}, {self.steps} steps)"
-        )
-
-    @property
-    def completed(self) -> bool:
-        """Whether the run lasted as long as it was asked to."""
-        return self.status is RunStatus.COMPLETED
 
     @property
     def doubt(self) -> str:
@@ -298,11 +372,6 @@ class Run(ShownInNotebooks):
         beyond = np.maximum(model.lower - self.position, self.position - model.upper)
         past = float(np.max(beyond, initial=0.0) - np.max(beyond[0], initial=0.0))
         return "; ".join(self.method.doubts(self.robot, self.position[0], sunk, past))
-
-    @property
-    def final_state(self) -> State:
-        """State of the last row."""
-        return State(self.position[-1], self.velocity[-1])
 
     @property
     def world_force(self) -> Floats:
@@ -346,25 +415,6 @@ class Run(ShownInNotebooks):
         from heelstrike.view.figures import plot
 
         return plot(self, what, **options)
-
-    def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write an animation of the run; see :func:`heelstrike.view.animation.animate`.
-
-        Parameters
-        ----------
-        path : str or path
-            File to write.
-        **options
-            As for that function.
-
-        Returns
-        -------
-        Path
-            The file.
-        """
-        from heelstrike.view.animation import animate
-
-        return animate(self, path, **options)
 
     def save_html(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write the run as one HTML file; see :func:`heelstrike.view.page.page.save_html`.
@@ -430,47 +480,19 @@ class Run(ShownInNotebooks):
 
         return report(self, path, **options)
 
-    def to_dataset(self) -> xarray.Dataset:
-        """Return the run as a labelled dataset with units."""
-        from heelstrike.sim.files.dataset import to_dataset
 
-        return to_dataset(self)
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the run as NetCDF (``.nc``), or as a table of text for other programs (``.csv``).
-
-        A NetCDF file is read again with :func:`heelstrike.load_run`. A table has a row for each
-        recorded time and a column for each number, headed by its name and unit as in
-        ``position left_knee [rad]``, and at last the events since the row before, in words. It
-        holds neither robot nor ground and cannot be loaded.
-
-        Parameters
-        ----------
-        path : str or path
-            File to write, whose name ends in .nc or .csv.
-
-        Returns
-        -------
-        Path
-            The file. It appears whole or not at all.
-
-        Raises
-        ------
-        RunFileError
-            If the name ends in anything else or the file cannot be written. The run is as it was.
-        """
-        from heelstrike.sim.files.run_file import save
-
-        return save(self, path)
+def quantities_of(run: type[AnyRun]) -> dict[str, Quantity]:
+    """Return what runs of a class record, by its name, in the order of rows."""
+    return {each.name: each.metadata["declared"] for each in fields(run) if each.metadata}
 
 
-QUANTITIES: dict[str, Quantity] = {
-    each.name: each.metadata["declared"] for each in fields(Run) if each.metadata
-}
-"""What is recorded, by its name, in the order of rows."""
+QUANTITIES = quantities_of(Run)
+"""What is recorded in the plane."""
 
 
-def joined(records: Sequence[Record], since: float, log: Bundle) -> dict[str, Any]:
+def joined(
+    records: Sequence[RowsAndEvents], quantities: Mapping[str, Quantity], since: float, log: Bundle
+) -> dict[str, Any]:
     """Return the rows and events of consecutive records, from a time on, as fields of a run.
 
     `log` is the bundle whose numbers the words of the records are.
@@ -481,7 +503,7 @@ def joined(records: Sequence[Record], since: float, log: Bundle) -> dict[str, An
         return np.concatenate(parts) if len(parts) > 1 else parts[0].copy()
 
     first = int(np.searchsorted(join("time", "rows"), since))
-    rows = {name: join(name, "rows")[first:] for name in ("time", *QUANTITIES)}
+    rows = {name: join(name, "rows")[first:] for name in ("time", *quantities)}
     events: tuple[Event, ...] = ()
     if any(record.events for record in records):
         arrays = {name: join(f"event_{name}", "events") for name in EVENT_MEMBERS}
@@ -511,29 +533,11 @@ def events_of(time: Floats, kind: Any, contact: Any, impulse: Floats) -> tuple[E
     """Return the events of some arrays, one entry an event."""
     lists = (values.tolist() for values in (time, kind, contact, impulse))
     return tuple(
-        Event(t, EventKind(int(k)), int(c), (normal, tangent))
-        for t, k, c, (normal, tangent) in zip(*lists, strict=True)
+        Event(t, EventKind(int(k)), int(c), tuple(components))
+        for t, k, c, components in zip(*lists, strict=True)
     )
 
 
 WORST = tuple(each.name for each in fields(Certificates))
 SOLVED = tuple(each.name for each in fields(SolverCount))[1:]
-COUNTS = ("steps", "saturations", *SOLVED)
-"""What is counted of every simulation, and what the worst is kept of."""
-
-
-def counted(memory: Memory) -> dict[str, Any]:
-    """Return counts and worst values of a simulation."""
-    tally, solver = memory.tally, memory.solver.tally
-    return {name: getattr(solver if name in SOLVED else tally, name) for name in COUNTS + WORST}
-
-
-def tallied(memory: Memory, solves_with: str) -> dict[str, Any]:
-    """Return counts and worst values of a simulation, as fields of a run."""
-    found = counted(memory)
-    return {
-        "certificates": Certificates(*(found[name] for name in WORST)),
-        "solver": SolverCount(solves_with, *(found[name] for name in SOLVED)),
-        "steps": found["steps"],
-        "saturations": found["saturations"],
-    }
+"""Worst values that are kept in the plane, and what is counted there of contact problems."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Required, TypedDict
+from typing import TYPE_CHECKING, Any, Required, TypedDict
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -12,25 +12,23 @@ import numpy as np
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.loops import loop_displacement
-from heelstrike.dynamics.queries.momenta import center_of_mass
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.model import NUMBERS, SCALES, Model
+from heelstrike.robot.model import SCALES, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import OnError
-from heelstrike.sim.contacts.brakes import brakes_of
-from heelstrike.sim.contacts.latches import latches_at
+from heelstrike.sim.dimension import AnyRobot, dimension_of
 from heelstrike.sim.push import Push
 from heelstrike.sim.snapshot import Snapshot
 
 if TYPE_CHECKING:
+    from heelstrike.contact.spatial.ground import SpatialGround
+    from heelstrike.robot.spatial.model import SpatialModel
     from heelstrike.sim.method import Method
 
 # The loops count in 64 bits.
 MOST_EVERY = 2**62
-
-FLAT = Ground()
 
 # Loops that are open by no more than this (m, rad) are closed as a simulation begins.
 OPEN_LOOP = 1e-6
@@ -44,7 +42,7 @@ class Setup(TypedDict, total=False):
 
     state: Required[State | Snapshot]
     method: Method | None
-    ground: Ground | None
+    ground: Ground | SpatialGround | None
     control_period: float | None
     record_every: int
     stop_when_fallen: bool | None
@@ -59,10 +57,10 @@ class Setup(TypedDict, total=False):
 class Setting:
     """What is to be simulated."""
 
-    robot: Robot
+    robot: Any
     state: State
     """Where the robot begins."""
-    ground: Ground
+    ground: Any
     control_period: float | None
     """Seconds between two calls of the controller; None for as often as the method can."""
     record_every: int
@@ -81,10 +79,10 @@ class Setting:
 
 
 def checked_setting(
-    robot: Robot,
+    robot: AnyRobot,
     state: State,
     *,
-    ground: Ground | None = None,
+    ground: Ground | SpatialGround | None = None,
     control_period: float | None = None,
     record_every: int = 1,
     stop_when_fallen: bool | None = None,
@@ -101,14 +99,9 @@ def checked_setting(
     SimulationError
         If something is not usable.
     """
-    if not isinstance(robot, Robot):
-        raise SimulationError(
-            f"robot must be a Robot, got {robot!r}; load_robot gives one by its name or file"
-        )
-    ground = FLAT if ground is None else ground
-    if not isinstance(ground, Ground):
-        raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
-    check_state(robot, state)
+    dimension = dimension_of(robot)
+    ground = dimension.checked_ground(ground)
+    state = dimension.checked_state(robot, state)
     if control_period is not None and not 0.0 < control_period < np.inf:
         raise SimulationError(f"control_period must be a positive number, got {control_period}")
     if not (hasattr(record_every, "__index__") and 1 <= record_every <= MOST_EVERY):
@@ -117,8 +110,8 @@ def checked_setting(
         stop_when_fallen = robot.floating and len(robot.feet) > 1
     fallen_height = -np.inf
     if stop_when_fallen:
-        x, z = center_of_mass(robot, state.q)
-        fallen_height = FALL_FRACTION * (z - float(ground.height(x)))
+        fallen_height = FALL_FRACTION * dimension.height(robot, state, ground)
+    held, on = dimension.held(robot, state, ground, latched, braked)
     return Setting(
         robot=robot,
         state=state,
@@ -127,8 +120,8 @@ def checked_setting(
         record_every=int(record_every),
         fallen_height=fallen_height,
         pushes=checked_pushes(robot, pushes),
-        held=latches_at(robot, state, ground, latched),
-        braked=brakes_of(robot, braked),
+        held=held,
+        braked=on,
         checked=checked,
         on_error=checked_on_error(on_error),
     )
@@ -143,7 +136,7 @@ def checked_on_error(on_error: OnError | str) -> OnError:
         raise SimulationError(f"on_error is one of {known}; got {on_error!r}") from None
 
 
-def checked_pushes(robot: Robot, pushes: Sequence[Push] | Push) -> tuple[Push, ...]:
+def checked_pushes(robot: AnyRobot, pushes: Sequence[Push] | Push) -> tuple[Push, ...]:
     """Return some pushes that act on links of the robot, or refuse them."""
     if isinstance(pushes, Push):
         pushes = (pushes,)
@@ -166,18 +159,19 @@ def identity_of(setting: Setting, method: Method, controller: str) -> dict[str, 
 
 
 def _held_by(setting: Setting) -> str:
-    return f", {setting.robot.constraints}" if setting.robot.constraints else ""
+    held = getattr(setting.robot, "constraints", ())  # of the plane only
+    return f", {held}" if held else ""
 
 
-_DIGESTS: WeakKeyDictionary[Model, str] = WeakKeyDictionary()
+_DIGESTS: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
 
 
-def model_digest(model: Model) -> str:
+def model_digest(model: Model | SpatialModel) -> str:
     """Return what tells the numbers of a robot from those of others."""
     if model not in _DIGESTS:
         digest = hashlib.sha256()
         for name, value in model.members().items():
-            number = NUMBERS[name]
+            number: Any = model.declared[name]
             usual = name in SCALES and np.all(value == number.default)
             if number.later and (np.size(value) == 0 or usual):
                 continue  # snapshots that are older than the number stay good

@@ -18,7 +18,6 @@ from heelstrike.arguments import refusal, takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.mold import Mold
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.model import Floats
@@ -28,36 +27,26 @@ from heelstrike.robot.state import State
 from heelstrike.robot.warning import warn
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus
-from heelstrike.sim.contacts.brakes import braked_joints, brakes_of, brakes_on, put_on
-from heelstrike.sim.contacts.latches import latches_at, latches_of
-from heelstrike.sim.contacts.loops import HOLDS, PUT_ON
 from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
-from heelstrike.sim.controller.law import Law, commands_voltage, law_of, no_torque
+from heelstrike.sim.controller.law import Law, law_of, no_torque
 from heelstrike.sim.controller.raised import EndOfRun, tell
 from heelstrike.sim.controller.robot import NO_ENDING
 from heelstrike.sim.controller.watch import Watch
+from heelstrike.sim.dimension import AnyRobot, dimension_of
 from heelstrike.sim.frame import Outcome, compiled_loop, fixed_for
 from heelstrike.sim.image import Camera
-from heelstrike.sim.look import Look
-from heelstrike.sim.memory import Memory, allocate_memory
-from heelstrike.sim.method import Method, UnknownMethod, check_constraints, work_of
+from heelstrike.sim.method import Method, work_of
 from heelstrike.sim.push import Push, numbers_of_pushes, pushes_of_numbers, pushes_on
-from heelstrike.sim.record.record import Record, allocate_record
-from heelstrike.sim.run import Run, Timing, joined, tallied
-from heelstrike.sim.setting import (
-    Setting,
-    Setup,
-    check_state,
-    checked_pushes,
-    checked_setting,
-    identity_of,
-)
+from heelstrike.sim.record.record import RowsAndEvents, allocate_record
+from heelstrike.sim.run import Run, Timing, joined
+from heelstrike.sim.setting import Setting, Setup, checked_pushes, checked_setting, identity_of
 from heelstrike.sim.snapshot import Snapshot
-from heelstrike.sim.time_stepping import SimulationWarning, TimeStepping
+from heelstrike.sim.time_stepping import SimulationWarning
 
 if TYPE_CHECKING:
+    from heelstrike.contact.spatial.ground import SpatialGround
     from heelstrike.sim.spatial.run import SpatialRun
 
 # Rows of one chunk of the record, and most steps between two looks at Ctrl-C and the progress bar.
@@ -72,10 +61,7 @@ FAR = 1e300
 LAID = 1e-6
 
 _OUTCOMES = tuple(Outcome)
-_USUAL = TimeStepping()
 _CLOCK = Mold(Clock())
-
-AnyRobot = Robot | SpatialRobot
 
 CAN_GO_ON = (RunStatus.COMPLETED, RunStatus.INTERRUPTED)
 
@@ -85,8 +71,9 @@ class Simulation:
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
+    robot : Robot or SpatialRobot
+        The robot. Of one in space it is a
+        :class:`~heelstrike.sim.spatial.SpatialSimulation`, which tells what is otherwise there.
     controller : object with ``torque(t, state, contacts)``, or None
         Decides the joint torques (nu,) in N m. Stock controllers run compiled; None applies no
         torque.
@@ -95,7 +82,7 @@ class Simulation:
         contact modes, pushes, ground and the memory of its controller are those of the snapshot.
     method : Method
         Simulation method; ``TimeStepping()`` by default.
-    ground : Ground
+    ground : Ground or SpatialGround
         The ground; flat with μ = 0.75 and no restitution by default.
     control_period : float, optional
         Time between two calls of the controller, in which its torques are held; a whole number of
@@ -156,17 +143,12 @@ class Simulation:
     ('completed', 0.01)
     """
 
-    def __new__(cls, robot: Any = None, *others: Any, **setup: Any) -> Any:
+    def __new__(cls, robot: Any = None, *_: Any, **__: Any) -> Any:
         """Make one of space, where the robot is one in space."""
-        if isinstance(robot, SpatialRobot):
+        if cls is Simulation and isinstance(robot, SpatialRobot):
             from heelstrike.sim.spatial.simulation import SpatialSimulation
 
-            if cls is not Simulation:
-                raise SimulationError(
-                    f"{cls.__name__} simulates robots in the plane. In space derive from "
-                    "heelstrike.sim.spatial.SpatialSimulation"
-                )
-            return SpatialSimulation(robot, *others, **setup)
+            return super().__new__(SpatialSimulation)
         return super().__new__(cls)
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -177,12 +159,12 @@ class Simulation:
     @takes(SimulationError)
     def __init__(
         self,
-        robot: Robot,
+        robot: Robot | SpatialRobot,
         controller: Controller | None = None,
         *,
         state: State | Snapshot,
         method: Method | None = None,
-        ground: Ground | None = None,
+        ground: Ground | SpatialGround | None = None,
         control_period: float | None = None,
         record_every: int = 1,
         stop_when_fallen: bool | None = None,
@@ -192,16 +174,17 @@ class Simulation:
         checked: bool = False,
         on_error: OnError | str = OnError.WARN,
     ) -> None:
+        self._dimension = dimension_of(robot)
         begin, given = state.state if isinstance(state, Snapshot) else state, ground
         if isinstance(state, Snapshot) and ground is None:
-            ground = _ground_of(state)
+            ground = self._ground_of(state)
         setting = checked_setting(
             robot, begin, ground=ground, control_period=control_period, record_every=record_every,
             stop_when_fallen=stop_when_fallen, pushes=pushes, latched=latched, braked=braked,
             checked=checked, on_error=on_error,
         )  # fmt: skip
         law_of(controller, begin=True)
-        self._begin(setting, checked_method(method))
+        self._begin(setting, self._dimension.way(method))
         self._control_with(controller)
         if isinstance(state, Snapshot):
             self.restore(state)
@@ -225,48 +208,47 @@ class Simulation:
         )
 
     def _begin(
-        self, setting: Setting, method: Method, memory: Memory | None = None,
-        clock: Clock | None = None, keep_rows: bool = True,
+        self, setting: Setting, way: Method, memory: Any = None, clock: Clock | None = None,
+        keep_rows: bool = True,
     ) -> None:  # fmt: skip
         """Allocate everything, compile, and check what only the method can.
 
         Parameters
         ----------
-        setting, method
-            What to simulate, and how.
-        memory : Memory, optional
-            Memory to use, as `allocate_memory` makes it for this robot and these pushes. A batch
-            gives it, which has checked everything before any of it begins.
+        setting, way
+            What to simulate, and how its dimension goes through time.
+        memory : Memory or SpatialMemory, optional
+            Memory to use, as the dimension makes it for this robot and these pushes. A batch gives
+            it, which has checked everything before any of it begins.
         clock : Clock, optional
             Clock to use.
         keep_rows : bool
             Whether rows and events are kept; otherwise they are counted and forgotten.
         """
-        self.robot, self.method, self._setting = setting.robot, method, setting
+        self.robot, self._way, self._setting = setting.robot, way, setting
+        self.method = way.asked_for
+        self._dimension = dimension = dimension_of(self.robot)
         self._given_period = setting.control_period
         self._ground, self._pushes = setting.ground, setting.pushes
         self._has_warned = False
         if memory is None:
             self._check(setting)
-        self._memory = allocate_memory(self.robot, self._pushes) if memory is None else memory
-        self._memory.q[:] = setting.state.q
-        self._memory.v[:] = setting.state.v
-        self._memory.loops.held[:] = setting.held
-        put_on(self.robot, setting.braked, setting.state, HOLDS, self._memory)
-        self._work = work_of(method, self.robot)
-        rows, events = method.room(self.robot)
+        self._memory = dimension.new_memory(setting) if memory is None else memory
+        dimension.begin(setting, self._memory)
+        self._work = work_of(way, self.robot)
+        rows, events = way.room(self.robot)
         self._clock = clock = _CLOCK.cast() if clock is None else clock
         clock.record_every, clock.fallen_height = setting.record_every, setting.fallen_height
         clock.row_margin, clock.event_margin = rows, events
-        method.set_clock(setting, self._clock)
+        way.set_clock(setting, self._clock)
         for bundle in (self._memory, self._work, self._clock, setting.ground.model()):
             _ = bundle.address  # laid out now, not while the loop is timed
         self._compile_s, self._wall_s = self._choose_loop(), 0.0
         self._fork: Snapshot | None = None
         self._cameras: tuple[tuple[Any, Any], Any] = ((None, None), None)
         self._around: tuple[tuple[Any, Any], dict[str, Any]] = ((None, None), {})
-        self._look = Look(self.robot)
-        self._records: list[Record] = []
+        self._look = dimension.look(self.robot)
+        self._records: list[RowsAndEvents] = []
         self._keeps_rows = keep_rows
         self._event_counts = np.zeros(len(EventKind), dtype=np.int64)
         self._recorded_until = 0.0
@@ -278,9 +260,9 @@ class Simulation:
 
     def _choose_loop(self) -> float:
         """Take the loop that is made for what this robot, ground and method do not have."""
-        method = self.method
-        fixed = fixed_for(self.robot, self._ground.model(), self._work, method.usual_numbers)
-        self._loop, compile_s = compiled_loop(method.kernels, method.work, fixed)
+        way = self._way
+        fixed = fixed_for(self.robot, self._ground.model(), self._work, way.usual_numbers)
+        self._loop, compile_s = compiled_loop(way.kernels, way.work, fixed)
         return compile_s
 
     @property
@@ -295,22 +277,22 @@ class Simulation:
 
     @state.setter
     def state(self, state: State) -> None:
-        check_state(self.robot, state)
-        deep = self._depth(state, self._ground)
+        state = self._dimension.checked_state(self.robot, state)
+        deep, _ = self._depth(state, self._ground)
         if deep.any():
             point = int(np.argmax(deep))
             raise SimulationError(
                 f"contact point {self.robot.contact_names[point]!r} would be {deep[point]:.3g} m "
                 "in the ground; robot.placed(state, ground) gives a state that is not"
             )
-        latches_at(self.robot, state, self._ground, self.latched)
+        self._dimension.held(self.robot, state, self._ground, self.latched, ())
         self._check(replace(self._setting, ground=self._ground, state=state))
         memory = self._memory
         memory.q[:], memory.v[:] = state.q, state.v
-        memory.loops.brake_position[:] = state.q[self.robot.model.brake_joint]
+        self._dimension.moved(state, self.robot, memory)
         memory.contacts.force[:] = 0.0
         memory.reported.forget()
-        self.method.forget_ground(self.robot, self._work, self._clock, stops=True)
+        self._way.forget_ground(self.robot, self._work, self._clock, stops=True)
         self._reconsider()
 
     @property
@@ -319,60 +301,60 @@ class Simulation:
         return self._look.at_contacts(self._ground, self._memory)
 
     @property
-    def ground(self) -> Ground:
+    def ground(self) -> Any:
         """The ground; another may be laid, but not into a foot."""
         return self._ground
 
     @ground.setter
-    def ground(self, ground: Ground) -> None:
-        if not isinstance(ground, Ground):
-            raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
-        deep = self._depth(self.state, ground)
+    def ground(self, ground: Ground | SpatialGround) -> None:
+        ground = self._dimension.checked_ground(ground)
+        deep, upwards = self._depth(self.state, ground)
         if deep.any():
-            at = contact_kinematics(self.robot, self._memory.q, self._memory.v, ground)
             point = int(np.argmax(deep))
             raise SimulationError(
                 f"this ground would be {deep[point]:.3g} m above contact point "
                 f"{self.robot.contact_names[point]!r}; lower it by "
-                f"{float(np.max(deep / at.normal[:, 1])):.3g} m, or raise "
+                f"{float(np.max(deep / upwards)):.3g} m, or raise "
                 "the robot first"
             )
         self._check(replace(self._setting, ground=ground, state=self.state))
         mine, its = self._ground.numbers(), ground.numbers()
         alike = mine.keys() == its.keys()
         if not (alike and all(np.array_equal(mine[name], its[name]) for name in mine)):
-            self.method.forget_ground(self.robot, self._work, self._clock)
+            self._dimension.check_fit(ground, self._memory)
+            self._way.forget_ground(self.robot, self._work, self._clock)
+            self._dimension.laid(self._memory)
             self._clock.moving = 0
         self._ground = ground
         self._choose_loop()
 
     def _check(self, setting: Setting) -> None:
         """Refuse what the method cannot simulate, and warn of what it can hardly, once."""
-        check_constraints(self.method, setting)
-        self.method.check(setting)
-        self._has_warned = self._has_warned or has_warned(self.method, setting)
+        self._dimension.check(self._way, setting)
+        self._has_warned = self._has_warned or has_warned(self._way, setting)
 
     def _reconsider(self) -> None:
         """Decide this instant again, even if it had been: what it depends on has been changed."""
         self._clock.moving = 0
-        self.method.reconsider(self._work)
+        self._way.reconsider(self._work)
 
-    def _depth(self, state: State, ground: Ground) -> Floats:
-        """How deep points would be in a ground, (nc,) in m; 0 of those no deeper than now."""
-        gap = contact_kinematics(self.robot, state.q, state.v, ground).gap
+    def _depth(self, state: State, ground: Any) -> tuple[Floats, Floats]:
+        """How deep points would be in a ground, (nc,) in m; 0 of those no deeper than now.
+
+        And how far up its normals point there.
+        """
+        gap, upwards = self._dimension.gaps(self.robot, state, ground)
         now = float(np.min(self.contacts.gap, initial=0.0))
-        return np.where(gap < min(-LAID, now - LAID), -gap, 0.0)
+        return np.where(gap < min(-LAID, now - LAID), -gap, 0.0), upwards
 
     @property
     def latched(self) -> tuple[str, ...]:
         """Joints that latches hold; when others are set, the latches of the rest let go at once."""
-        held = self._memory.loops.held
-        return tuple(name for name, one in zip(self.robot.latch_names, held, strict=True) if one)
+        return self._dimension.latched(self.robot, self._memory)
 
     @latched.setter
     def latched(self, joints: Iterable[str | int]) -> None:
-        held = self._memory.loops.held
-        held[:] = latches_at(self.robot, self.state, self._ground, joints)
+        self._dimension.latch(self.robot, self.state, self._ground, joints, self._memory)
         self._reconsider()
 
     @property
@@ -381,12 +363,11 @@ class Simulation:
 
         The brakes of the rest let go at once.
         """
-        return braked_joints(self.robot, self._memory.loops.braked)
+        return self._dimension.braked(self.robot, self._memory)
 
     @braked.setter
     def braked(self, joints: Iterable[str | int]) -> None:
-        wanted = brakes_of(self.robot, joints)
-        put_on(self.robot, wanted, self.state, PUT_ON, self._memory)
+        self._dimension.brake(self.robot, self.state, joints, self._memory)
         self._reconsider()
 
     @property
@@ -401,7 +382,7 @@ class Simulation:
     @property
     def control_period(self) -> float:
         """Seconds between two calls of the controller; zero of one that acts continuously."""
-        step, clock = self.method.step_length, self._clock
+        step, clock = self._way.step_length, self._clock
         return clock.control_period if step is None else clock.control_every * step
 
     @property
@@ -495,8 +476,8 @@ class Simulation:
         if not isinstance(given, Real):  # cheaper than a look at all arguments: calls are many
             raise SimulationError(refusal("until", given, ("float",)))
         if np.isfinite(until):
-            self.method.check_span(self._setting, max(until - self.time, 0.0))
-            instant = self.method.instant(self._clock, until)
+            self._way.check_span(self._setting, max(until - self.time, 0.0))
+            instant = self._way.instant(self._clock, until)
         if instant < self.time:
             raise SimulationError(
                 f"until must not be before the present time, {self._now} s; got {until}"
@@ -638,11 +619,10 @@ class Simulation:
         """Let the brakes and latches hold that a controller in Python names, and no others."""
         python = self._python.partner if isinstance(self._python, AskedLaw) else self._python
         braked, latched = getattr(python, "braked", None), getattr(python, "latched", None)
-        if braked is not None and brakes_of(self.robot, braked) != brakes_on(self._memory.loops):
+        if braked is not None and self._dimension.would_brake(self.robot, braked, self._memory):
             self.braked = braked
         if latched is not None:
-            named = latches_of(self.robot, latched)
-            kept = [joint for joint in self.latched if self.robot.joint_index(joint) in named]
+            kept = self._dimension.still_latched(self.robot, latched, self._memory)
             if len(kept) < len(self.latched):
                 self.latched = kept
 
@@ -673,7 +653,7 @@ class Simulation:
         if outcome is Outcome.DIVERGED and tally.bad_trial > 0:
             return self._not_finite(tally.bad_trial - 1, f"in the step after {self._now}")
         if outcome is Outcome.DIVERGED:
-            reason = self.method.reason(self._work)
+            reason = self._way.reason(self._work)
             return RunStatus.DIVERGED, (
                 f"the simulation could not go on at {self._now}: {reason}"
                 if reason
@@ -681,17 +661,16 @@ class Simulation:
                 f"gains{self._doubts}"
             )
         if outcome is Outcome.SOLVER_FAILED:
-            reason = self.method.reason(self._work)
+            reason = self._way.reason(self._work)
             return RunStatus.SOLVER_FAILED, (
-                f"no contact solver could certify a solution at {self._now}; residuals "
-                f"{self._memory.assembly.answer.residual.tolist()}{reason and f'. {reason}'}"
+                f"{self._dimension.unsolved(self._now, self._memory)}{reason and f'. {reason}'}"
                 f"{self._doubts}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
 
     @property
     def _doubts(self) -> str:
-        doubts = self.method.doubts(self.robot, self._setting.state.q)
+        doubts = self._way.doubts(self.robot, self._setting.state.q)
         return "".join(f". {doubt[0].upper()}{doubt[1:]}" for doubt in doubts)
 
     def _stopped(self, why: str) -> str:
@@ -713,7 +692,7 @@ class Simulation:
             self._count_events(self._records[-1])
             return ""
         clock = self._clock
-        rows = self.method.rows_in(clock.until - clock.time, clock.record_every)
+        rows = self._way.rows_in(clock.until - clock.time, clock.record_every)
         # What goes on piece by piece makes room for as much again as there is.
         rows = max(rows, sum(record.rows for record in self._records))
         rows = min(CHUNK, rows + clock.row_margin)
@@ -734,7 +713,7 @@ class Simulation:
         self._records.append(record)
         return ""
 
-    def _count_events(self, record: Record) -> None:
+    def _count_events(self, record: RowsAndEvents) -> None:
         """Count the events of a record and forget it."""
         kinds = record.event_kind[: record.events]
         self._event_counts += np.bincount(kinds, minlength=len(EventKind))
@@ -768,10 +747,10 @@ class Simulation:
                 "this controller has another log than the one before, and rows are recorded: "
                 "start a new simulation with it, from state=simulation.state"
             )
-        ready.control.function[:] = compiled.function.words
+        ready.control.function[:] = self._dimension.words_of(compiled)
         _ = ready.control.address
-        voltage = commands_voltage(controller, robot)
-        self.method.set_clock(setting, clock)
+        voltage = self._dimension.commands_voltage(controller, robot)
+        self._way.set_clock(setting, clock)
         self._setting, self._logs, self._python_log = setting, ready, told
         self._controller, self._python, self._control = controller, python, ready.control
         self._numbers = python.numbers if isinstance(python, AskedLaw) else ready
@@ -785,14 +764,14 @@ class Simulation:
             self._shown: Contacts = read_only(memory.contacts)
         if law is not None:
             self._name = f"controller {law.function.name!r}"
-        self._take_gains(law, voltage)
+        self._dimension.take_gains(robot, law, voltage, memory)
         self._identity = identity_of(setting, self.method, self._decides)
         if python is None:
             self._control.continuous = setting.control_period is None and controller is not None
         else:
             self._control.in_python = 1
-            if setting.control_period is None and self.method.python_period is not None:
-                clock.control_period = self.method.python_period
+            if setting.control_period is None and self._way.python_period is not None:
+                clock.control_period = self._way.python_period
         self._numbers.control.robot.period = self.control_period
         # It is due at once, and then at the whole periods, as if it had been called all the time.
         period = clock.control_period
@@ -800,18 +779,6 @@ class Simulation:
         clock.answered = 0
         known = self._numbers.robot
         self._watch = Watch((robot,) if known is robot else (robot, known), ready, memory)
-
-    def _take_gains(self, law: Law | None, voltage: bool) -> None:
-        """Note which joint forces an implicit scheme takes at the end of a step."""
-        model, memory = self.robot.model, self._memory
-        driven = model.actuator_joint
-        memory.stiffness[:] = model.stiffness
-        memory.damping[:] = model.damping
-        if law is not None:
-            memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
-            memory.damping[driven] += 0.0 if law.damping is None else law.damping
-        if voltage:
-            memory.damping[driven] += model.stall_torque[driven] / model.no_load_speed[driven]
 
     def snapshot(self) -> Snapshot:
         """Return everything that the further course depends on.
@@ -871,6 +838,12 @@ class Simulation:
             pushes.share[:] = share
             self._memory = self._memory.replaced(pushes=pushes)
 
+    def _ground_of(self, snapshot: Snapshot) -> Any:
+        try:
+            return self._dimension.ground_of(snapshot.part("ground"))
+        except (KeyError, ValueError) as error:
+            raise SimulationError(f"the snapshot is damaged: {error}") from error
+
     def _put_back(self, snapshot: Snapshot) -> None:
         """Take up what a snapshot holds, or leave everything as it is."""
         beside, taken = snapshot.beside, snapshot.taken
@@ -879,7 +852,8 @@ class Simulation:
             float(beside["time"])
             now = self._surroundings()
             if not all(map(operator.is_, map(beside.get, now), now.values())):
-                pushes, ground = pushes_of_numbers(snapshot.part("push")), _ground_of(snapshot)
+                pushes, ground = pushes_of_numbers(snapshot.part("push")), self._ground_of(snapshot)
+                self._dimension.check_fit(ground, memory)
                 memory = memory.replaced(pushes=pushes_on(self.robot, pushes))
             camera = self._camera(memory)
             if taken is None or snapshot.is_named or not camera.fits(taken):
@@ -898,7 +872,7 @@ class Simulation:
         for numbers in (self._control, self._numbers.control):
             numbers.robot.ending = NO_ENDING
 
-    def _camera(self, memory: Memory) -> Camera:
+    def _camera(self, memory: Any) -> Camera:
         """Return what takes images of all that changes as a simulation goes on."""
         of, camera = self._cameras
         if of[0] is not memory or of[1] is not self._control:
@@ -924,7 +898,7 @@ class Simulation:
         return arrays
 
     @property
-    def record(self) -> Run:
+    def record(self) -> Any:
         """Everything since the simulation began or was restored, up to now.
 
         The last row is this instant, for which the controller is asked and forces are found. That
@@ -971,18 +945,19 @@ class Simulation:
         final = self.snapshot() if self._fork is None else self._fork
         return final.at(self.time)
 
-    def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Run:
+    def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Any:
         """Return what is recorded as a run, which goes on from `final`."""
         if not self._records:
             self._new_record()
-        return Run(
+        dimension = self._dimension
+        return dimension.run(
             robot=self.robot,
             ground=self._ground,
             method=self.method,
             status=status,
             message=message,
-            **joined(self._records, self._recorded_until, self._logs.log),
-            **tallied(self._memory, self.method.solves_with),
+            **joined(self._records, dimension.quantities, self._recorded_until, self._logs.log),
+            **dimension.tallied(self._memory, self._way.solves_with),
             timing=Timing(self._compile_s, self._wall_s),
             error=self.error,
             pushes=self._pushes,
@@ -1009,7 +984,7 @@ def simulate(
 @overload
 def simulate(
     robot: SpatialRobot, controller: Controller | None = None, *, duration: float,
-    progress: Callable[[float], None] | None = None, **setup: Any,
+    progress: Callable[[float], None] | None = None, **setup: Unpack[Setup],
 ) -> SpatialRun: ...  # fmt: skip
 
 
@@ -1060,10 +1035,6 @@ def simulate(
         With ``on_error="raise"``, what the controller raised.
     """
     check_duration(duration)
-    if isinstance(robot, SpatialRobot):
-        from heelstrike.sim.spatial.simulation import simulate_in_space
-
-        return simulate_in_space(robot, controller, duration=duration, progress=progress, **setup)
     simulation = Simulation(robot, controller, **setup)
     going = simulation.advance(simulation._recorded_until + duration, progress=progress)
     final = simulation._final()
@@ -1085,30 +1056,6 @@ def check_duration(duration: float) -> None:
     """Refuse a duration that is none."""
     if not (np.isfinite(duration) and duration >= 0.0):
         raise SimulationError(f"duration must be a finite number ≥ 0, got {duration}")
-
-
-def checked_method(method: Method | None) -> Method:
-    """Return a simulation method, time stepping if none is asked for, or refuse what is none."""
-    if method is None:
-        return _USUAL
-    if isinstance(method, UnknownMethod):
-        raise SimulationError(
-            f"{method.name} is here as data only, as its file tells of it; load the run with the "
-            f"class, or those of its laws: load_run(path, classes=[{method.name}])"
-        )
-    if not isinstance(method, Method):
-        raise SimulationError(
-            f"method must be a simulation method such as TimeStepping(), got {method!r}"
-            + (f"; write {method.__name__}()" if isinstance(method, type) else "")
-        )
-    return method
-
-
-def _ground_of(snapshot: Snapshot) -> Ground:
-    try:
-        return Ground.of_numbers(snapshot.part("ground"))
-    except (KeyError, ValueError) as error:
-        raise SimulationError(f"the snapshot is damaged: {error}") from error
 
 
 def _place(thing: Any) -> str:

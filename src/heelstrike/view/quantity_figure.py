@@ -7,7 +7,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from heelstrike.errors import ViewError
-from heelstrike.sim.files.dataset import labels
+from heelstrike.sim.files.layout import IN_THE_PLANE
 from heelstrike.sim.files.logs import dimensions
 from heelstrike.sim.run import QUANTITIES
 from heelstrike.view.comparison_figure import COLORS, STROKES
@@ -34,8 +34,8 @@ def draw_quantity(excerpt: Excerpt, name: str) -> Figure:
     else:
         told = run.log[name]
         shape, unit, label, values = told.extents, told.unit, told.label or name, told.values
-    known = labels(run.robot)
-    along = dimensions(name, shape)
+    known = IN_THE_PLANE.labels(run.robot)
+    along = dimensions(name, shape, IN_THE_PLANE.extents)
     sizes = values.shape[1:]
     names = [
         known.get(each, [str(i) for i in range(size)])

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import inspect
-from pathlib import Path
 
 import pytest
 
 import heelstrike as hs
+from heelstrike.sim.spatial import SpatialSimulation
 
 
-def test_what_is_for_the_plane_says_so(tmp_path: Path) -> None:
+def test_what_is_for_the_plane_says_so() -> None:
     robot = hs.load_robot("bravo7", dimension=3)
     with pytest.raises(hs.GaitError, match=r"for the plane: hs.load_robot\(file, dimension=2\)"):
         hs.optimize_gait(robot, step_length=0.3, step_duration=0.7)
 
+
+def test_a_simulation_of_ones_own_takes_robots_in_space() -> None:
     class Own(hs.Simulation):
-        def __init__(self, robot: hs.Robot, more: int = 2) -> None:
+        def __init__(self, robot: hs.SpatialRobot, more: int = 2) -> None:
             super().__init__(robot, state=robot.reference_state())
 
     assert list(inspect.signature(Own).parameters) == ["robot", "more"]
-    with pytest.raises(hs.SimulationError, match="Own simulates robots in the plane"):
-        Own(robot)  # type: ignore[arg-type]
-    run = hs.simulate(robot, state=robot.reference_state(), duration=0.002)
-    with pytest.raises(hs.RunFileError, match=r"a run in space.*xarray"):
-        hs.load_run(run.save(tmp_path / "run.nc"))
+    robot = hs.load_robot("bravo7", dimension=3)
+    assert Own(robot).step() is hs.RunStatus.COMPLETED
+    with pytest.raises(hs.SimulationError, match="robot must be a SpatialRobot"):
+        SpatialSimulation(hs.load_robot("bravo7"))

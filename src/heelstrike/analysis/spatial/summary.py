@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 
 from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.support import pushing_in_space
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
-from heelstrike.analysis.summary import UNKNOWN, Words, plain
+from heelstrike.analysis.summary import UNKNOWN, Figures, in_lines
 from heelstrike.field_texts import dataclass
-from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.model import Floats
-from heelstrike.sim.closed_sets import RunStatus
-from heelstrike.sim.spatial.record import SpatialEventKind
-from heelstrike.sim.spatial.run import SpatialRun, SpatialSolverCount
-
-if TYPE_CHECKING:
-    from rich.table import Table
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.run import SolverCount
+from heelstrike.sim.spatial.run import SpatialRun
 
 SHORTEST_WAY = 1e-3
 """Distance (m) below which energy a distance means nothing."""
@@ -30,7 +22,7 @@ MOST_LOOKED_AT = 2000
 
 
 @dataclass(frozen=True)
-class SpatialSummary(ShownInNotebooks):
+class SpatialSummary(Figures):
     """Figures of a run in space. Those that do not exist for it are NaN (null in JSON)."""
 
     robot: str
@@ -68,7 +60,7 @@ class SpatialSummary(ShownInNotebooks):
     relaxed: int
     """uncertified, halved, relaxed: Steps that went on with a residual above 1e-9; steps taken in
     parts; contact problems in which points in a wedge were not asked to leave the ground."""
-    solver: SpatialSolverCount
+    solver: SolverCount
     """How the contact problems were solved."""
     torque_cost_N2m2s: float  # noqa: N815 - units keep their capitals
     """∫ ΓᵀΓ dt over the whole run."""
@@ -86,46 +78,13 @@ class SpatialSummary(ShownInNotebooks):
     energy_gain_J: float = 0.0  # noqa: N815 - units keep their capitals
     """Kinetic energy that restitution with friction made in impacts."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain dictionaries, lists and numbers, with None for what does not exist."""
-        found: dict[str, Any] = plain(asdict(self))
-        return found
-
-    def to_json(self, *, indent: int | None = 2) -> str:
-        """Return the summary as JSON text.
-
-        Parameters
-        ----------
-        indent : int or None
-            Spaces of indentation; None for one line.
-
-        Returns
-        -------
-        str
-            What :meth:`to_dict` returns, as JSON.
-        """
-        return json.dumps(self.to_dict(), indent=indent, allow_nan=False, ensure_ascii=False)
-
-    def __str__(self) -> str:
-        rows = spatial_lines(self)
-        width = max(len(label) for label, _ in rows)
-        return "\n".join([self._title(), *(f"{label:<{width}}  {value}" for label, value in rows)])
-
-    def __rich__(self) -> Table:
-        from rich.table import Table
-
-        good = self.status == RunStatus.COMPLETED.value
-        table = Table(
-            title=self._title(), title_style="bold green" if good else "bold red", show_header=False
-        )
-        table.add_column(style="cyan", no_wrap=True)
-        table.add_column()
-        for label, value in spatial_lines(self):
-            table.add_row(label, value)
-        return table
-
-    def _title(self) -> str:
-        return f"{self.robot}: {self.message}"
+    def lines(self) -> list[tuple[str, str]]:
+        """Label and value of every line of the table a person reads."""
+        needless = {
+            "energy made by impacts": not self.energy_gain_J > 0.0,
+            "turn": not np.isfinite(self.turn_rad),
+        }
+        return in_lines(self, LINES, needless)
 
 
 def summarize_in_space(run: SpatialRun) -> SpatialSummary:
@@ -165,7 +124,7 @@ def summarize_in_space(run: SpatialRun) -> SpatialSummary:
         distance_m=distance,
         speed_m_s=distance / duration if duration > 0.0 else UNKNOWN,
         turn_rad=_turn(run),
-        touchdowns=sum(event.kind is SpatialEventKind.TOUCHDOWN for event in run.events),
+        touchdowns=sum(event.kind is EventKind.TOUCHDOWN for event in run.events),
         zmp_margin_min_m=round(float(np.fmin.reduce(margin, initial=UNKNOWN)), 12) + 0.0,
         friction_use_max=_friction_use(run),
         slip_max_m=_slip(run),
@@ -245,15 +204,3 @@ LINES = {
     "computing time": "{s.wall_s:.3} s ({s.real_time_factor:.3} × real time), "
     "compilation {s.compile_s:.3} s",
 }
-
-
-def spatial_lines(s: SpatialSummary) -> list[tuple[str, str]]:
-    """Label and value of every line of the table a person reads."""
-    write = Words().format
-    needless = {
-        "energy created by impacts": not s.energy_gain_J > 0.0,
-        "turn": not np.isfinite(s.turn_rad),
-    }
-    return [
-        (label, write(line, s=s)) for label, line in LINES.items() if not needless.get(label, False)
-    ]

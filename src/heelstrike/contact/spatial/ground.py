@@ -7,10 +7,12 @@ robot are looked at: edges of a box do not meet edges of the robot.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import field
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.arguments import check_fields, takes
 from heelstrike.compiler.bundle import Bundle, array, number
@@ -32,6 +34,10 @@ BESIDE = 1e-6
 
 PARALLEL = 1.0 - 1e-9
 """Cosine of the angle below which two faces are one."""
+
+
+OF_LENGTH_ONE = 1e-15
+"""How far the length of a normal is from one by rounding: it stays as it is then, in files too."""
 
 
 class SpatialGroundModel(Bundle):
@@ -126,8 +132,9 @@ class SpatialGround:
             )
         if not math.isfinite(self.height):
             raise SimulationError(f"height of the ground must be finite, got {self.height}")
-        normal /= np.max(np.abs(normal))
-        normal /= np.linalg.norm(normal)
+        if abs(np.linalg.norm(normal) - 1.0) > OF_LENGTH_ONE:
+            normal /= np.max(np.abs(normal))
+            normal /= np.linalg.norm(normal)
         boxes = tuple(self.boxes)
         for each in boxes:
             if not isinstance(each, Box):
@@ -237,6 +244,58 @@ class SpatialGround:
     def model(self) -> SpatialGroundModel:
         """Return the arrays that the kernels use."""
         return self._model
+
+    def numbers(self) -> dict[str, Floats]:
+        """Return the ground as arrays that :meth:`of_numbers` makes it of.
+
+        What a box has from the ground is NaN.
+        """
+
+        def column(name: str, *length: int) -> Floats:
+            values = [getattr(box, name) for box in self.boxes]
+            return np.array(values, dtype=np.float64).reshape(-1, *length)  # None becomes NaN
+
+        return {
+            **{name: np.array(float(getattr(self, name))) for name in SCALARS},
+            "normal": np.array(self.normal),
+            **{f"box_{name}": column(name, *length) for name, length in OF_A_BOX.items()},
+        }
+
+    @classmethod
+    def of_numbers(cls, numbers: Mapping[str, NDArray[Any]]) -> SpatialGround:
+        """Make the ground of :meth:`numbers`.
+
+        Parameters
+        ----------
+        numbers : mapping of str to array
+            What that returned.
+
+        Returns
+        -------
+        SpatialGround
+            The ground.
+
+        Raises
+        ------
+        SimulationError
+            If a number cannot be.
+        """
+        columns = [numbers[f"box_{name}"].tolist() for name in OF_A_BOX]
+        boxes = []
+        for values in zip(*columns, strict=True):
+            box = dict(zip(OF_A_BOX, values, strict=True))
+            for name in ("friction", "restitution"):
+                box[name] = None if math.isnan(box[name]) else box[name]
+            boxes.append(Box(**box))
+        scalars = {name: float(numbers[name]) for name in SCALARS}
+        return cls(normal=numbers["normal"], boxes=tuple(boxes), **scalars)
+
+
+SCALARS = ("friction", "restitution", "height")
+OF_A_BOX: dict[str, tuple[int, ...]] = {
+    "center": (3,), "size": (3,), "yaw": (), "pitch": (), "friction": (), "restitution": ()
+}  # fmt: skip
+"""Numbers of a ground, and shapes of those of a box."""
 
 
 def _axes(box: Box) -> Floats:

@@ -22,6 +22,7 @@ from heelstrike.control.policy.reference import (
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
@@ -242,8 +243,7 @@ def policy(
     if follows:
         stride = stride_at(parameters.following, memory.speed)
         phase = memory.phase + (t - memory.since) / stride
-        joints = robot.model.actuator_joint
-        follow(parameters.following, memory.speed, phase, joints, state.q, state.v, torque)
+        follow(parameters.following, memory.speed, phase, robot, state.q, state.v, torque)
     else:
         for i in range(torque.shape[0]):
             torque[i] = 0.0
@@ -259,7 +259,7 @@ class Policy(Law):
     file : str, path or Network
         A file that :meth:`Network.save`, or anything else, wrote in the format of
         :mod:`heelstrike.control.policy.network`; or the network itself.
-    robot : Robot, optional
+    robot : Robot or SpatialRobot, optional
         The robot, to see at once whether it fits.
     speed : float, optional
         Speed (m/s) that is commanded to a policy which follows a motion; the lowest of its motions
@@ -280,7 +280,8 @@ class Policy(Law):
 
     @takes(ControllerError)
     def __init__(
-        self, file: str | os.PathLike[str] | Network, robot: Robot | None = None, *,
+        self, file: str | os.PathLike[str] | Network,
+        robot: Robot | SpatialRobot | None = None, *,
         speed: float | None = None, phase: float = 0.0,
     ) -> None:  # fmt: skip
         network = file if isinstance(file, Network) else load_network(file)

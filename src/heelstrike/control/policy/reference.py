@@ -8,6 +8,7 @@ the robot is off the motion.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from heelstrike.compiler.bundle import Bundle, array, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
@@ -140,18 +141,18 @@ def stride_at(following: Following, speed: float) -> float:
 
 @kernel
 def follow(
-    following: Following, speed: float, phase: float, joints: Integers, q: Floats, v: Floats,
+    following: Following, speed: float, phase: float, robot: Any, q: Floats, v: Floats,
     torque: Floats,
 ) -> None:  # fmt: skip
-    """Write the torques that make actuated joints follow the motion."""
+    """Write the torques that make actuated joints of a robot, as laws see it, follow the motion."""
     at = spot(following.speed, following.motion.shape[1], speed, phase)
     nq, nv = q.shape[0], v.shape[0]
     for i in range(torque.shape[0]):
-        joint = joints[i]
+        j, k = robot.driven_position(i), robot.driven_velocity(i)
         torque[i] = (
             between(following.motion, at, nq + nv + i)
-            + following.stiffness[i] * (between(following.motion, at, joint) - q[joint])
-            + following.damping[i] * (between(following.motion, at, nq + joint) - v[joint])
+            + following.stiffness[i] * (between(following.motion, at, j) - q[j])
+            + following.damping[i] * (between(following.motion, at, nq + k) - v[k])
         )
 
 
@@ -174,8 +175,7 @@ def held_action(
     nu, command = torque.shape[0], parameters.command
     speed, since = float(command[nu]), float(command[nu + 2])
     phase = float(command[nu + 1]) + (t - since) / stride_at(parameters.following, speed)
-    joints = robot.model.actuator_joint
-    follow(parameters.following, speed, phase, joints, state.q, state.v, torque)
+    follow(parameters.following, speed, phase, robot, state.q, state.v, torque)
     for i in range(nu):
         torque[i] += parameters.gear[i] * min(max(command[i], -1.0), 1.0)
 

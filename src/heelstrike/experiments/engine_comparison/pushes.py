@@ -62,7 +62,7 @@ class PushRow:
     """The largest push in an engine."""
 
     engine: str
-    """Name of the row's engine, or of our way through time."""
+    """Name of the row's engine, or of our simulation method."""
     title: str
     """What tables call it."""
     settings: str
@@ -246,7 +246,7 @@ def stands_by_ours(walk: Walk, method: Method, sign: float, impulse: float) -> b
     walk : Walk
         What is pushed.
     method : Method
-        The way through time.
+        The simulation method.
     sign : float
         1 forward, -1 backward.
     impulse : float

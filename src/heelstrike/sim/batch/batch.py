@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,23 +15,29 @@ from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.batch.crew import Crew
 from heelstrike.sim.batch.lanes import Lanes
 from heelstrike.sim.batch.moving import move_lanes
-from heelstrike.sim.batch.planning import Joints, Plan, compile_all, naming, planned
+from heelstrike.sim.batch.planning import Joints, Plan, compile_all, naming, planned, way_of
 from heelstrike.sim.closed_sets import OnError, RunStatus
 from heelstrike.sim.contacts.brakes import put_on
 from heelstrike.sim.contacts.latches import latches_at
 from heelstrike.sim.contacts.loops import HOLDS
 from heelstrike.sim.controller.interface import Controller
+from heelstrike.sim.dimension import dimension_of
 from heelstrike.sim.frame import Outcome
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import Push
-from heelstrike.sim.setting import check_state, checked_on_error, checked_setting
-from heelstrike.sim.simulation import CAN_GO_ON, FAR, Simulation, checked_method
+from heelstrike.sim.setting import checked_on_error, checked_setting
+from heelstrike.sim.simulation import CAN_GO_ON, FAR, Simulation
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.time_stepping import TimeStepping
+
+if TYPE_CHECKING:
+    from heelstrike.contact.spatial.ground import SpatialGround
+
 
 NO_ROWS = 2**62
 """Steps between two rows of runs that are not recorded: more than any run has."""
@@ -52,7 +58,7 @@ class Batch:
 
     Parameters
     ----------
-    robot : Robot, or sequence of n
+    robot : Robot or SpatialRobot, or sequence of n
         Robots may differ in every number, but must be built alike.
     controller : controller, sequence of n, or None
         :class:`~heelstrike.HeldTorque`, whose torques are in `command`; another stock controller,
@@ -65,7 +71,7 @@ class Batch:
         Numbers of the controller, in the place of its own.
     pushes : Push, sequence of Push, or sequence of n sequences of Push
         Forces from outside.
-    ground : Ground, or sequence of n
+    ground : Ground or SpatialGround, or sequence of n
         The ground; flat with μ = 0.75 and no restitution by default.
     method : Method
         Simulation method of all lanes; ``TimeStepping()`` by default.
@@ -91,11 +97,14 @@ class Batch:
     gap : (n, nc) float
         Height of the contact points over the ground (m), at the beginning of the last step.
     contact_force : (n, nc, 2) float
-        Normal and tangential force on the robot in the last step (N), axes of the ground below.
+        Normal and tangential force on the robot in the last step (N), axes of the ground below;
+        (n, nc, 3) in space.
     steps, saturations : (n,) int
         Steps taken; torques that were clipped.
     penetration, complementarity, cone, non_penetration, energy_gain : (n,) float
-        Worst values since the lane began; see :class:`~heelstrike.sim.run.Certificates`.
+        Worst values since the lane began; see :class:`~heelstrike.sim.run.Certificates`. In space
+        there are `residual`, `uncertified`, `halved` and `relaxed` in the place of the three
+        residuals; see :class:`~heelstrike.sim.spatial.SpatialCertificates`.
     events : (n, kinds) int
         Events of each kind, in the order of :class:`~heelstrike.sim.closed_sets.EventKind`.
     outcome : (n,) int
@@ -130,17 +139,29 @@ class Batch:
     ([0.01, 0.01, 0.01], np.True_)
     """
 
+    steps: Integers
+    saturations: Integers
+    penetration: Floats
+    complementarity: Floats
+    cone: Floats
+    non_penetration: Floats
+    energy_gain: Floats
+    residual: Floats
+    uncertified: Integers
+    halved: Integers
+    relaxed: Integers
+
     @takes(SimulationError)
     def __init__(
         self,
-        robot: Robot | Sequence[Robot],
+        robot: Robot | SpatialRobot | Sequence[Robot] | Sequence[SpatialRobot],
         controller: Controller | Sequence[Controller] | None = None,
         *,
         state: State | Sequence[State],
         lanes: int | None = None,
         parameters: Any = None,
         pushes: Push | Sequence[Push] | Sequence[Sequence[Push]] = (),
-        ground: Ground | Sequence[Ground] | None = None,
+        ground: Ground | SpatialGround | Sequence[Ground] | Sequence[SpatialGround] | None = None,
         method: Method | None = None,
         control_period: float | None = None,
         stop_when_fallen: bool | None = None,
@@ -151,13 +172,13 @@ class Batch:
     ) -> None:
         if lanes is not None and lanes < 1:
             raise SimulationError(f"lanes must be at least 1, got {lanes}")
-        method = checked_method(method)
+        way = way_of(robot, method)
         self._setup: dict[str, Any] = {
             "control_period": control_period, "record_every": NO_ROWS,
             "stop_when_fallen": stop_when_fallen, "on_error": checked_on_error(on_error),
         }  # fmt: skip
         plans, _ = planned(
-            method, self._setup, robot=robot, controller=controller, state=state,
+            way, self._setup, robot=robot, controller=controller, state=state,
             parameters=parameters, pushes=pushes, ground=ground, latched=latched, braked=braked,
         )  # fmt: skip
         if lanes is not None and len(plans) == 1:
@@ -166,13 +187,15 @@ class Batch:
             raise SimulationError(
                 f"lanes is {lanes}, but the other arguments are for {len(plans)} lanes"
             )
-        self.robot, self.method = plans[0].setting.robot, method
+        self.robot: Any = plans[0].setting.robot
+        self._way, self.method = way, way.asked_for
+        self._dimension = dimension_of(self.robot)
         self._lay_out(plans, checked_threads(threads, len(plans)))
 
     def _lay_out(self, plans: list[Plan], threads: int) -> None:
-        self.compile_s = compile_all(self.method, plans)
+        self.compile_s = compile_all(self._way, plans)
         self._plans = plans
-        self._lanes = Lanes(plans, self.method, threads, keep_rows=False)
+        self._lanes = Lanes(plans, self._way, threads, keep_rows=False)
         self._lanes.refuse_others(plans)
         self._lanes.make_ready()
         self._crew = Crew(threads)
@@ -205,14 +228,8 @@ class Batch:
         self.torque: Floats = column(memory.torque)
         self.gap: Floats = column(memory.contacts.gap)
         self.contact_force: Floats = column(memory.contacts.force)
-        tallied = {name: column(found[f"tally.{name}"]) for name in TALLIED}
-        self.steps: Integers = tallied["steps"]
-        self.saturations: Integers = tallied["saturations"]
-        self.penetration: Floats = tallied["penetration"]
-        self.complementarity: Floats = tallied["complementarity"]
-        self.cone: Floats = tallied["cone"]
-        self.non_penetration: Floats = tallied["non_penetration"]
-        self.energy_gain: Floats = tallied["energy_gain"]
+        for name in self._dimension.tallied_names:
+            setattr(self, name, column(found[f"tally.{name}"]))
 
     def __len__(self) -> int:
         return len(self._plans)
@@ -333,7 +350,7 @@ class Batch:
         self._look_at_lent()
         lanes = self._lanes.lanes
         self._until[:] = [
-            self.method.instant(lane._clock, time)
+            self._way.instant(lane._clock, time)
             for lane, time in zip(lanes, times.tolist(), strict=True)
         ]
         early = (self.time < self._until) & self.going
@@ -365,7 +382,7 @@ class Batch:
         """
         chosen = self._chosen(mask)
         q, v = self._states(chosen, state)
-        self._check_states(chosen, q, v)
+        q, v = self._checked_states(chosen, q, v)
         if chosen.size:
             self._begin_anew(chosen, q, v)
 
@@ -381,7 +398,7 @@ class Batch:
             self._has_ended = bool((self._outcome > WENT_ON).any())
 
     def _renew(
-        self, index: int, *, pushes: Sequence[Push] | None = None, ground: Ground | None = None
+        self, index: int, *, pushes: Sequence[Push] | None = None, ground: Any = None
     ) -> None:
         """Give a lane that is about to start again other pushes, as many as it has, or ground.
 
@@ -404,12 +421,12 @@ class Batch:
         self,
         index: int,
         *,
-        robot: Robot | None = None,
+        robot: Robot | SpatialRobot | None = None,
         controller: Controller | None = None,
         state: State | None = None,
         parameters: Bundle | None = None,
         pushes: Sequence[Push] | None = None,
-        ground: Ground | None = None,
+        ground: Ground | SpatialGround | None = None,
         latched: Sequence[str | int] | None = None,
         braked: Sequence[str | int] | None = None,
     ) -> None:
@@ -457,14 +474,14 @@ class Batch:
         }  # fmt: skip
         about: Any = known | {name: each for name, each in given.items() if each is not None}
         with naming(index, 2):
-            plans, _ = planned(self.method, self._setup, **about)
+            plans, _ = planned(self._way, self._setup, **about)
             if len(plans) != 1:
                 raise SimulationError(
                     f"lay changes one lane at a time, got arguments for {len(plans)}"
                 )
             self._lanes.refuse_others(plans)
             commanded_width(plans, (self.command.shape[1],))
-            compile_all(self.method, plans)
+            compile_all(self._way, plans)
             self._lanes.lay(index, plans[0])
         self._plans[index] = plans[0]
         commanded = self._lanes.lanes[index].commanded
@@ -553,31 +570,33 @@ class Batch:
             found.append(np.broadcast_to(array, (len(chosen), size)))
         return found[0], found[1]
 
-    def _check_states(self, chosen: Integers, q: Floats, v: Floats) -> None:
-        """Refuse states that lanes cannot begin with."""
+    def _checked_states(self, chosen: Integers, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Return states that lanes can begin with, or refuse others."""
         finite = np.isfinite(q).all(axis=1) & np.isfinite(v).all(axis=1)
         if not finite.all():
             lane = int(chosen[np.flatnonzero(~finite)[0]])
             raise SimulationError(f"the state of lane {lane} is not finite")
-        model = self.robot.model
-        if model.loops or model.couplings:
-            for index, *state in zip(chosen.tolist(), q, v, strict=True):
+        if not self._dimension.is_free(self.robot):
+            q, v = q.copy(), v.copy()
+            for place, index in enumerate(chosen.tolist()):
                 with naming(index, len(self)):
-                    check_state(self._plans[index].setting.robot, State(*state))
+                    robot, at = self._plans[index].setting.robot, State(q[place], v[place])
+                    good = self._dimension.checked_state(robot, at)
+                q[place], v[place] = good.q, good.v
         if not isinstance(self.method, TimeStepping):
             for index, *state in zip(chosen.tolist(), q, v, strict=True):
                 lane, at = self._lanes.lanes[index], State(*state)
                 setting = replace(self._plans[index].setting, state=at, ground=lane.ground)
                 with naming(index, len(self)):
-                    self.method.check(setting)
+                    self._way.check(setting)
+        return q, v
 
     def _hold(self, index: int) -> None:
         """Let what follows from the state follow from the one that a lane begins with now."""
         plan, lane = self._plans[index], self._lanes.lanes[index]
         setting = plan.setting
-        model = setting.robot.model
         falls = np.isfinite(setting.fallen_height)
-        if not (falls or model.latches or model.brakes):
+        if not (falls or setting.held or setting.braked):
             return
         state = lane.state
         if falls:
@@ -585,10 +604,11 @@ class Batch:
                 setting.robot, state, ground=lane.ground, **self._setup | {"stop_when_fallen": True}
             )
             lane._clock.fallen_height = again.fallen_height
-        if model.latches:
+        if setting.held:
             held = latches_at(setting.robot, state, lane.ground, plan.latched)
             lane._memory.loops.held[:] = held
-        put_on(setting.robot, setting.braked, state, HOLDS, lane._memory)
+        if setting.braked:
+            put_on(setting.robot, setting.braked, state, HOLDS, lane._memory)
 
     def _tell_apart(self) -> None:
         """Find lanes that move by themselves, and whether any takes more than its memory to begin.
@@ -597,9 +617,10 @@ class Batch:
         """
         self._alone = np.array([lane.moves_alone for lane in self._lanes.lanes], dtype=bool)
         self._any_alone = bool(self._alone.any())
-        model = self.robot.model
-        self._any_special = bool(model.latches or model.brakes) or any(
-            np.isfinite(plan.setting.fallen_height) or plan.setting.pushes for plan in self._plans
+        settings = [plan.setting for plan in self._plans]
+        self._any_special = any(
+            each.held or each.braked or each.pushes or np.isfinite(each.fallen_height)
+            for each in settings
         )
         thread = self._lanes.thread
         self._shares = [np.flatnonzero(thread == each) for each in range(self._crew.threads)]
@@ -665,12 +686,6 @@ class Batch:
             self._outcome[index] = _OUTCOME_OF[lane.status]
             self._has_ended = True
 
-
-TALLIED = (
-    "steps", "saturations", "penetration", "complementarity", "cone", "non_penetration",
-    "energy_gain",
-)  # fmt: skip
-"""Counts and worst values of a lane, by their names in its memory."""
 
 _OUTCOME_OF = {
     RunStatus.FELL: int(Outcome.FELL),

@@ -20,10 +20,9 @@ from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.controller.control import TRUSTED
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.frame import Outcome
-from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import pushes_on
-from heelstrike.sim.run import Run, counted
+from heelstrike.sim.run import AnyRun
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.simulation import NEVER, Simulation
 
@@ -44,7 +43,7 @@ class Ending:
     """(kinds,) Events of each kind."""
     counts: dict[str, Any]
     """What was counted, and the worst values, by name."""
-    run: Run | None
+    run: AnyRun | None
     """The record, if rows were kept."""
 
 
@@ -57,7 +56,7 @@ class Lane(Simulation):
         What it is to be.
     method : Method
         Simulation method.
-    memory, clock : Memory and Clock
+    memory, clock : Memory or SpatialMemory, and Clock
         As they are allocated for its robot and pushes.
     events : (kinds,) int
         Where its events are counted.
@@ -66,7 +65,7 @@ class Lane(Simulation):
     """
 
     def __init__(
-        self, plan: Plan, method: Method, memory: Memory, clock: Clock, events: Integers,
+        self, plan: Plan, method: Method, memory: Any, clock: Clock, events: Integers,
         *, keep_rows: bool,
     ) -> None:  # fmt: skip
         self._begin(plan.setting, method, memory, clock, keep_rows)
@@ -171,7 +170,7 @@ class Lane(Simulation):
     def to_the_end(self, duration: float, stopped: Callable[[], bool]) -> Ending:
         """Simulate as :func:`~heelstrike.simulate` does, until `stopped` says so."""
         keep = self._keeps_rows
-        self._advance(self.method.instant(self._clock, duration), NEVER, stopped=stopped)
+        self._advance(self._way.instant(self._clock, duration), NEVER, stopped=stopped)
         final = self._final() if keep else None
         status, message = self._decide_last()
         last = self._records[-1]
@@ -182,7 +181,7 @@ class Lane(Simulation):
         self.count_events()
         return Ending(
             status, message, self.error, State(state.q.copy(), state.v.copy()), self.time,
-            self._event_counts.copy(), counted(self._memory), run,
+            self._event_counts.copy(), self._dimension.counted(self._memory), run,
         )  # fmt: skip
 
 

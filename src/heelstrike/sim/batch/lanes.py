@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import address_of_array
 from heelstrike.compiler.mold import Mold
-from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers
-from heelstrike.robot.robot import Robot
 from heelstrike.sim.batch.lane import Lane
 from heelstrike.sim.batch.moving import PLACES, put_back_lanes
 from heelstrike.sim.batch.planning import Plan
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.memory import Memory, allocate_memory
+from heelstrike.sim.dimension import dimension_of
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import pushes_on
 
@@ -58,10 +55,11 @@ class Lanes:
     ) -> None:
         count = len(plans)
         self._method, self._keep_rows = method, keep_rows
-        robots = list(dict.fromkeys(plan.setting.robot for plan in plans))
-        sizes, self._clock_mold = {_mold(robot).size for robot in robots}, Mold(Clock())
-        most = max(map(_capacity, robots))
-        self._scratch = [contact_workspace(most, ready=False) for _ in range(threads)]
+        settings = [plan.setting for plan in plans]
+        self._dimension = dimension_of(settings[0].robot)
+        sizes = {self._dimension.mold(setting).size for setting in settings}
+        self._clock_mold = Mold(Clock())
+        self._scratch = [self._dimension.scratch(settings) for _ in range(threads)]
         width = self._clock_mold.size + max(sizes)
         self._block = np.zeros((count, width), dtype=np.int64)
         self.thread = np.arange(count) * threads // max(count, 1)
@@ -88,7 +86,7 @@ class Lanes:
     def refuse_others(self, plans: Sequence[Plan]) -> None:
         """Refuse robots whose memory would not lie in columns."""
         wanted = self._block.shape[1] - self._clock_mold.size
-        if any(_mold(plan.setting.robot).size != wanted for plan in plans):
+        if any(self._dimension.mold(plan.setting).size != wanted for plan in plans):
             raise SimulationError(
                 "the robots of a batch must have the same structure, joint by joint; one of these "
                 "differs. Use simulate_batch for such robots"
@@ -124,12 +122,11 @@ class Lanes:
         return found
 
     def _new(self, index: int, plan: Plan) -> Lane:
-        robot, row = plan.setting.robot, self._block[index]
-        mold, first = _mold(robot), self._clock_mold.size
+        setting, row = plan.setting, self._block[index]
+        mold, first = self._dimension.mold(setting), self._clock_mold.size
         memory = mold.cast(row[first : first + mold.size])
-        scratch = self._scratch[self.thread[index]]
-        solver = scratch.replaced(settings=memory.solver.settings, tally=memory.solver.tally)
-        memory = memory.replaced(solver=solver, pushes=pushes_on(robot, plan.setting.pushes))
+        memory = self._dimension.with_scratch(memory, self._scratch[self.thread[index]])
+        memory = memory.replaced(pushes=pushes_on(setting.robot, setting.pushes))
         clock = self._clock_mold.cast(row[:first])
         return Lane(
             plan, self._method, memory, clock, self.events[index], keep_rows=self._keep_rows
@@ -156,20 +153,3 @@ class Lanes:
             used = set(self._image_at.tolist())
             images = self._images.items()
             self._images = {k: each for k, each in images if address_of_array(each) in used}
-
-
-def _mold(robot: Robot) -> Mold[Memory]:
-    """Mold of the memory of a robot's simulations, with none for the solvers."""
-    if robot not in _MOLDS:
-        _MOLDS[robot] = Mold(
-            allocate_memory(robot).replaced(solver=contact_workspace(1, ready=False))
-        )
-    return _MOLDS[robot]
-
-
-_MOLDS: WeakKeyDictionary[Robot, Mold[Memory]] = WeakKeyDictionary()
-
-
-def _capacity(robot: Robot) -> int:
-    """Contacts that the solvers have room for."""
-    return max(len(allocate_memory(robot).rows.kind), 1)

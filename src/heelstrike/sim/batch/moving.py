@@ -14,7 +14,7 @@ from heelstrike.compiler.words import copy_between
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.frame import FORK, PAUSED, RECORD_FULL
-from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.record import RowsAndEvents
 
 # The columns of places: where the loop of a lane is and the bundles that it is called with, and
 # where its law looks for the torques that are commanded, zero if it does not.
@@ -25,7 +25,7 @@ PLACES = 9
 @cache
 def move_lanes() -> Any:
     """Return what moves lanes on: see `move` within."""
-    clock_at, record_at = bundle_at(Clock), bundle_at(Record)
+    clock_at, record_at = bundle_at(Clock), bundle_at(RowsAndEvents)
 
     def move(
         places: Integers, lanes: Integers, until: Floats, steps: int, command: Integers,

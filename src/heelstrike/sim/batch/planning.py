@@ -11,16 +11,17 @@ from numpy.typing import NDArray
 
 from heelstrike.arguments import are_numbers, refusal
 from heelstrike.compiler.bundle import Bundle
-from heelstrike.contact.ground import Ground
 from heelstrike.errors import ControllerError, RobotError, SimulationError
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.contacts.latches import is_one, several
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.controller.law import Law, law_of
+from heelstrike.sim.dimension import AnyRobot, dimension_of
 from heelstrike.sim.frame import compiled_loop, fixed_for
-from heelstrike.sim.method import Method, check_constraints, work_of
+from heelstrike.sim.method import Method, work_of
 from heelstrike.sim.push import Push
 from heelstrike.sim.setting import Setting, checked_setting
 from heelstrike.sim.simulation import has_warned
@@ -49,9 +50,9 @@ class Plan(NamedTuple):
 
 def planned(
     method: Method, setup: Mapping[str, Any], *,
-    robot: Robot | Sequence[Robot], controller: Controller | Sequence[Controller] | None,
+    robot: AnyRobot | Sequence[AnyRobot], controller: Controller | Sequence[Controller] | None,
     state: State | Snapshot | Sequence[State], parameters: Any, pushes: Any,
-    ground: Ground | Sequence[Ground] | None, latched: Any, braked: Any,
+    ground: Any, latched: Any, braked: Any,
     **more: Sequence[Any],
 ) -> tuple[list[Plan], list[dict[str, Any]]]:  # fmt: skip
     """Check what the lanes of a batch are to be.
@@ -90,7 +91,6 @@ def planned(
         latched=[None] if latched is None else _joints("latched", latched),
         braked=_joints("braked", braked),
     )
-    _check_robots([each["robot"] for each in asked])
     laws = {id(each): _law(each) for each in _listed(controller)}
     plans = []
     for index, each in enumerate(asked):
@@ -102,12 +102,11 @@ def planned(
 
 
 def _plan(
-    method: Method, law: Law, setup: Mapping[str, Any], *, robot: Robot, state: State,
+    method: Method, law: Law, setup: Mapping[str, Any], *, robot: AnyRobot, state: State,
     parameters: Any, **about: Any,
 ) -> Plan:  # fmt: skip
     setting = checked_setting(robot, state, **setup, **about)
-    check_constraints(method, setting)
-    method.check(setting)
+    dimension_of(robot).check(method, setting)
     has_warned(method, setting)
     method.set_clock(setting, Clock())
     if isinstance(parameters, Mapping):
@@ -130,8 +129,8 @@ def compile_all(method: Method, plans: Sequence[Plan]) -> float:
         found.add(fixed_for(setting.robot, setting.ground.model(), work, method.usual_numbers))
     for fixed in found:
         seconds += compiled_loop(method.kernels, method.work, fixed)[1]
-    for function in {plan.law.function for plan in plans}:
-        function.finish()
+    for plan in {plan.law.function: plan for plan in plans}.values():
+        dimension_of(plan.setting.robot).words_of(plan.law)
     return seconds
 
 
@@ -240,22 +239,34 @@ def _joints(name: str, joints: Any) -> Sequence[Any]:
 
 
 _ALIKE = {
-    "nv": "coordinates", "nu": "actuators", "nc": "contact points", "loops": "closed loops",
-    "couplings": "coupled joints", "latches": "latches", "brakes": "brakes",
+    "nv": "coordinates", "nq": "positions", "nu": "actuators", "nc": "contact points",
+    "loops": "closed loops", "couplings": "coupled joints", "latches": "latches",
+    "brakes": "brakes",
 }  # fmt: skip
 
 
 def _check_robots(robots: Sequence[Any]) -> None:
     for index, robot in enumerate(robots):
-        if not isinstance(robot, Robot):
+        if not isinstance(robot, Robot | SpatialRobot):
             raise SimulationError(f"robot must be a Robot or several, got {robot!r}")
+        if type(robot) is not type(robots[0]):
+            raise SimulationError(
+                "the robots of a batch live all in the plane or all in space: robot "
+                f"{index} is a {type(robot).__name__}, the first a {type(robots[0]).__name__}"
+            )
         for name, what in _ALIKE.items():
-            first, other = getattr(robots[0].model, name), getattr(robot.model, name)
+            first, other = (getattr(each.model, name, 0) for each in (robots[0], robot))
             if first != other:
                 raise SimulationError(
                     f"the robots of a batch must be built alike: robot {index} has {other} "
                     f"{what}, the first has {first}"
                 )
+
+
+def way_of(robot: AnyRobot | Sequence[AnyRobot], method: Method | None) -> Method:
+    """Return how the robots of a batch go through time as a method says, or refuse it."""
+    _check_robots(_listed(robot))
+    return dimension_of(_listed(robot)[0]).way(method)
 
 
 def _law(controller: Any) -> Law:

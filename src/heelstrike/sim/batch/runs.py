@@ -12,7 +12,7 @@ from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import field, replace
 from time import perf_counter, thread_time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,21 +24,28 @@ from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.batch.batch import NO_ROWS, checked_threads
 from heelstrike.sim.batch.lane import Ending, Lane
 from heelstrike.sim.batch.lanes import Lanes
-from heelstrike.sim.batch.planning import Joints, Plan, compile_all, naming, planned
+from heelstrike.sim.batch.planning import Joints, Plan, compile_all, naming, planned, way_of
 from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.controller.raised import tell
+from heelstrike.sim.dimension import dimension_of
 from heelstrike.sim.method import Method
+from heelstrike.sim.plane import PLANE
 from heelstrike.sim.push import Push
 from heelstrike.sim.record.size import check_runs
-from heelstrike.sim.run import COUNTS, WORST, Run, Timing
+from heelstrike.sim.run import Timing
 from heelstrike.sim.setting import checked_on_error
-from heelstrike.sim.simulation import check_duration, checked_method
+from heelstrike.sim.simulation import check_duration
 from heelstrike.sim.snapshot import Snapshot
+
+if TYPE_CHECKING:
+    from heelstrike.contact.spatial.ground import SpatialGround
+
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -50,9 +57,9 @@ SHOWN = 10
 """Runs that a warning of errors names at most, beside the first."""
 
 
-@dataclass(frozen=True, eq=False)
-class BatchResult:
-    """What many simulations came to."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AnyBatchResult:
+    """What many simulations came to, in the plane or in space."""
 
     position: Floats
     """(n, nq)"""
@@ -72,26 +79,20 @@ class BatchResult:
     :class:`~heelstrike.sim.closed_sets.EventKind`."""
     penetration: Floats
     """(n,) Deepest penetration of a contact point, in m."""
-    complementarity: Floats
-    cone: Floats
-    non_penetration: Floats
-    """complementarity, cone, non_penetration: (n,) Largest relative residuals of the contact
-    problems."""
     energy_gain: Floats
     """(n,) Kinetic energy that restitution made (J)."""
     solves: Integers
     shortcuts: Integers
     fallbacks: Integers
     failures: Integers
-    combinations: Integers
     relaxed: Integers
-    """solves, shortcuts, fallbacks, failures, combinations, relaxed: (n,) Contact problems of each
-    run, and how they were solved; see :class:`~heelstrike.sim.run.SolverCount`."""
+    """solves, shortcuts, fallbacks, failures, relaxed: (n,) Contact problems of each run, and how
+    they were solved; see :class:`~heelstrike.sim.run.SolverCount`."""
     threads: int
     """Threads that worked on it."""
     timing: Timing
     """Seconds spent compiling, or loading compiled code, and simulating."""
-    _runs: tuple[Run | None, ...] | None = field(default=None, repr=False)
+    _runs: tuple[Any, ...] | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.status)
@@ -101,7 +102,7 @@ class BatchResult:
         """Which runs lasted as long as they were asked to, (n,)."""
         return np.array([status is RunStatus.COMPLETED for status in self.status], dtype=bool)
 
-    def run(self, index: int) -> Run:
+    def run(self, index: int) -> Any:
         """Return the record of one run, as :func:`~heelstrike.simulate` would have.
 
         Parameters
@@ -111,7 +112,7 @@ class BatchResult:
 
         Returns
         -------
-        Run
+        Run or SpatialRun
             Its record.
 
         Raises
@@ -142,16 +143,41 @@ class BatchResult:
         return f"{len(self)} runs: {', '.join(counts)}"
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BatchResult(AnyBatchResult):
+    """What many simulations came to."""
+
+    complementarity: Floats
+    cone: Floats
+    non_penetration: Floats
+    """complementarity, cone, non_penetration: (n,) Largest relative residuals of the contact
+    problems."""
+    combinations: Integers
+    """(n,) Contact problems that came to the last resort, combinations of contact modes."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SpatialBatchResult(AnyBatchResult):
+    """What many simulations in space came to."""
+
+    residual: Floats
+    """(n,) Largest relative residual of the contact problems."""
+    uncertified: Integers
+    halved: Integers
+    """uncertified, halved: (n,) Steps that went on with a residual above 1e-9; that were taken in
+    parts."""
+
+
 @takes(SimulationError)
 def simulate_batch(
-    robot: Robot | Sequence[Robot],
+    robot: Robot | SpatialRobot | Sequence[Robot] | Sequence[SpatialRobot],
     controller: Controller | Sequence[Controller] | None = None,
     *,
     state: State | Snapshot | Sequence[State],
     duration: ArrayLike,
     parameters: Bundle | Sequence[Bundle] | Mapping[str, ArrayLike] | None = None,
     pushes: Push | Sequence[Push] | Sequence[Sequence[Push]] = (),
-    ground: Ground | Sequence[Ground] | None = None,
+    ground: Ground | SpatialGround | Sequence[Ground] | Sequence[SpatialGround] | None = None,
     method: Method | None = None,
     control_period: float | None = None,
     record_every: int | None = None,
@@ -162,7 +188,7 @@ def simulate_batch(
     threads: int | None = None,
     time_limit: float | None = None,
     progress: Callable[[int, int], None] | bool | None = None,
-) -> BatchResult:
+) -> Any:
     """Simulate many runs at once.
 
     Each argument is either for all runs or has one entry a run; n is their number. The results are
@@ -171,7 +197,7 @@ def simulate_batch(
 
     Parameters
     ----------
-    robot : Robot, or sequence of n
+    robot : Robot or SpatialRobot, or sequence of n
         Robots may differ in every number, but must have as many coordinates, actuators, contact
         points, closed loops and coupled joints.
     controller : controller, sequence of n, or None
@@ -186,7 +212,7 @@ def simulate_batch(
         run to run.
     pushes : Push, sequence of Push, or sequence of n sequences of Push
         Forces from outside; a plain sequence acts in every run.
-    ground : Ground, or sequence of n
+    ground : Ground or SpatialGround, or sequence of n
         The ground; flat with μ = 0.75 and no restitution by default.
     method : Method
         Simulation method of all runs; ``TimeStepping()`` by default.
@@ -221,7 +247,7 @@ def simulate_batch(
 
     Returns
     -------
-    BatchResult
+    BatchResult or SpatialBatchResult
         How every run ended. A fall or a failure, of the controller too, ends its own run only;
         Ctrl-C ends all, and those that had not begun are where they started. While compiling,
         Ctrl-C raises KeyboardInterrupt.
@@ -250,7 +276,7 @@ def simulate_batch(
         raise SimulationError(f"threads must be at least 1, got {threads}")
     if time_limit is not None and not time_limit > 0.0:
         raise SimulationError(f"time_limit must be positive (s) or None, got {time_limit}")
-    method = checked_method(method)
+    way = way_of(robot, method)
     setup: dict[str, Any] = {
         "control_period": control_period,
         "record_every": NO_ROWS if record_every is None else record_every,
@@ -258,7 +284,7 @@ def simulate_batch(
         "on_error": OnError.STOP,  # of one run; what the batch does comes at its end
     }
     plans, asked = planned(
-        method, setup, robot=robot, controller=controller, state=state, parameters=parameters,
+        way, setup, robot=robot, controller=controller, state=state, parameters=parameters,
         pushes=pushes, ground=ground, latched=latched, braked=braked,
         duration=_durations(duration),
     )  # fmt: skip
@@ -266,12 +292,12 @@ def simulate_batch(
     for index, (plan, each) in enumerate(zip(plans, durations, strict=True)):
         with naming(index, len(plans)):
             check_duration(each)
-            method.check_span(plan.setting, each)
+            way.check_span(plan.setting, each)
     if record_every is not None:
-        rows = sum(method.rows_in(each, record_every) for each in durations)
+        rows = sum(way.rows_in(each, record_every) for each in durations)
         check_runs(plans[0].setting.robot, rows, len(plans), record_every)
-    compile_s = compile_all(method, plans)
-    work = _Work(plans, durations, method, recorded=record_every is not None, limit=time_limit)
+    compile_s = compile_all(way, plans)
+    work = _Work(plans, durations, way, recorded=record_every is not None, limit=time_limit)
     threads = checked_threads(workers, len(plans))
     with _shown(progress, len(plans)) as show:
         work.finish(threads, show)
@@ -321,7 +347,9 @@ class _Work:
         self._why = ""
         self._lock = threading.Lock()
         self._done = 0
-        self._endings = [_not_begun(plan.setting.state) for plan in plans]
+        self._dimension = dimension_of(plans[0].setting.robot)
+        nothing = self._dimension.nothing_counted()
+        self._endings = [_not_begun(plan.setting.state, nothing) for plan in plans]
 
     def finish(self, threads: int, show: Callable[[int, int], None]) -> None:
         """Simulate everything; Ctrl-C ends the runs at work and leaves the others."""
@@ -393,7 +421,7 @@ class _Work:
                 message += f". Errors ended {len(failed) - 1} more: {others}{more}"
             tell(message, first.error, on_error)
 
-    def result(self, threads: int, timing: Timing) -> BatchResult:
+    def result(self, threads: int, timing: Timing) -> Any:
         """Return what came out."""
         endings = self._endings
         interrupted = [ending.status is RunStatus.INTERRUPTED for ending in endings]
@@ -404,7 +432,8 @@ class _Work:
             name: np.array([ending.counts[name] for ending in endings])
             for name in endings[0].counts
         }
-        return BatchResult(
+        kind: Any = BatchResult if self._dimension is PLANE else SpatialBatchResult
+        return kind(
             position=np.array([ending.state.q for ending in endings]).reshape(count, -1),
             velocity=np.array([ending.state.v for ending in endings]).reshape(count, -1),
             time=np.array([ending.time for ending in endings]),
@@ -425,8 +454,7 @@ def _is_error(ending: Ending) -> bool:
     return ending.status is RunStatus.CONTROLLER_FAILED and ending.error is not None
 
 
-def _not_begun(state: State) -> Ending:
-    counts = dict.fromkeys(COUNTS, 0) | dict.fromkeys(WORST, 0.0)
+def _not_begun(state: State, counts: dict[str, Any]) -> Ending:
     events = np.zeros(len(EventKind), dtype=np.int64)
     message = "interrupted before it began"
     return Ending(RunStatus.INTERRUPTED, message, None, state, 0.0, events, counts, None)

@@ -12,6 +12,7 @@ from heelstrike.compiler.words import copy_words
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.controller.control import OVERRAN, TRUSTED, Control
 from heelstrike.sim.controller.guard import intact, intact_between
+from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import Memory
 
 
@@ -25,7 +26,7 @@ def ask(
     robot.trial = 0
     _show(q, v, model, memory, control)
     at = control.kept_at, control.log_at
-    _ask(controller, time, control.kept, at, control, torque)
+    call_law(controller, time, control.kept, at, control, torque)
 
 
 @dissolved_kernel
@@ -40,7 +41,7 @@ def consult(
     robot.trial = 1
     _show(q, v, model, memory, control)
     at = control.spare_at, control.spare_log_at
-    _ask(controller, time, control.spare, at, control, torque)
+    call_law(controller, time, control.spare, at, control, torque)
 
 
 @dissolved_kernel
@@ -61,10 +62,11 @@ def _show(q: Floats, v: Floats, model: Model, memory: Memory, control: Control) 
 
 
 @dissolved_kernel
-def _ask(
+def call_law(
     controller: Any, time: float, kept: Integers, at: tuple[int, int], control: Control,
     torque: Floats,
 ) -> None:  # fmt: skip
+    """Call a controller; its torques are no number if it wrote where it may not."""
     memory_at, log_at = at
     controller(
         time, address_of(control.state), address_of(control.contacts), address_of(control.robot),
@@ -95,7 +97,12 @@ def _show_copies(memory: Memory, control: Control) -> None:
     copy_words(tree.velocity, own.velocity)
     copy_words(tree.bias_acceleration, own.bias_acceleration)
     copy_words(tree.inertia, own.inertia)
-    contacts, seen = memory.contacts, control.contacts
+    show_contacts(memory.contacts, control.contacts)
+
+
+@kernel
+def show_contacts(contacts: Contacts, seen: Contacts) -> None:
+    """Copy contact points."""
     copy_words(contacts.position, seen.position)
     copy_words(contacts.normal, seen.normal)
     copy_words(contacts.gap, seen.gap)

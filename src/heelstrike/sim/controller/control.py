@@ -12,18 +12,12 @@ import numpy as np
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.mold import Mold
 from heelstrike.compiler.words import VALUE
-from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Integers
-from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.guard import guarded_bundle, in_one_block
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.controller.robot import (
-    ControlledRobot,
-    ControlState,
-    extents_of,
-    robot_view,
-)
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState, extents_of
+from heelstrike.sim.dimension import AnyRobot, dimension_of
 
 if TYPE_CHECKING:
     from heelstrike.sim.controller.law import Law
@@ -79,11 +73,11 @@ class ReadyLaw:
 
     Parameters
     ----------
-    robot : Robot
+    robot : Robot or SpatialRobot
         The robot.
     law : Law
         The law.
-    tree, contacts : Workspace and Contacts, optional
+    tree, contacts : Workspace or SpatialWorkspace, and Contacts, optional
         Those of the simulation, which stock controllers are shown; others see copies.
     log : Bundle, optional
         What the log begins with that a controller in Python keeps; by default that of the law.
@@ -104,7 +98,7 @@ class ReadyLaw:
     """
 
     def __init__(
-        self, robot: Robot, law: Law, tree: Workspace | None = None,
+        self, robot: AnyRobot, law: Law, tree: Any = None,
         contacts: Contacts | None = None, log: Bundle | None = None,
     ) -> None:  # fmt: skip
         believes = believes_in_another(law, robot)
@@ -116,15 +110,16 @@ class ReadyLaw:
         self._spare = own.spare
         ours = law.function.is_ours and tree is not None and contacts is not None
         sees = {"kinematics": tree} if ours and not believes else {}
+        its = dimension_of(robot).shown(robot)
         shown: dict[str, Any] = {
-            "state": ControlState.allocate(extents, **sees),
+            "state": its.state.allocate(extents, **sees),
             "contacts": contacts if ours else Contacts.allocate(extents),
-            "robot": robot_view(robot),
+            "robot": its.robot,
         }
         self._shown: dict[str, Bundle] = {}
         if not ours:
             shown = self._shown = {name: guarded_bundle(each) for name, each in shown.items()}
-        self.control = Control(
+        self.control = its.control(
             function=np.zeros(VALUE, dtype=np.int64), parameters=own.parameter_words,
             kept=own.kept_words, spare=own.spare_words,
             between_parameters=laid.between[0], between_kept=laid.between[1],
@@ -168,7 +163,7 @@ _NOWHERE = np.zeros(0, dtype=np.int64)
 class _Laid(NamedTuple):
     """The numbers of a law for a robot: laid out in blocks, and where in these is what."""
 
-    robot: Robot
+    robot: AnyRobot
     parameters: Bundle
     memory: dict[str, Any]
     mold: Mold[Any]
@@ -179,7 +174,7 @@ class _Laid(NamedTuple):
 _LAID: WeakKeyDictionary[Law, _Laid] = WeakKeyDictionary()
 
 
-def _numbers_of(law: Law, robot: Robot, log: Bundle | None) -> tuple[Any, _Laid]:
+def _numbers_of(law: Law, robot: AnyRobot, log: Bundle | None) -> tuple[Any, _Laid]:
     """Return the numbers that a law begins with, and how they were laid out."""
     plain = all(isinstance(value, int | float) for value in law.memory.values())
     if log is not None or not plain:
@@ -198,7 +193,7 @@ def _numbers_of(law: Law, robot: Robot, log: Bundle | None) -> tuple[Any, _Laid]
     return own, laid
 
 
-def _laid_out(law: Law, robot: Robot, log: Bundle) -> _Laid:
+def _laid_out(law: Law, robot: AnyRobot, log: Bundle) -> _Laid:
     numbers, memory = law.numbers(robot)
     parameters, parameter_words, between_parameters = in_one_block(numbers)
     kinds: tuple[Any, Any] = type(memory), type(log)
@@ -239,7 +234,7 @@ def _places(values: Any, block: Integers) -> Integers:
     return np.arange(first, first + values.size)
 
 
-def believes_in_another(law: Law, robot: Robot) -> bool:
+def believes_in_another(law: Law, robot: AnyRobot) -> bool:
     """Whether a law knows another robot than the one it controls, by any of its numbers.
 
     Raises

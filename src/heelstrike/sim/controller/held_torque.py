@@ -9,6 +9,7 @@ from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.controller.law import Law, controller, per_actuator
 
 
@@ -33,7 +34,7 @@ class HeldTorque(Law):
 
     Parameters
     ----------
-    robot : Robot
+    robot : Robot or SpatialRobot
         The robot.
     torque : float or (nu,) float
         Torques to begin with (N m).
@@ -56,6 +57,6 @@ class HeldTorque(Law):
     commanded = "torque"
 
     @takes(ControllerError)
-    def __init__(self, robot: Robot, torque: ArrayLike = 0.0) -> None:
+    def __init__(self, robot: Robot | SpatialRobot, torque: ArrayLike = 0.0) -> None:
         held = per_actuator("torque", torque, robot)
         super().__init__(held_torque, Command(torque=held))

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle
-from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.checking import CheckedCall
 from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.interface import ARGUMENTS, Contacts, Partaking
+from heelstrike.sim.dimension import AnyRobot
 
 if TYPE_CHECKING:
     from heelstrike.sim.controller.law import Law
@@ -24,7 +24,7 @@ class AskedLaw:
 
     Parameters
     ----------
-    robot : Robot
+    robot : Robot or SpatialRobot
         The robot it controls.
     law : Law
         The law.
@@ -41,7 +41,7 @@ class AskedLaw:
     """
 
     def __init__(
-        self, robot: Robot, law: Law, *, compiled: bool = False, checked: bool = False
+        self, robot: AnyRobot, law: Law, *, compiled: bool = False, checked: bool = False
     ) -> None:
         ready = ReadyLaw(robot, law)
         self.control = control = ready.control

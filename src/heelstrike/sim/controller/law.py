@@ -132,9 +132,7 @@ class ControllerFunction:
     @cached_property
     def words(self) -> Integers:
         """What loops find it by, compiled: its value in words of memory."""
-        words = np.zeros(VALUE, dtype=np.int64)
-        _keep()(self.finish(), words)
-        return words
+        return _words(self.finish())
 
     def finish(self) -> Any:
         """Compile it, or load its machine code.
@@ -155,13 +153,7 @@ class ControllerFunction:
     @cached_property
     def separate(self) -> SeparateKernel:
         """Its machine code, which loops find by its address."""
-        # Stock controllers have tests that see to their indices.
-        function = kernel(self.function) if self.is_ours else within_bounds(self.function)
-        return SeparateKernel(
-            _called_by_address(self, function),
-            lambda: CONTROLLER_SIGNATURE,
-            boundscheck=not self.is_ours,
-        )
+        return _separate(self)
 
 
 @cache
@@ -170,6 +162,13 @@ def _keep() -> Any:
         keep_value(controller, words)
 
     return compiled_for(types.void(CONTROLLER_TYPE, types.int64[::1]), keep_controller)
+
+
+def _words(compiled: Any) -> Integers:
+    """Return the words that loops find a compiled law by."""
+    words = np.zeros(VALUE, dtype=np.int64)
+    _keep()(compiled, words)
+    return words
 
 
 def machine_code_of(law: ControllerFunction, seen: Mapping[str, Any]) -> Integers:
@@ -187,26 +186,28 @@ def machine_code_of(law: ControllerFunction, seen: Mapping[str, Any]) -> Integer
     ControllerError
         If it cannot be compiled.
     """
-    function = kernel(law.function) if law.is_ours else within_bounds(law.function)
-    separate = SeparateKernel(
-        _called_by_address(law, function, seen), lambda: CONTROLLER_SIGNATURE,
-        boundscheck=not law.is_ours,
-    )  # fmt: skip
     try:
-        compiled = separate.finish()
+        return _words(_separate(law, seen).finish())
     except CompileError as error:
         raise ControllerError(f"controller {law.name!r} cannot be compiled. {error}") from error
-    words = np.zeros(VALUE, dtype=np.int64)
-    _keep()(compiled, words)
-    return words
 
 
 _SEEN: Mapping[str, Any] = {"state": ControlState, "contacts": Contacts, "robot": ControlledRobot}
 """What laws are shown in the plane."""
 
 
+def _separate(law: ControllerFunction, seen: Mapping[str, Any] = _SEEN) -> SeparateKernel:
+    """Return the machine code of a law that is shown bundles of some classes."""
+    # Stock controllers have tests that see to their indices.
+    function = kernel(law.function) if law.is_ours else within_bounds(law.function)
+    return SeparateKernel(
+        _called_by_address(law, function, seen), lambda: CONTROLLER_SIGNATURE,
+        boundscheck=not law.is_ours,
+    )  # fmt: skip
+
+
 def _called_by_address(
-    law: ControllerFunction, function: Any, seen: Mapping[str, Any] = _SEEN
+    law: ControllerFunction, function: Any, seen: Mapping[str, Any]
 ) -> Callable[..., None]:
     """Return what loops call: it finds the bundles at their addresses and calls the function."""
     kinds: dict[str, Any] = {
@@ -404,7 +405,7 @@ class Law:
         law.parameters, law._asked = _fitting(self.function, parameters), None
         return law
 
-    def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
+    def numbers(self, robot: Any) -> tuple[Bundle, Bundle]:
         """Return its parameters, and a memory to begin with, for a robot; all can be set.
 
         Parameters
@@ -441,7 +442,7 @@ class Law:
     def _is_of(bundle: type[Bundle], name: str) -> bool:
         return name in bundle.declared or name in bundle.extent_names
 
-    def new_log(self, robot: Robot) -> Bundle:
+    def new_log(self, robot: Any) -> Bundle:
         """Return a log to begin with, all zeros.
 
         Parameters

@@ -129,6 +129,16 @@ class ControlledRobot(Bundle):
     """acceleration, force, passive, other, three, reaching, shares: Scratch of the queries."""
 
     @kernel
+    def driven_position(self, actuator: int) -> int:
+        """Place in q of what an actuator drives."""
+        return int(self.model.actuator_joint[actuator])
+
+    @kernel
+    def driven_velocity(self, actuator: int) -> int:
+        """Place in v of what an actuator drives."""
+        return int(self.model.actuator_joint[actuator])
+
+    @kernel
     def stop(self, ending: int) -> None:
         """End the run with this instant, for the reason of that place among the law's `endings`.
 

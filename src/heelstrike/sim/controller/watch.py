@@ -14,10 +14,9 @@ from heelstrike.compiler.bundle_type import WORD_BYTES
 from heelstrike.compiler.compilation import loop_for
 from heelstrike.compiler.words import word_from
 from heelstrike.robot.model import Integers
-from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.control import OVERRAN, TRUSTED, ReadyLaw
 from heelstrike.sim.controller.guard import GUARD, ZONE, trespasses
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.dimension import AnyRobot
 
 BYTES = ZONE * WORD_BYTES
 """Of the guard words on either side of an array."""
@@ -28,15 +27,15 @@ class Watch:
 
     Parameters
     ----------
-    robots : tuple of Robot
+    robots : tuple of Robot or SpatialRobot
         Those that it could change, whose numbers are copied.
     law : ReadyLaw
         The controller.
-    memory : Memory
+    memory : Memory or SpatialMemory
         Memory of the simulation.
     """
 
-    def __init__(self, robots: tuple[Robot, ...], law: ReadyLaw, memory: Memory) -> None:
+    def __init__(self, robots: tuple[AnyRobot, ...], law: ReadyLaw, memory: Any) -> None:
         self._control = law.control
         watched = law.control.conduct != TRUSTED or law.control.in_python
         self._numbers = [(each, numbers_of(each)) for each in robots] if watched else []
@@ -90,7 +89,7 @@ def _untouched() -> Any:
     return loop_for(signature, is_untouched)
 
 
-def numbers_of(robot: Robot) -> dict[str, Any]:
+def numbers_of(robot: AnyRobot) -> dict[str, Any]:
     """Copy all numbers of a robot."""
     return {
         name: array.copy()
@@ -99,7 +98,7 @@ def numbers_of(robot: Robot) -> dict[str, Any]:
     }
 
 
-def restored(robot: Robot, numbers: dict[str, Any]) -> str:
+def restored(robot: AnyRobot, numbers: dict[str, Any]) -> str:
     """Put numbers of a robot back; say which had changed, nothing if none had."""
     first = ""
     for name, kept in numbers.items():

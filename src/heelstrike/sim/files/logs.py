@@ -11,36 +11,31 @@ from collections.abc import Mapping
 from typing import Any
 
 from heelstrike.sim.files.variables import DamageError, Stored, Variable
-from heelstrike.sim.run import Logged, Run
+from heelstrike.sim.run import AnyRun, Logged
 
 PREFIX = "log_"
 
-DIMENSIONS = {
-    "nl": "coordinate", "nq": "coordinate", "nv": "coordinate", "nu": "actuator", "nc": "contact",
-    "axes": "axis", "components": "component", "conditions": "condition",
-    "loops": "loop", "couplings": "coupling", "brakes": "brake",
-    "constraints": "constraint",
-}  # fmt: skip
-"""What datasets call the extents of a row. In the plane links and coordinates share one."""
+Extents = Mapping[str | int, str]
+"""What datasets call the extents of arrays."""
 
 
-def dimensions(name: str, extents: tuple[str, ...]) -> tuple[str, ...]:
+def dimensions(name: str, extents: tuple[str, ...], known: Extents) -> tuple[str, ...]:
     """Return what the dimensions of a logged array are called: the robot's, or its own."""
     own = (f"{PREFIX}{name}_{place}" for place in range(len(extents)))
-    return tuple(DIMENSIONS.get(each, mine) for each, mine in zip(extents, own, strict=True))
+    return tuple(known.get(each, mine) for each, mine in zip(extents, own, strict=True))
 
 
-def log_variables(run: Run) -> dict[str, Any]:
+def log_variables(run: AnyRun, known: Extents) -> dict[str, Any]:
     """Return the log of a run as a dataset takes it."""
     return {
-        PREFIX + name: _variable(name, each.extents, each.unit, each.label, _kind(each)).written(
-            each.values
-        )
+        PREFIX + name: _variable(
+            dimensions(name, each.extents, known), each.unit, each.label, _kind(each)
+        ).written(each.values)
         for name, each in run.log.items()
     }
 
 
-def log_attribute(run: Run) -> dict[str, str]:
+def log_attribute(run: AnyRun) -> dict[str, str]:
     """Return what a file has to tell of a log."""
     told = {
         name: [_kind(each).__name__, each.unit, each.label, list(each.extents)]
@@ -49,7 +44,7 @@ def log_attribute(run: Run) -> dict[str, str]:
     return {"log": json.dumps(told)} if told else {}
 
 
-def stored_log(stored: Stored, sizes: dict[str, int]) -> Mapping[str, Logged]:
+def stored_log(stored: Stored, sizes: dict[str, int], known: Extents) -> Mapping[str, Logged]:
     """Return the log in a file, none of one that has none.
 
     Raises
@@ -71,15 +66,15 @@ def stored_log(stored: Stored, sizes: dict[str, int]) -> Mapping[str, Logged]:
     for name, (unit, label, extents, kind) in declared.items():
         if kind not in ("float", "int"):
             raise DamageError(f"the log {name!r} holds {kind!r}, neither int nor float")
-        variable = _variable(name, extents, unit, label, int if kind == "int" else float)
+        dims = dimensions(name, extents, known)
+        variable = _variable(dims, unit, label, int if kind == "int" else float)
         (values,) = stored.arrays({PREFIX + name: variable}, sizes).values()
         found[name] = Logged(values, unit, label, extents)
     return found
 
 
-def _variable(name: str, extents: tuple[str, ...], unit: str, label: str, kind: type) -> Variable:
-    dims = ("time", *dimensions(name, extents))
-    return Variable(dims, unit, label, kind, allowed="anything")
+def _variable(dims: tuple[str, ...], unit: str, label: str, kind: type) -> Variable:
+    return Variable(("time", *dims), unit, label, kind, allowed="anything")
 
 
 def _kind(logged: Logged) -> type:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,13 @@ from heelstrike.robot.model import NUMBERS, SCALES, SELDOM, Model, bounds
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
+from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot
 from heelstrike.sim.files.variables import DamageError, Stored, Variable
 
 if TYPE_CHECKING:
     import xarray
+
+_SomeFoot = TypeVar("_SomeFoot", Foot, SpatialFoot)
 
 _DIMS: dict[str | int, str] = {
     "nl": "coordinate", "nj": "coordinate", "nq": "coordinate", "nv": "coordinate",
@@ -43,7 +46,7 @@ _NAMES = {
     "actuator_names": Variable(("actuator",), kind=str),
     "contact_names": Variable(("contact",), kind=str),
 }
-_FEET = {
+FEET = {
     "foot_link": Variable(("foot",), kind=int),
     "foot_name": Variable(("foot",), kind=str),
     "contact_foot": Variable(("contact",), kind=int),
@@ -67,9 +70,6 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
     """Return the numbers and names of a robot as a dataset."""
     import xarray
 
-    foot_of = np.full(robot.nc, -1)
-    for index, foot in enumerate(robot.feet):
-        foot_of[list(foot.contacts)] = index
     values: dict[str, Any] = {
         **{
             name: each
@@ -77,9 +77,7 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
             if (each := getattr(robot.model, name)).size or NUMBERS[name].shape[0] not in SELDOM
         },
         **{name: getattr(robot, name) for name in _NAMES},
-        "foot_link": [foot.link for foot in robot.feet],
-        "foot_name": [foot.name for foot in robot.feet],
-        "contact_foot": foot_of,
+        **told_feet(robot),
     }
     if robot.contact_friction:
         values["contact_friction"] = robot.contact_friction
@@ -92,7 +90,7 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
             "outline_corners": [len(each.corners) for each in robot.outlines],
             "outline_corner": np.concatenate([each.corners for each in robot.outlines]),
         }
-    declared = _NUMBERS | _OUTLINES | _NAMES | _FEET | _FRICTION | _MIRROR
+    declared = _NUMBERS | _OUTLINES | _NAMES | FEET | _FRICTION | _MIRROR
     # NetCDF has no lists of no text: names of nothing are left out.
     variables = {
         name: declared[name].written(each)
@@ -107,6 +105,39 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
         "pivot": int(robot.model.pivot),
     }
     return xarray.Dataset(variables, attrs=attributes)
+
+
+def told_feet(robot: Robot | SpatialRobot) -> dict[str, Any]:
+    """Return the feet of a robot as columns."""
+    foot_of = np.full(robot.nc, -1)
+    feet: tuple[Foot | SpatialFoot, ...] = robot.feet
+    for index, foot in enumerate(feet):
+        foot_of[list(foot.contacts)] = index
+    return {
+        "foot_link": [foot.link for foot in feet],
+        "foot_name": [foot.name for foot in feet],
+        "contact_foot": foot_of,
+    }
+
+
+def feet_of(stored: Stored, sizes: dict[str, int], kind: type[_SomeFoot]) -> tuple[_SomeFoot, ...]:
+    """Return the feet of some columns.
+
+    Raises
+    ------
+    DamageError
+        If a contact point is of no foot that is there.
+    """
+    foot_link, foot_name, contact_foot = stored.arrays(FEET, sizes).values()
+    if np.any(contact_foot < -1) or np.any(contact_foot >= len(foot_link)):
+        raise DamageError("contact_foot points outside the robot")
+    make: Any = kind
+    return tuple(
+        make(name, link, tuple(np.flatnonzero(contact_foot == index).tolist()))
+        for index, (name, link) in enumerate(
+            zip(foot_name.tolist(), foot_link.tolist(), strict=True)
+        )
+    )
 
 
 def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
@@ -126,15 +157,7 @@ def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
     stored, sizes = Stored(contents), _SIZES.copy()
     model = Model(**stored.arrays(_NUMBERS, sizes), pivot=stored.count("pivot"))
     names = stored.arrays(_NAMES, sizes)
-    foot_link, foot_name, contact_foot = stored.arrays(_FEET, sizes).values()
-    if np.any(contact_foot < -1) or np.any(contact_foot >= len(foot_link)):
-        raise DamageError("contact_foot points outside the robot")
-    feet = tuple(
-        Foot(name, link, tuple(np.flatnonzero(contact_foot == index).tolist()))
-        for index, (name, link) in enumerate(
-            zip(foot_name.tolist(), foot_link.tolist(), strict=True)
-        )
-    )
+    feet = feet_of(stored, sizes, Foot)
     mirror = None
     if stored.count("symmetric"):
         arrays = stored.arrays(_MIRROR, sizes)

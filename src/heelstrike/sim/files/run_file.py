@@ -13,6 +13,7 @@ import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,15 +21,16 @@ from heelstrike.arguments import takes
 from heelstrike.errors import RunFileError, WriteError
 from heelstrike.reader_process import MOST_MEMORY, READER, ReadingError
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.files import hdf5_contents
 from heelstrike.sim.files.dataset import ROBOT_GROUP, to_dataset
 from heelstrike.sim.files.hdf5_contents import Contents
-from heelstrike.sim.files.robot_dataset import robot_to_dataset
+from heelstrike.sim.files.layout import layout_of
 from heelstrike.sim.files.seal import seal, seal_holds
 from heelstrike.sim.files.settings import unreadable
 from heelstrike.sim.files.stored_run import stored_run
 from heelstrike.sim.files.table import to_csv
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import AnyRun
 from heelstrike.whole_file import check_target, write_whole
 
 PATIENCE = 20.0
@@ -44,12 +46,12 @@ ENDINGS = {
 """Endings of the names of files that runs are written to, and what these are."""
 
 
-def save(run: Run, path: str | os.PathLike[str]) -> Path:
+def save(run: AnyRun, path: str | os.PathLike[str]) -> Path:
     """Write a run as NetCDF, or as a table of text. The file appears whole or not at all.
 
     Parameters
     ----------
-    run : Run
+    run : Run or SpatialRun
         The run.
     path : str or path
         File to write, ``.nc`` or ``.csv``; an existing one is replaced.
@@ -72,8 +74,7 @@ def save(run: Run, path: str | os.PathLike[str]) -> Path:
         raise RunFileError(f"{error}; {KEPT}") from error
     if ending == TABLE:
         return _written(path, to_csv(run))
-    shapes = () if run.ground.shape is None else (run.ground.shape,)
-    for part in (run.method, *shapes, *run.robot.constraints):
+    for part in (run.method, *_from_outside(run)):
         if reason := unreadable(part):
             raise RunFileError(
                 f"cannot write {path}: a run by {type(part).__name__} could not be read again: "
@@ -91,6 +92,13 @@ def save(run: Run, path: str | os.PathLike[str]) -> Path:
             f"cannot write {path}: {type(error).__name__}: {error}; {KEPT}"
         ) from error
     return _written(path, image.getbuffer())
+
+
+def _from_outside(run: AnyRun) -> tuple[Any, ...]:
+    """Return shape of the ground and constraints of a run, which may be of somebody's classes."""
+    shape = getattr(run.ground, "shape", None)
+    constraints: tuple[Any, ...] = getattr(run.robot, "constraints", ())
+    return constraints if shape is None else (shape, *constraints)
 
 
 def check_run_file(path: str | os.PathLike[str], *endings: str) -> str:
@@ -128,12 +136,13 @@ def _written(path: str | os.PathLike[str], content: str | memoryview) -> Path:
         raise RunFileError(f"{error}; {KEPT}") from error
 
 
-def _image(run: Run) -> io.BytesIO:
+def _image(run: AnyRun) -> io.BytesIO:
     """Return the bytes of the file."""
     import h5netcdf
     from xarray.backends import H5NetCDFStore
 
-    dataset = to_dataset(run)
+    layout = layout_of(run)
+    dataset = to_dataset(run).drop_vars(layout.left_out(run.robot))
     compression = {"zlib": True, "complevel": 1, "shuffle": True}
     encoding = {
         name: {"_FillValue": None, **(compression if dataset[name].size > 1000 else {})}
@@ -143,7 +152,8 @@ def _image(run: Run) -> io.BytesIO:
     image = io.BytesIO()
     with h5netcdf.File(image, "w") as file:
         dataset.dump_to_store(H5NetCDFStore(file, mode="w"), encoding=encoding)
-        robot_to_dataset(run.robot).dump_to_store(H5NetCDFStore(file, group=ROBOT_GROUP, mode="a"))
+        robot = layout.robot_to_dataset(run.robot)
+        robot.dump_to_store(H5NetCDFStore(file, group=ROBOT_GROUP, mode="a"))
     line = seal(image.getbuffer())
     image.seek(0, io.SEEK_END)
     image.write(line)
@@ -152,16 +162,17 @@ def _image(run: Run) -> io.BytesIO:
 
 @takes(RunFileError)
 def load_run(
-    path: str | os.PathLike[str], robot: Robot | None = None, classes: Sequence[type] = ()
-) -> Run:
-    """Read a run that was saved with :meth:`Run.save`.
+    path: str | os.PathLike[str], robot: Robot | SpatialRobot | None = None,
+    classes: Sequence[type] = (),
+) -> Any:  # fmt: skip
+    """Read a run that was saved with :meth:`Run.save`, or one in space.
 
     Parameters
     ----------
     path : str or path
         The NetCDF file.
-    robot : Robot, optional
-        Robot to attach to the run, instead of the one the file describes. Its coordinates,
+    robot : Robot or SpatialRobot, optional
+        Robot to attach to the run, instead of the one the file describes. Its joints,
         actuators and contact points must have the names of the file's.
     classes : sequence of type
         Methods, contact laws, ground shapes and constraints from outside the package that the run
@@ -170,7 +181,7 @@ def load_run(
 
     Returns
     -------
-    Run
+    Run or SpatialRun
         The run as it was saved; of an exception of the controller only the message remains.
 
     Raises

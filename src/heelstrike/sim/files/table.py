@@ -14,17 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.robot.robot import Robot
 from heelstrike.sim.files.dataset import to_dataset
-from heelstrike.sim.run import Run
+from heelstrike.sim.files.layout import layout_of
+from heelstrike.sim.run import AnyRun
 
 EVENTS = "events"
 """The last column: what happened since the row before, in words."""
-OF_HINGES = ("rad", "rad/s", "N m")
-"""Units of joints that turn, where a quantity has one for those and one for slides."""
 
 
-def to_csv(run: Run) -> str:
+def to_csv(run: AnyRun) -> str:
     """Return a run as text: a line of headings, then a line a recorded time.
 
     Headings are as in ``position left_knee [rad]``. The last column, ``events``, says what happened
@@ -34,7 +32,7 @@ def to_csv(run: Run) -> str:
 
     Parameters
     ----------
-    run : Run
+    run : Run or SpatialRun
         The run.
 
     Returns
@@ -42,7 +40,7 @@ def to_csv(run: Run) -> str:
     str
         The text.
     """
-    data = to_dataset(run)
+    data, layout = to_dataset(run), layout_of(run)
     headings, columns = [f"time [{data['time'].attrs['units']}]"], [run.time.tolist()]
     for name, each in data.data_vars.items():
         if each.dims[:1] != ("time",):
@@ -51,7 +49,7 @@ def to_csv(run: Run) -> str:
         unit, of = each.attrs.get("units", ""), str(each.dims[1]) if each.ndim > 1 else ""
         for place in np.ndindex(each.shape[1:]):
             words = [str(name), *(labels[k][i] for k, i in enumerate(place, start=1))]
-            its = _unit_of(unit, run.robot, of, place)
+            its = layout.unit_of(run.robot, of, place[0], unit) if of else unit
             headings.append(" ".join(words) + (f" [{its}]" if its not in ("", "1") else ""))
             columns.append(each.values[(slice(None), *place)].tolist())
     text = io.StringIO()
@@ -67,25 +65,11 @@ def _labels(data: Any, dim: Hashable, size: int) -> Sequence[str]:
     return list(map(str, data[dim].values if dim in data.coords else range(size)))
 
 
-def _unit_of(unit: str, robot: Robot, of: str, place: Sequence[int]) -> str:
-    """Unit of a number of a joint, where hinges and slides have their own: ``m or rad``."""
-    model = robot.model
-    joints: dict[str, Sequence[int]] = {
-        "coordinate": range(robot.nj),
-        "coupling": model.coupling_joint[:, 0].tolist(),
-        "brake": model.brake_joint.tolist(),
-    }
-    if " or " not in unit or of not in joints:
-        return unit
-    turns = bool(model.axis[joints[of][place[0]], 0])
-    return next(one for one in unit.split(" or ") if (one in OF_HINGES) is turns)
-
-
 def _written(value: Any) -> str:
     return "" if isinstance(value, float) and math.isnan(value) else repr(value)
 
 
-def _events(run: Run) -> Iterator[str]:
+def _events(run: AnyRun) -> Iterator[str]:
     """What happened up to each row, since the one before."""
     told: list[list[str]] = [[] for _ in run.time]
     times = [event.time for event in run.events]

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from heelstrike.compiler.bundle import Bundle, array, cell
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.run import QUANTITIES
+from heelstrike.robot.spatial.robot import SpatialRobot
+from heelstrike.sim.dimension import dimension_of
+from heelstrike.sim.run import QUANTITIES, Quantity
 
 
-class Record(Bundle):
-    """Rows of a run, filled by the compiled loop, one row an instant.
+class RowsAndEvents(Bundle):
+    """What every record has: how much of it is used, times, logs and events.
 
-    Forces and torques of a row are those decided at its instant and acting over the step that
-    follows. `rows` and `events` are the numbers of rows used. Every recorded quantity of a
-    :class:`~heelstrike.Run` has an array by its name. `log` holds the words of what the controller
+    `rows` and `events` are the numbers of rows used. `log` holds the words of what the controller
     logged, of the first `logged` rows.
     """
 
@@ -23,7 +24,6 @@ class Record(Bundle):
     events: int = cell(int)
     logged: int = cell(int)
     time: Floats = array("nt")
-    vars().update({name: array("nt", *each.shape) for name, each in QUANTITIES.items()})
     log: Integers = array("nt", "words", of=int)
     event_time: Floats = array("ne")
     event_kind: Integers = array("ne", of=int)
@@ -35,12 +35,29 @@ class Record(Bundle):
         def __getattr__(self, name: str) -> Floats: ...
 
 
-def allocate_record(robot: Robot, rows: int, events: int, words: int = 0) -> Record:
+def rows_of_quantities(quantities: Mapping[str, Quantity]) -> dict[str, Floats]:
+    """Declare an array for each recorded quantity, a row an instant."""
+    return {name: array("nt", *each.shape) for name, each in quantities.items()}
+
+
+class Record(RowsAndEvents):
+    """Rows of a run, filled by the compiled loop, one row an instant.
+
+    Forces and torques of a row are those decided at its instant and acting over the step that
+    follows. Every recorded quantity of a :class:`~heelstrike.Run` has an array by its name.
+    """
+
+    vars().update(rows_of_quantities(QUANTITIES))
+
+
+def allocate_record(
+    robot: Robot | SpatialRobot, rows: int, events: int, words: int = 0
+) -> RowsAndEvents:
     """Allocate a record of `rows` instants, with so many words of a log, and `events` events."""
-    extents = robot.model.extents | ROW_EXTENTS | {"words": words}
-    extents["constraints"] = len(robot.constraints)
-    return Record.allocate(extents, nt=rows, ne=events)
+    dimension = dimension_of(robot)
+    extents = robot.model.extents | dimension.row_extents(robot) | {"words": words}
+    return dimension.record.allocate(extents, nt=rows, ne=events)
 
 
 ROW_EXTENTS = {"components": 2, "conditions": 3, "constraints": 0}
-"""Extents of rows that no robot's model tells: so many constraints a robot has by itself."""
+"""Extents of rows that no planar robot's model tells: so many constraints a robot has by itself."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
@@ -15,8 +15,8 @@ from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT
 from heelstrike.sim.memory import Memory, Tally
-from heelstrike.sim.record.record import Record
-from heelstrike.sim.run import QUANTITIES
+from heelstrike.sim.record.record import Record, RowsAndEvents
+from heelstrike.sim.run import QUANTITIES, Quantity
 from heelstrike.tolerances import STANDING_SPEED
 
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
@@ -179,32 +179,35 @@ def note_stop(
         memory.reported.stopped[joint] = 0
 
 
-def _row_writer() -> Callable[[float, Memory, Record], None]:
-    """Make the kernel that writes rows, a loop for each recorded quantity."""
+def row_writer(
+    quantities: Mapping[str, Quantity], module: str
+) -> Callable[[float, Any, Any], None]:
+    """Make the kernel `note_row` of a module, which writes rows: a loop for each quantity."""
     lines = [
         "def note_row(time, memory, record):",
         " row = record.rows",
         " record.time[row] = time",
     ]
-    for name, quantity in QUANTITIES.items():
+    for name, quantity in quantities.items():
         indices = ["i", "j"][: len(quantity.shape)]
         for depth, index in enumerate(indices):
             extent = f"record.{name}.shape[{depth + 1}]"
             lines.append(f"{' ' * (depth + 1)}for {index} in range({extent}):")
         place = ", ".join(indices)
-        copy = f"record.{name}[row, {place}] = memory.{quantity.of}[{place}]"
+        its = f"memory.{quantity.of}[{place}]" if place else f"memory.{quantity.of}"
+        copy = f"record.{name}[{', '.join(['row', *indices])}] = {its}"
         lines.append(" " * (len(indices) + 1) + copy)
-    scope: dict[str, Any] = {"__name__": __name__}
+    scope: dict[str, Any] = {"__name__": module}
     exec("\n".join([*lines, " record.rows = row + 1"]), scope)
     scope["note_row"].__doc__ = "Append what acts now, of every recorded quantity, to the record."
     return dissolved_kernel(scope["note_row"])
 
 
-note_row = _row_writer()
+note_row = row_writer(QUANTITIES, __name__)
 
 
 @dissolved_kernel
-def note_log(kept: Integers, logged: Integers, record: Record) -> None:
+def note_log(kept: Integers, logged: Integers, record: RowsAndEvents) -> None:
     """Write to the rows that have none as yet what the controller logged last."""
     for row in range(record.logged, record.rows):
         for i in range(logged.shape[0]):
@@ -212,10 +215,16 @@ def note_log(kept: Integers, logged: Integers, record: Record) -> None:
     record.logged = record.rows
 
 
+@dissolved_kernel
+def is_row_due(clock: Clock) -> bool:
+    """Whether a row is due: every so many steps and at the end."""
+    return bool(clock.index % clock.record_every == 0 or clock.finishing == 1)
+
+
 @kernel
 def note_row_when_due(memory: Memory, clock: Clock, record: Record) -> int:
     """Append a row if one is due, every so many steps and at the end; return which, or -1."""
-    if clock.index % clock.record_every != 0 and clock.finishing == 0:
+    if not is_row_due(clock):
         return -1
     note_row(clock.time, memory, record)
     return int(record.rows - 1)

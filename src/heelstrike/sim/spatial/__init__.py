@@ -1,5 +1,6 @@
 """Time stepping of robots in space, and the run it leaves behind."""
 
+from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.spatial.controlled import SpatialControlledRobot, SpatialControlState
 from heelstrike.sim.spatial.record import SpatialEventKind
 from heelstrike.sim.spatial.run import (
@@ -8,7 +9,10 @@ from heelstrike.sim.spatial.run import (
     SpatialRun,
     SpatialSolverCount,
 )
-from heelstrike.sim.spatial.simulation import SpatialSimulation, SpatialSnapshot
+from heelstrike.sim.spatial.simulation import SpatialSimulation
+
+SpatialSnapshot = Snapshot
+"""That of the plane."""
 
 __all__ = [
     "SpatialCertificates",

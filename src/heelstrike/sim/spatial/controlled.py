@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
-from heelstrike.compiler.bundle_type import address_of
-from heelstrike.compiler.compilation import kernel
-from heelstrike.compiler.words import VALUE
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.dynamics.spatial.algebra import momentum_of, power, spatial
 from heelstrike.dynamics.spatial.equations import (
     bias_force,
@@ -18,16 +18,17 @@ from heelstrike.dynamics.spatial.equations import (
     inverse_dynamics,
     passive_force,
 )
+from heelstrike.dynamics.spatial.kinematics import forward_kinematics, link_velocities
 from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import HINGE, SLIDE, SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot
+from heelstrike.sim.controller.asking import call_law, show_contacts
+from heelstrike.sim.controller.control import TRUSTED, Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.controller.law import ControllerFunction, Law, machine_code_of
+from heelstrike.sim.controller.law import ControllerFunction, machine_code_of
+from heelstrike.sim.controller.robot import NO_ENDING
 from heelstrike.sim.spatial.memory import SpatialMemory
-
-GOES_ON = -1
-"""What `SpatialControlledRobot.ending` is while the law lets the run go on."""
 
 
 class SpatialControlState(Bundle):
@@ -42,6 +43,17 @@ class SpatialControlState(Bundle):
     actuator of a ball or free joint has the position zero."""
     kinematics: SpatialWorkspace = part(SpatialWorkspace)
     """What follows from them, ready for the queries of :class:`SpatialControlledRobot`."""
+
+
+@kernel
+def show_driven(
+    model: SpatialModel, position_of: Integers, q: Floats, v: Floats, state: SpatialControlState
+) -> None:
+    """Write positions and velocities of what the actuators drive."""
+    for i in range(position_of.shape[0]):
+        at = position_of[i]
+        state.joint_position[i] = q[at] if at >= 0 else 0.0
+        state.joint_velocity[i] = v[model.actuator_velocity[i]]
 
 
 class SpatialControlledRobot(Bundle):
@@ -66,6 +78,23 @@ class SpatialControlledRobot(Bundle):
     """Which ending of its own the law has come to, see :meth:`stop`; -1 for none."""
     position_of: Integers = array("nu", of=int)
     """Position of the joint of each actuator; -1 where it has several."""
+
+    @kernel
+    def update(self, state: SpatialControlState) -> None:
+        """Let all that follows from the positions and velocities of a state follow from them."""
+        show_driven(self.model, self.position_of, state.q, state.v, state)
+        forward_kinematics(self.model, state.q, state.kinematics)
+        link_velocities(self.model, state.v, state.kinematics)
+
+    @kernel
+    def driven_position(self, actuator: int) -> int:
+        """Place in q of what an actuator drives; -1 where its joint has several."""
+        return int(self.position_of[actuator])
+
+    @kernel
+    def driven_velocity(self, actuator: int) -> int:
+        """Place in v of what an actuator drives."""
+        return int(self.model.actuator_velocity[actuator])
 
     @kernel
     def stop(self, ending: int) -> None:
@@ -101,50 +130,75 @@ class SpatialControlledRobot(Bundle):
             torque[i] = -power(spatial(work.motion, k), weight)
 
 
-class SpatialControl(Bundle):
+class SpatialControl(Control):
     """The numbers of a controller in space, and how it is asked."""
 
-    function: Integers = array(VALUE, of=int, address=True)
-    """The compiled function, as :func:`~heelstrike.compiler.words.kept_value` reads it."""
-    parameters_at: int = number(int)
-    memory_at: int = number(int)
-    log_at: int = number(int)
-    """parameters_at, memory_at, log_at: Where the tables of the bundles are."""
-    state: SpatialControlState = part(SpatialControlState, address=True)
-    contacts: Contacts = part(Contacts, address=True)
-    robot: SpatialControlledRobot = part(SpatialControlledRobot, address=True)
-    """state, contacts, robot: What it is shown."""
-    in_python: int = cell(int)
-    """Whether the loop has to come back for its torques."""
+    state: SpatialControlState = part(SpatialControlState, address=True)  # type: ignore[assignment]
+    robot: SpatialControlledRobot = part(  # type: ignore[assignment]
+        SpatialControlledRobot, address=True
+    )
+    """state, robot: What it is shown, beside the contacts."""
 
 
-@kernel
-def show_state(
-    model: SpatialModel, robot: SpatialControlledRobot, q: Floats, v: Floats,
-    state: SpatialControlState,
+@dissolved_kernel
+def ask_in_space(
+    controller: Any, time: float, q: Floats, v: Floats, model: SpatialModel,
+    memory: SpatialMemory, control: SpatialControl, torque: Floats,
 ) -> None:  # fmt: skip
-    """Copy the state for the controller."""
+    """Ask a controller for its torques; they are no number if it wrote where it may not."""
+    state = control.state
     for i in range(q.shape[0]):
         state.q[i] = q[i]
     for k in range(v.shape[0]):
         state.v[k] = v[k]
-    for i in range(model.nu):
-        at = robot.position_of[i]
-        state.joint_position[i] = q[at] if at >= 0 else 0.0
-        state.joint_velocity[i] = v[model.actuator_velocity[i]]
+    show_driven(model, control.robot.position_of, q, v, state)
+    if control.conduct != TRUSTED:
+        show_kinematics(memory.equations.tree, state.kinematics)
+        show_contacts(memory.contacts, control.contacts)
+    if control.believes == 1:
+        control.robot.update(state)
+    at = control.kept_at, control.log_at
+    call_law(controller, time, control.kept, at, control, torque)
 
 
 @kernel
-def ask_law(
-    controller: Any, time: float, model: SpatialModel, control: SpatialControl,
+def show_kinematics(tree: SpatialWorkspace, own: SpatialWorkspace) -> None:
+    """Copy kinematics: what a controller does to them harms nobody."""
+    copy_words(tree.rotation, own.rotation)
+    copy_words(tree.origin, own.origin)
+    copy_words(tree.pivot, own.pivot)
+    copy_words(tree.motion, own.motion)
+    copy_words(tree.velocity, own.velocity)
+    copy_words(tree.bias_acceleration, own.bias_acceleration)
+    copy_words(tree.inertia, own.inertia)
+
+
+@dissolved_kernel
+def limit_torque_in_space(
+    model: SpatialModel,
+    control: SpatialControl,  # noqa: ARG001 - in space there are no voltages
     memory: SpatialMemory,
-) -> None:  # fmt: skip
-    """Ask a compiled controller for its commands."""
-    show_state(model, control.robot, memory.q, memory.v, control.state)
-    controller(
-        time, address_of(control.state), address_of(control.contacts), address_of(control.robot),
-        control.parameters_at, control.memory_at, control.log_at, memory.command,
-    )  # fmt: skip
+) -> bool:
+    """Find the torques of an instant from its commands; return whether all of these are finite.
+
+    Torques keep to the limits of their actuators, and to the line from stall torque to no-load
+    speed where a motor has one.
+    """
+    command, v = memory.command, memory.v
+    for i in range(model.nu):
+        wanted = command[i]
+        if not abs(wanted) < math.inf:
+            memory.tally.bad_torque = i
+            return False
+        command[i] = min(max(wanted, model.torque_lower[i]), model.torque_upper[i])
+        k = model.actuator_velocity[i]
+        stall, applied = model.stall_torque[k], command[i]
+        if stall < math.inf:
+            drag = stall / model.no_load_speed[k] * v[k]
+            applied = min(max(applied, -stall - drag), stall - drag)
+        memory.tally.saturations += applied != wanted
+        memory.torque[i] = applied
+    return True
 
 
 SEEN: dict[str, Any] = {
@@ -165,46 +219,14 @@ def words_in_space(function: ControllerFunction) -> Integers:
     return machine_code_of(function, SEEN)
 
 
-class ReadySpatialLaw:
-    """A law made ready for a robot in space: its numbers, and a new memory and log.
-
-    Parameters
-    ----------
-    robot : SpatialRobot
-        The robot.
-    law : Law
-        The law.
-    function : (any,) int64
-        Words of the machine code that the loop asks.
-    memory : SpatialMemory
-        Of the simulation; its kinematics are those that the law is shown.
-
-    Attributes
-    ----------
-    control : SpatialControl
-        What the loop hands along.
-    parameters, memory, log : Bundle
-        Its numbers, what it remembers, and what it tells of itself.
-    """
-
-    def __init__(
-        self, robot: SpatialRobot, law: Law, function: Integers, memory: SpatialMemory
-    ) -> None:
-        known: Any = robot
-        self.parameters, self.memory = law.numbers(known)
-        self.log = law.new_log(known)
-        extents = robot.model.extents
-        view = SpatialControlledRobot.allocate(
-            extents, model=robot.model, mass=robot.total_mass, position_of=driven_positions(robot)
-        )
-        view.ending = GOES_ON
-        self.control = SpatialControl(
-            function=function.copy(),
-            parameters_at=self.parameters.address, memory_at=self.memory.address,
-            log_at=self.log.address,
-            state=SpatialControlState.allocate(extents, kinematics=memory.equations.tree),
-            contacts=memory.contacts, robot=view,
-        )  # fmt: skip
+def view_of(robot: SpatialRobot) -> SpatialControlledRobot:
+    """Make the view of a robot that a law has."""
+    view = SpatialControlledRobot.allocate(
+        robot.model.extents, model=robot.model, mass=robot.total_mass,
+        position_of=driven_positions(robot),
+    )  # fmt: skip
+    view.ending = NO_ENDING
+    return view
 
 
 def driven_positions(robot: SpatialRobot) -> Integers:

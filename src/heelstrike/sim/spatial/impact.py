@@ -56,9 +56,13 @@ def takes_part(
 
 @kernel
 def pose_impact_of(
-    step: float, before: int, table: BlockTable, assembly: SpatialAssembly, impact: SpatialImpact
-) -> None:
-    """Write the problem of the impact: what takes part, without the gaps, with its bounces."""
+    step: float, before: int, relaxed: bool, table: BlockTable, assembly: SpatialAssembly,
+    impact: SpatialImpact,
+) -> None:  # fmt: skip
+    """Write the problem of the impact: what takes part, without the gaps, with its bounces.
+
+    `relaxed` says that nothing was asked to come out of the ground.
+    """
     problem, its = assembly.problem, impact.problem
     members = rows = 0
     for place in range(assembly.count):
@@ -79,7 +83,7 @@ def pose_impact_of(
         impact.bounce[members] = 0.0
         if table.kind[entry] != DRY_JOINT:
             impact.bounce[members] = table.restitution[entry] * assembly.before[place]
-            left = 0.0 if impact.relaxed == 1 else min(table.gap[entry], 0.0)
+            left = 0.0 if relaxed else min(table.gap[entry], 0.0)
             its.free[rows] -= (max(table.gap[entry], 0.0) + left) / step
             its.free[rows] += impact.bounce[members]
         for other in range(members + 1):
@@ -112,14 +116,14 @@ def energy_of_impact(impact: SpatialImpact) -> float:
 
 @kernel
 def solve_impact_of(
-    step: float, before: int, table: BlockTable, solver: BlockWorkspace,
+    step: float, before: int, relaxed: bool, table: BlockTable, solver: BlockWorkspace,
     assembly: SpatialAssembly, impact: SpatialImpact,
 ) -> int:  # fmt: skip
     """Solve the impact of a step; its impulses go to the rows of the candidates.
 
     Returns how the solve ended.
     """
-    pose_impact_of(step, before, table, assembly, impact)
+    pose_impact_of(step, before, relaxed, table, assembly, impact)
     status = solve_block_problem(impact.problem, solver, impact.answer)
     impact.gain = energy_of_impact(impact)
     first, its = assembly.problem.first, impact.problem

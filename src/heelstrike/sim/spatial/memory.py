@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
+from heelstrike.compiler.mold import Mold
 from heelstrike.contact.spatial.certified_solve import block_workspace
 from heelstrike.contact.spatial.workspace import (
     BlockAnswer,
     BlockProblem,
+    BlockSettings,
+    BlockTally,
     BlockWorkspace,
     block_answer,
     block_problem,
 )
 from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot
+from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.memory import CommonTally
+from heelstrike.sim.push import Push, Pushes, pushes_on
 from heelstrike.sim.spatial.table import NEVER_TOUCHED, BlockTable, lay_out_table, most_rows_of
 
 KNOWN_SPEED = 1e-12
@@ -27,28 +38,35 @@ MOST_ITERATIONS = 400
 """Iterations of a contact problem in a step."""
 
 
-class SpatialTally(Bundle):
-    """Counts and worst values of a simulation, over every step, recorded or not."""
+class SpatialTally(CommonTally):
+    """Counts and worst values of a simulation in space, over every step, recorded or not."""
 
-    steps: int = cell(int)
-    """Steps, and parts of halved ones."""
-    saturations: int = cell(int)
-    bad_torque: int = cell(int)
-    """saturations, bad_torque: Commands that limits did not let through; the actuator whose command
-    was not finite."""
-    halved: int = cell(int)
-    uncertified: int = cell(int)
-    relaxed: int = cell(int)
-    """halved, uncertified, relaxed: Steps that were halved; that went on with a residual above the
-    tolerance; that were not asked to leave the ground."""
-    penetration: float = cell(float)
-    """Deepest penetration of a contact point (m)."""
     residual: float = cell(float)
     """Largest residual of a contact problem, rounding included."""
     unsolved: float = cell(float)
     """Residual of the step that nothing could certify and that was not taken."""
+    uncertified: int = cell(int)
+    halved: int = cell(int)
+    relaxed: int = cell(int)
+    """uncertified, halved, relaxed: Steps that went on with a residual above the tolerance; that
+    were halved; that were not asked to leave the ground."""
     energy_gain: float = cell(float)
     """Kinetic energy that restitution made (J)."""
+
+
+class SpatialStep(Bundle):
+    """What a step adds to the tally, once it is taken."""
+
+    parts: int = cell(int)
+    """How many parts it was taken in."""
+    uncertified: int = cell(int)
+    halved: int = cell(int)
+    relaxed: int = cell(int)
+    energy_gain: float = cell(float)
+    """uncertified, halved, relaxed, energy_gain: As in the tally."""
+    q: Floats = array("nq")
+    v: Floats = array("nv")
+    """q, v: The state at its end."""
 
 
 class SpatialEquations(Bundle):
@@ -72,8 +90,6 @@ class SpatialFeet(Bundle):
     """Projection of each point onto the ground, then onto its wall: where its rows are taken."""
     frame: Floats = array("feet", 9)
     """Normals and tangents, row by row."""
-    slip: Floats = array("nc", 2)
-    """Tangential velocity at the end of the step."""
 
 
 class SpatialAssembly(Bundle):
@@ -96,16 +112,21 @@ class SpatialAssembly(Bundle):
     """problem, answer: The problem of the positions."""
 
 
+class SpatialWedge(Bundle):
+    """Which steps were not asked to come out of the ground."""
+
+    relaxed: int = cell(int)
+    wedged: int = cell(int)
+    since: int = cell(int)
+    """relaxed, wedged, since: Whether this one is not; the last step that was not; the first of
+    those without a break."""
+
+
 class SpatialImpact(Bundle):
     """The impact of a step: what closes in it."""
 
     happens: int = cell(int)
     """Whether there is one."""
-    relaxed: int = cell(int)
-    wedged: int = cell(int)
-    since: int = cell(int)
-    """relaxed, wedged, since: Whether the step is not asked to come out of the ground; the last
-    step that was not; the first of those without a break."""
     gain: float = cell(float)
     """Kinetic energy that restitution made in it (J)."""
     member: Integers = array("entries", of=int)
@@ -121,17 +142,17 @@ class SpatialImpact(Bundle):
     """problem, answer: The impact."""
 
 
-class SpatialPushes(Bundle):
-    """Forces from outside as the kernels see them."""
+class SpatialReaction(Bundle):
+    """What else came of the contact problem of a step."""
 
-    link: Integers = array("np", of=int)
-    point: Floats = array("np", 3)
-    force: Floats = array("np", 3)
-    """point, force: Points in the axes of their links; forces in world axes."""
-    start: Floats = array("np")
-    end: Floats = array("np")
-    row: Floats = array(3, "longest")
-    """Scratch."""
+    stop_torque: Floats = array("nv")
+    friction_torque: Floats = array("nv")
+    """stop_torque, friction_torque: Generalised forces of stops and of dry friction."""
+    slip: Floats = array("nc", 2)
+    """Tangential velocity of the contact points at the end of the step; zero of those that take no
+    part."""
+    residual: float = cell(float)
+    """Of the problem of the positions, rounding included; zero where there was none."""
 
 
 class SpatialReported(Bundle):
@@ -142,9 +163,16 @@ class SpatialReported(Bundle):
     """closed, slipping: Whether each entry was on the ground or at its stop, and whether it slid or
     moved."""
 
+    def forget(self) -> None:
+        """Be as at the beginning."""
+        self.closed[:] = self.slipping[:] = 0
+
 
 class SpatialMemory(Bundle):
-    """State of a simulation in space and all that its kernels write to."""
+    """State of a simulation in space and all that its kernels write to.
+
+    What has an address of its own is written again before it is read, and is not kept.
+    """
 
     q: Floats = array("nq")
     v: Floats = array("nv")
@@ -157,49 +185,95 @@ class SpatialMemory(Bundle):
     command: Floats = array("nu")
     torque: Floats = array("nu")
     """command, torque: What the controller asks for, and what acts of it."""
-    stop_torque: Floats = array("nv")
-    friction_torque: Floats = array("nv")
-    """stop_torque, friction_torque: Generalised forces of stops and of dry friction."""
     blocks: BlockTable = part(BlockTable)
     equations: SpatialEquations = part(SpatialEquations)
     contacts: Contacts = part(Contacts)
     feet: SpatialFeet = part(SpatialFeet)
-    assembly: SpatialAssembly = part(SpatialAssembly)
-    impact: SpatialImpact = part(SpatialImpact)
-    solver: BlockWorkspace = part(BlockWorkspace)
-    pushes: SpatialPushes = part(SpatialPushes)
+    reaction: SpatialReaction = part(SpatialReaction)
+    step: SpatialStep = part(SpatialStep)
+    """What is decided of the step that follows."""
+    wedge: SpatialWedge = part(SpatialWedge)
+    assembly: SpatialAssembly = part(SpatialAssembly, address=True)
+    impact: SpatialImpact = part(SpatialImpact, address=True)
+    solver: BlockWorkspace = part(BlockWorkspace, address=True)
+    settings: BlockSettings = part(BlockSettings)
+    solves: BlockTally = part(BlockTally)
+    """settings, solves: Of the solver."""
+    pushes: Pushes = part(Pushes)
     reported: SpatialReported = part(SpatialReported)
     tally: SpatialTally = part(SpatialTally)
 
 
+class SpatialScratch(NamedTuple):
+    """What the solvers of a simulation scribble on.
+
+    Attributes
+    ----------
+    assembly : SpatialAssembly
+    impact : SpatialImpact
+    solver : BlockWorkspace
+    """
+
+    assembly: SpatialAssembly
+    impact: SpatialImpact
+    solver: BlockWorkspace
+
+
+def spatial_scratch(entries: int, rows: int, model: SpatialModel) -> SpatialScratch:
+    """Allocate room for problems of so many entries and rows."""
+    blocks, most = max(entries, 1), max(rows, 1)
+    extents = {**model.extents, "entries": entries, "capacity": most}
+
+    def both() -> dict[str, Any]:
+        return {"problem": block_problem(blocks, most), "answer": block_answer(blocks, most)}
+
+    return SpatialScratch(
+        SpatialAssembly.allocate(extents, **both()),
+        SpatialImpact.allocate(extents, **both()),
+        block_workspace(blocks, most, ready=False),
+    )
+
+
 def allocate_spatial_memory(
-    robot: SpatialRobot, pushes: SpatialPushes, *, walls: bool = False
+    robot: SpatialRobot, pushes: Sequence[Push] = (), *, walls: bool = False
 ) -> SpatialMemory:
     """Allocate the memory of a simulation of a robot in space, on ground with walls or without."""
+    memory = spatial_mold(robot, walls=walls).cast()
+    table = memory.blocks
+    scratch = spatial_scratch(len(table.kind), most_rows_of(table), robot.model)
+    return beside_scratch(memory, scratch).replaced(pushes=pushes_on(robot, pushes))
+
+
+def beside_scratch(memory: SpatialMemory, scratch: SpatialScratch) -> SpatialMemory:
+    """Return a memory whose solvers scribble there."""
+    solver = scratch.solver.replaced(settings=memory.settings, tally=memory.solves)
+    return memory.replaced(assembly=scratch.assembly, impact=scratch.impact, solver=solver)
+
+
+def spatial_mold(robot: SpatialRobot, *, walls: bool) -> Mold[SpatialMemory]:
+    """Return the mold of the memory of a robot's simulations, with nothing to scribble on."""
+    molds = _MOLDS.setdefault(robot, {})
+    if walls not in molds:
+        molds[walls] = Mold(_laid_out(robot, walls=walls))
+    return molds[walls]
+
+
+_MOLDS: WeakKeyDictionary[SpatialRobot, dict[bool, Mold[SpatialMemory]]] = WeakKeyDictionary()
+
+
+def _laid_out(robot: SpatialRobot, *, walls: bool) -> SpatialMemory:
     table = lay_out_table(robot, walls=walls)
-    entries, rows = len(table.kind), max(most_rows_of(table), 1)
+    nothing = spatial_scratch(0, 0, robot.model)
     extents = {
-        **robot.model.extents, "entries": entries, "capacity": rows, "axes": 3, "components": 3,
+        **robot.model.extents, "entries": len(table.kind), "axes": 3, "components": 3,
         "feet": (2 if walls else 1) * robot.model.nc,
     }  # fmt: skip
-    blocks = max(entries, 1)
-    assembly = SpatialAssembly.allocate(
-        extents, problem=block_problem(blocks, rows), answer=block_answer(blocks, rows)
-    )
-    impact = SpatialImpact.allocate(
-        extents,
-        wedged=NEVER_TOUCHED,
-        problem=block_problem(blocks, rows),
-        answer=block_answer(blocks, rows),
-    )
-    solver = block_workspace(blocks, rows, ready=False)
-    solver.settings.floor = KNOWN_SPEED
-    solver.settings.effort = MOST_ITERATIONS
-    return SpatialMemory.allocate(
-        extents, blocks=table, assembly=assembly, impact=impact, solver=solver, pushes=pushes
-    )
-
-
-def no_pushes(robot: SpatialRobot) -> SpatialPushes:
-    """Return the arrays of no pushes at all."""
-    return SpatialPushes.allocate(robot.model.extents, np=0, link=np.zeros(0, dtype=np.int64))
+    memory = SpatialMemory.allocate(
+        extents, command=guarded(np.zeros(robot.nu)), blocks=table, pushes=pushes_on(robot, ()),
+        **nothing._asdict(),
+    )  # fmt: skip
+    settings = memory.settings
+    settings.become(nothing.solver.settings)
+    settings.floor, settings.effort = KNOWN_SPEED, MOST_ITERATIONS
+    memory.wedge.wedged = NEVER_TOUCHED
+    return memory

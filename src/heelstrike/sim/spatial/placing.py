@@ -10,7 +10,7 @@ from heelstrike.dynamics import spatial
 from heelstrike.errors import SimulationError
 from heelstrike.robot.spatial.robot import SpatialRobot, checked_state
 from heelstrike.robot.state import State
-from heelstrike.sim.spatial.simulation import spatial_ground
+from heelstrike.sim.spatial.space import SPACE
 
 
 def placed_in_space(
@@ -51,7 +51,7 @@ def placed_in_space(
     begin = checked_state(robot, robot.reference_state() if state is None else state)
     if not (robot.floating and robot.nc):
         return begin
-    plane = spatial_ground(ground)
+    plane = SPACE.checked_ground(ground)
     normal = np.asarray(plane.normal, dtype=np.float64)
     points = spatial.lowest_positions(robot, begin.q)
     below = plane.height - points[:, :2] @ normal[:2] / normal[2]

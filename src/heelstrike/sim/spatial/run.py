@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,62 +12,16 @@ from heelstrike.contact.spatial.ground import SpatialGround
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.robot import SpatialRobot
-from heelstrike.robot.state import State
-from heelstrike.sim.closed_sets import RunStatus
-from heelstrike.sim.method import Method
-from heelstrike.sim.run import Timing
-from heelstrike.sim.spatial.memory import SpatialMemory
-from heelstrike.sim.spatial.record import SpatialEventKind, SpatialRecord
+from heelstrike.sim.run import AnyRun, Event, SolverCount, quantities_of, recorded
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.figure import Figure
 
     from heelstrike.analysis.spatial.summary import SpatialSummary
 
 
-class Recorded(NamedTuple):
-    """What datasets call a recorded quantity."""
-
-    dims: tuple[str, ...]
-    unit: str
-    label: str
-
-
-RECORDED: dict[str, Recorded] = {
-    "position": Recorded(("q",), "m or rad", "generalised positions"),
-    "velocity": Recorded(("v",), "m/s or rad/s", "generalised velocities"),
-    "torque": Recorded(("actuator",), "N m", "joint torques within their limits"),
-    "stop_torque": Recorded(("v",), "N m or N", "force of the joint stops on the robot"),
-    "friction_torque": Recorded(("v",), "N m or N", "dry friction of the joints"),
-    "contact_point": Recorded(("contact", "axis"), "m", "world position of the contact points"),
-    "contact_normal": Recorded(("contact", "axis"), "1", "ground normal at the contact points"),
-    "gap": Recorded(("contact",), "m", "distance of the contact points to the ground"),
-    "contact_force": Recorded(
-        ("contact", "component"),
-        "N",
-        "contact forces on the robot, mean over the step that follows",
-    ),
-    "slip": Recorded(
-        ("contact", "tangent"), "m/s", "tangential velocity of the contact points after the step"
-    ),
-    "residual": Recorded((), "1", "relative residual of the contact problem"),
-}
-"""What is recorded of every row; datasets and joined records follow."""
-
-
-@dataclass(frozen=True)
-class SpatialEvent:
-    """Something that happened in a run in space."""
-
-    time: float
-    """When, in seconds."""
-    kind: SpatialEventKind
-    """What."""
-    contact: int
-    """Index of the contact point, of the joint of a stop, or of the velocity of dry friction."""
-    impulse: tuple[float, float, float]
-    """Impulse (normal, t1, t2) on the robot over the step in which it happened, in N s."""
+SpatialEvent, SpatialSolverCount = Event, SolverCount
+"""Those of the plane: an event has three components of impulse in space."""
 
 
 @dataclass(frozen=True)
@@ -92,20 +44,8 @@ class SpatialCertificates:
     """Kinetic energy that restitution with friction made (J)."""
 
 
-@dataclass(frozen=True)
-class SpatialSolverCount:
-    """How the contact problems of a run were solved."""
-
-    solves: int
-    shortcuts: int
-    fallbacks: int
-    failures: int
-    """solves, shortcuts, fallbacks, failures: Contact problems; those answered by the modes of the
-    step before; ways that failed where there was another; problems that none could certify."""
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SpatialRun:
+class SpatialRun(AnyRun):
     """Record of a simulation in space.
 
     A row holds everything about one instant: the state, the torques decided in it, and the contact
@@ -115,63 +55,16 @@ class SpatialRun:
 
     robot: SpatialRobot
     ground: SpatialGround
-    method: Method
-    """How it went through time."""
-    status: RunStatus
-    """How the run ended."""
-    message: str
-    """The same in a person's words."""
-    time: Floats
-    """(nt,) Seconds."""
-    position: Floats
-    """(nt, nq) Generalised positions (m, rad)."""
-    velocity: Floats
-    """(nt, nv) Generalised velocities (m/s, rad/s)."""
-    torque: Floats
-    """(nt, nu) Joint torques within their limits (N m)."""
-    stop_torque: Floats
-    """(nt, nv) Force of the joint stops on the robot (N m, N)."""
-    friction_torque: Floats
-    """(nt, nv) Dry friction of the joints on the robot (N m, N)."""
-    contact_point: Floats
-    """(nt, nc, 3) World position of the contact points (m)."""
-    contact_normal: Floats
-    """(nt, nc, 3) Ground normal at the contact points."""
-    gap: Floats
-    """(nt, nc) Distance to the ground (m)."""
-    contact_force: Floats
-    """(nt, nc, 3) Contact forces on the robot, normal, t1, t2, mean over the step (N)."""
-    slip: Floats
-    """(nt, nc, 2) Tangential velocity along t1 and t2 after the step (m/s)."""
-    residual: Floats
-    """(nt,) Residual of the contact problem of the step."""
-    events: tuple[SpatialEvent, ...]
     certificates: SpatialCertificates
-    solver: SpatialSolverCount
-    steps: int
-    """Steps taken; the parts of halved ones count each."""
-    saturations: int
-    """Commands that limits or motors did not let through."""
-    timing: Timing
-    error: BaseException | None = field(default=None, repr=False)
-    """What the controller raised, if that ended the run."""
-
-    def __repr__(self) -> str:
-        last = self.time[-1] if len(self.time) else 0.0
-        return (
-            f"SpatialRun({self.robot.name}, {self.method.name}, {last:.6g} s, "
-            f"{self.status.value}, {self.steps} steps)"
-        )
-
-    @property
-    def completed(self) -> bool:
-        """Whether the run lasted as long as it was asked to."""
-        return self.status is RunStatus.COMPLETED
-
-    @property
-    def final_state(self) -> State:
-        """State of the last row."""
-        return State(self.position[-1], self.velocity[-1])
+    slip: Floats = recorded(
+        "nc", 2, of="reaction.slip", unit="m/s",
+        label="tangential velocity of the contact points after the step",
+    )  # fmt: skip
+    """Along t1 and t2. Zero for points that are not in the contact problem."""
+    residual: Floats = recorded(
+        of="reaction.residual", unit="1", label="relative residual of the contact problem"
+    )
+    """Zero where there was none."""
 
     @property
     def world_force(self) -> Floats:
@@ -213,25 +106,6 @@ class SpatialRun:
 
         return plot_in_space(self, what, **options)
 
-    def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write an animation of the run; see :func:`heelstrike.view.animation.animate`.
-
-        Parameters
-        ----------
-        path : str or path
-            File to write.
-        **options
-            As for that function.
-
-        Returns
-        -------
-        Path
-            The file.
-        """
-        from heelstrike.view.animation import animate
-
-        return animate(self, path, **options)
-
     def save_html(self, path: str | os.PathLike[str], **options: Any) -> Path:
         """Write the run as one HTML file; see :func:`heelstrike.view.spatial.page.save_html`.
 
@@ -251,40 +125,9 @@ class SpatialRun:
 
         return save_html(self, path, **options)
 
-    def to_dataset(self) -> xarray.Dataset:
-        """Return the run as a labelled dataset with units.
 
-        Returns
-        -------
-        xarray.Dataset
-            With the dimensions ``time``, ``q``, ``v``, ``actuator``, ``contact``, ``axis`` (x, y,
-            z), ``component`` (normal, t1, t2), ``tangent`` (t1, t2) and ``event``.
-        """
-        from heelstrike.sim.spatial.dataset import dataset_of
-
-        return dataset_of(self)
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the dataset of the run as NetCDF.
-
-        Parameters
-        ----------
-        path : str or path
-            File to write, whose name ends in .nc.
-
-        Returns
-        -------
-        Path
-            The file. It appears whole or not at all.
-
-        Raises
-        ------
-        RunFileError
-            If the name ends in anything else or the file cannot be written.
-        """
-        from heelstrike.sim.spatial.dataset import save_dataset
-
-        return save_dataset(self, path)
+RECORDED = quantities_of(SpatialRun)
+"""What is recorded in space."""
 
 
 def tangents_of(normal: Floats) -> tuple[Floats, Floats]:
@@ -300,37 +143,3 @@ def tangents_of(normal: Floats) -> tuple[Floats, Floats]:
 
 X_NORMAL = 1e-12
 """Sine of the angle from x up to which a normal is along it."""
-
-
-def joined_records(records: Sequence[SpatialRecord]) -> dict[str, Any]:
-    """Return rows and events of consecutive records as fields of a run."""
-
-    def join(name: str, used: str) -> Any:
-        return np.concatenate([getattr(each, name)[: getattr(each, used)] for each in records])
-
-    rows = {name: join(name, "rows") for name in ("time", *RECORDED)}
-    arrays = [join(f"event_{name}", "events") for name in ("time", "kind", "contact", "impulse")]
-    order = np.argsort(arrays[0], kind="stable")
-    lists = [values[order].tolist() for values in arrays]
-    events = tuple(
-        SpatialEvent(time, SpatialEventKind(kind), contact, (n, s, t))
-        for time, kind, contact, (n, s, t) in zip(*lists, strict=True)
-    )
-    return {**rows, "events": events}
-
-
-def counts_of(memory: SpatialMemory) -> dict[str, Any]:
-    """Return counts and worst values of a simulation as fields of a run."""
-    tally, solver = memory.tally, memory.solver.tally
-    return {
-        "certificates": SpatialCertificates(
-            penetration=tally.penetration, residual=tally.residual,
-            uncertified=tally.uncertified, halved=tally.halved, relaxed=tally.relaxed,
-            energy_gain=tally.energy_gain,
-        ),
-        "solver": SpatialSolverCount(
-            solver.solves, solver.shortcuts, solver.fallbacks, solver.failures
-        ),
-        "steps": tally.steps,
-        "saturations": tally.saturations,
-    }  # fmt: skip

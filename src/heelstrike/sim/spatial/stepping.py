@@ -34,6 +34,7 @@ from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.push import Pushes, share_over_step
 from heelstrike.sim.spatial.candidates import (
     NO_ANGLE,
     assemble,
@@ -49,9 +50,9 @@ from heelstrike.sim.spatial.memory import (
     SpatialAssembly,
     SpatialEquations,
     SpatialFeet,
-    SpatialImpact,
     SpatialMemory,
-    SpatialPushes,
+    SpatialStep,
+    SpatialWedge,
 )
 from heelstrike.sim.spatial.table import (
     BALL_STOP,
@@ -89,16 +90,13 @@ def find_state(
 
 @kernel
 def add_spatial_pushes(
-    model: SpatialModel, time: float, step: float, equations: SpatialEquations,
-    pushes: SpatialPushes, force: Floats,
-) -> None:  # fmt: skip
-    """Add the mean force of the pushes over a step."""
-    tree = equations.tree
+    model: SpatialModel, tree: SpatialWorkspace, pushes: Pushes, force: Floats
+) -> None:
+    """Add the generalised force Jᵀf of the pushes to `force`."""
     for i in range(pushes.link.shape[0]):
-        acting = min(time + step, pushes.end[i]) - max(time, pushes.start[i])
-        if acting <= 0.0:
+        share = pushes.share[i]
+        if share <= 0.0:
             continue
-        share = acting / step
         f = share * pushes.force[i, 0], share * pushes.force[i, 1], share * pushes.force[i, 2]
         at = pushes.point[i, 0], pushes.point[i, 1], pushes.point[i, 2]
         place = place_of(tree, point_position(tree, pushes.link[i], at))
@@ -111,14 +109,15 @@ def add_spatial_pushes(
 @kernel
 def find_free_velocity(
     model: SpatialModel, time: float, step: float, q: Floats, v: Floats, torque: Floats,
-    pushes: SpatialPushes, equations: SpatialEquations, next_v: Floats,
+    pushes: Pushes, equations: SpatialEquations, next_v: Floats,
 ) -> None:  # fmt: skip
     """Velocity at the end of the step if nothing held the robot."""
     force, rate = equations.force, equations.rate
     passive_force(model, q, v, force)
     for i in range(model.nu):
         force[model.actuator_velocity[i]] += torque[i]
-    add_spatial_pushes(model, time, step, equations, pushes, force)
+    if share_over_step(time, step, pushes):
+        add_spatial_pushes(model, equations.tree, pushes, force)
     for k in range(model.nv):
         rate[k] = step * (force[k] - equations.bias[k])
     solve_factorized(model, equations.factor, rate)
@@ -179,25 +178,25 @@ def forgive_depth(step: float, table: BlockTable, assembly: SpatialAssembly) -> 
 
 
 @kernel
-def goes_on_wedged(steps: int, impact: SpatialImpact) -> bool:
+def goes_on_wedged(steps: int, wedge: SpatialWedge) -> bool:
     """Whether the step before had no way out, and is not asked again: at 1, 2, 4, 8, ... steps."""
-    age = steps - impact.since
-    return impact.wedged == steps - 1 and age & (age - 1) != 0
+    age = steps - wedge.since
+    return wedge.wedged == steps - 1 and age & (age - 1) != 0
 
 
 @kernel
-def note_relaxed(steps: int, impact: SpatialImpact) -> None:
+def note_relaxed(steps: int, wedge: SpatialWedge) -> None:
     """Keep that a step is not asked to come out of the ground."""
-    impact.relaxed = 1
-    if impact.wedged < steps - 1:
-        impact.since = steps
-    impact.wedged = steps
+    wedge.relaxed = 1
+    if wedge.wedged < steps - 1:
+        wedge.since = steps
+    wedge.wedged = steps
 
 
 @kernel
 def solve_positions(
     step: float, steps: int, table: BlockTable, solver: BlockWorkspace,
-    assembly: SpatialAssembly, impact: SpatialImpact,
+    assembly: SpatialAssembly, wedge: SpatialWedge,
 ) -> int:  # fmt: skip
     """Solve the problem of the positions; where there is no way out, without asking for one.
 
@@ -205,13 +204,13 @@ def solve_positions(
     points is in the ground by another billionth: each would have to slide its own way. They are
     left there, and asked again when that is twice as long ago.
     """
-    impact.relaxed = 0
-    at_once = goes_on_wedged(steps, impact) and forgive_depth(step, table, assembly)
+    wedge.relaxed = 0
+    at_once = goes_on_wedged(steps, wedge) and forgive_depth(step, table, assembly)
     if at_once:
-        note_relaxed(steps, impact)
+        note_relaxed(steps, wedge)
     status = solve_block_problem(assembly.problem, solver, assembly.answer)
     if status != SOLVED and not at_once and forgive_depth(step, table, assembly):
-        note_relaxed(steps, impact)
+        note_relaxed(steps, wedge)
         status = solve_block_problem(assembly.problem, solver, assembly.answer)
     return status
 
@@ -231,8 +230,9 @@ def left_by(status: int, answer: BlockAnswer) -> float:
 
 @kernel
 def solve_step_of(
-    model: SpatialModel, time: float, step: float, resolves: bool, memory: SpatialMemory
-) -> float:
+    model: SpatialModel, time: float, step: float, number: int, resolves: bool,
+    memory: SpatialMemory,
+) -> float:  # fmt: skip
     """Find the velocity at the end of a step; return the largest residual, zero if certified.
 
     ``memory.next_v`` receives the velocity, ``memory.impact.arriving`` that with which positions
@@ -243,7 +243,7 @@ def solve_step_of(
     worst = 0.0
     for entry in range(table.called.shape[0]):
         table.called[entry] = 0
-    before = memory.tally.steps - 1
+    before = number - 1
     for _ in range(CALLS):
         worst = 0.0
         find_free_velocity(
@@ -252,7 +252,7 @@ def solve_step_of(
         list_candidates(
             model, step, equations.tree, table, memory.feet, memory.q, next_v, assembly
         )  # fmt: skip
-        impact.happens = impact.relaxed = 0
+        impact.happens = memory.wedge.relaxed = 0
         impact.gain = 0.0
         for k in range(model.nv):
             impact.arriving[k] = next_v[k]
@@ -260,15 +260,19 @@ def solve_step_of(
             assemble(
                 model, step, table, memory.feet, memory.q, v, next_v, equations, assembly
             )  # fmt: skip
-            steps = memory.tally.steps
-            status = solve_positions(step, steps, table, memory.solver, assembly, impact)
+            status = solve_positions(
+                step, number, table, memory.solver, assembly, memory.wedge
+            )  # fmt: skip
             worst = left_by(status, assembly.answer)
             add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
             for row in range(assembly.problem.first[assembly.count]):
                 impact.impulse[row] = assembly.answer.impulse[row]
             if resolves and worst == 0.0 and closes(step, before, table, assembly):
                 impact.happens = 1
-                status = solve_impact_of(step, before, table, memory.solver, assembly, impact)
+                left = memory.wedge.relaxed == 1
+                status = solve_impact_of(
+                    step, before, left, table, memory.solver, assembly, impact
+                )  # fmt: skip
                 worst = left_by(status, impact.answer)
                 add_impulses(model, impact.impulse, equations, assembly, next_v)
             else:
@@ -346,14 +350,20 @@ def share_forces(
 
 @kernel
 def find_slip(
-    model: SpatialModel, v: Floats, feet: SpatialFeet, tree: SpatialWorkspace, slip: Floats
-) -> None:
-    """Write the tangential velocity of every contact point at the end of the step.
+    model: SpatialModel, v: Floats, feet: SpatialFeet, table: BlockTable,
+    assembly: SpatialAssembly, tree: SpatialWorkspace, slip: Floats,
+) -> None:  # fmt: skip
+    """Write the tangential velocity of the contact points that take part, at the end of the step.
 
     The links of the tree have the velocities of then, afterwards.
     """
     link_velocities(model, v, tree)
     for contact in range(model.nc):
+        slip[contact, 0] = slip[contact, 1] = 0.0
+    for place in range(assembly.count):
+        contact = assembly.candidate[place]
+        if table.kind[contact] != POINT:  # points come first in the table, each in its own place
+            continue
         foot = feet.foot[contact, 0], feet.foot[contact, 1], feet.foot[contact, 2]
         speed = point_velocity(tree, model.contact_link[contact], foot)
         one = feet.frame[contact, 3], feet.frame[contact, 4], feet.frame[contact, 5]
@@ -363,27 +373,28 @@ def find_slip(
 
 
 @kernel
-def begin_step(table: BlockTable) -> None:
-    """Forget the forces of the step before."""
+def begin_step(table: BlockTable, step: SpatialStep) -> None:
+    """Forget what was decided of the step before."""
     for entry in range(table.kind.shape[0]):
         for i in range(3):
             table.force[entry, i] = 0.0
+    step.parts = step.uncertified = step.halved = step.relaxed = 0
+    step.energy_gain = 0.0
 
 
 @kernel
 def take_step(
     model: SpatialModel, ground: SpatialGroundModel, time: float, length: float, resolves: bool,
     memory: SpatialMemory,
-) -> tuple[bool, bool]:  # fmt: skip
+) -> bool:  # fmt: skip
     """Move on by a step, or by the parts of a halved one; the state has been found already.
 
-    Returns whether it could be done, and whether all of it is certified.
+    Returns whether it could be done.
     """
-    begin_step(memory.blocks)
+    counts, reaction, tally = memory.step, memory.reaction, memory.tally
+    begin_step(memory.blocks, counts)
     halvings, done = 0, 0
     parts = 1
-    certified = True
-    gain = 0.0
     while done < parts:
         step = length / parts
         if done > 0:
@@ -391,41 +402,42 @@ def take_step(
                 model, ground, memory.q, memory.v, memory.equations, memory.blocks,
                 memory.contacts, memory.feet,
             )  # fmt: skip
-        worst = solve_step_of(model, time + done * step, step, resolves, memory)
+        number = tally.steps + counts.parts
+        worst = solve_step_of(model, time + done * step, step, number, resolves, memory)
         if worst > 0.0 and halvings < HALVINGS_OF_A_STEP:
-            if halvings == 0:
-                memory.tally.halved += 1
+            counts.halved = 1
             halvings += 1
             parts *= 2
             done *= 2
             continue
         if not worst <= BEARABLE:
-            memory.tally.unsolved = worst
-            return False, False
+            tally.unsolved = reaction.residual = worst
+            return False
         if worst > 0.0:
-            certified = False
+            counts.uncertified = 1
         note_answer_of(
-            step, length, memory.tally.steps, memory.impact.impulse, memory.assembly, memory.blocks
+            step, length, number, memory.impact.impulse, memory.assembly, memory.blocks
         )  # fmt: skip
-        gain += memory.impact.gain
+        counts.energy_gain += memory.impact.gain
+        reaction.residual = 0.0
         if memory.assembly.count > 0:
-            memory.tally.residual = max(memory.tally.residual, residual_of(memory.assembly.answer))
+            reaction.residual = residual_of(memory.assembly.answer)
+            tally.residual = max(tally.residual, reaction.residual)
         if memory.impact.happens == 1:
-            memory.tally.residual = max(memory.tally.residual, residual_of(memory.impact.answer))
-        memory.tally.relaxed += memory.impact.relaxed
+            tally.residual = max(tally.residual, residual_of(memory.impact.answer))
+        counts.relaxed += memory.wedge.relaxed
         if done + 1 == parts:
             find_slip(
-                model, memory.next_v, memory.feet, memory.equations.tree, memory.feet.slip
+                model, memory.next_v, memory.feet, memory.blocks, memory.assembly,
+                memory.equations.tree, reaction.slip,
             )  # fmt: skip
         integrate(model, memory.q, memory.impact.arriving, step, memory.q)
         for k in range(model.nv):
             memory.v[k] = memory.next_v[k]
-        memory.tally.steps += 1
+        counts.parts += 1
         done += 1
-    memory.tally.energy_gain += gain
-    memory.tally.uncertified += not certified
     share_forces(
-        model, memory.q, memory.blocks, memory.feet, memory.contacts.force, memory.stop_torque,
-        memory.friction_torque,
+        model, memory.q, memory.blocks, memory.feet, memory.contacts.force, reaction.stop_torque,
+        reaction.friction_torque,
     )  # fmt: skip
-    return True, certified
+    return True

@@ -92,9 +92,7 @@ def run_card(run: Run) -> str:
 
 def summary_card(summary: Summary) -> str:
     """Show a summary as the table that is printed."""
-    from heelstrike.analysis.summary import lines
-
-    return _card(f"{summary.robot}: {summary.message}", table(dict(lines(summary))), "")
+    return _card(f"{summary.robot}: {summary.message}", table(dict(summary.lines())), "")
 
 
 def ground_card(ground: Ground) -> str:

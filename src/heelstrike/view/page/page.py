@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from heelstrike.analysis.motion import run_motion
-from heelstrike.analysis.summary import lines, summarize
+from heelstrike.analysis.summary import summarize
 from heelstrike.analysis.support import support_phases
 from heelstrike.analysis.zero_moment_point import zero_moment_point
 from heelstrike.arguments import takes
@@ -103,7 +103,7 @@ def page(run: Run, gait: Gait | None = None, *, command: str = "") -> str:
     parts = {
         "title": escaped(run.robot.name),
         "headline": escaped(judge(run, gait).headline),
-        "summary": table(dict(lines(summary)), "Summary"),
+        "summary": table(dict(summary.lines()), "Summary"),
         "certificates": table(certificates(run), "Certificates: worst values over all steps"),
         "provenance": table(provenance(run, gait, command=command), "Where this comes from"),
     }

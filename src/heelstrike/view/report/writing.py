@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from heelstrike.analysis.diagnosis.changes import Tried
 from heelstrike.analysis.diagnosis.limits import REACHED, Limit
 from heelstrike.analysis.diagnosis.measures import measures, motor_loads
-from heelstrike.analysis.summary import lines, summarize
+from heelstrike.analysis.summary import summarize
 from heelstrike.analysis.support import step_times
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
@@ -329,7 +329,7 @@ def _differences(named: Mapping[str, Run]) -> Iterator[str]:
 
 
 def _summaries(named: Mapping[str, Run], gait: Gait | None) -> str:
-    each = [dict(lines(summarize(run, gait=gait))) for run in named.values()]
+    each = [dict(summarize(run, gait=gait).lines()) for run in named.values()]
     if len(each) == 1:
         return table(each[0], "Summary")
     rows = [(label, *(one.get(label, "–") for one in each)) for label in each[0]]

@@ -14,6 +14,7 @@ from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_po
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
 from heelstrike.robot.model import Floats
+from heelstrike.sim.files.spatial import IN_SPACE
 from heelstrike.sim.run import Run
 from heelstrike.sim.spatial.run import RECORDED, SpatialRun
 from heelstrike.view.comparison_figure import COLORS, STROKES
@@ -156,14 +157,13 @@ def _quantity(run: SpatialRun, name: str) -> tuple[str, list[Panel]]:
         "contact": run.robot.contact_names,
     }
     values = getattr(run, name)
-    if not quantity.dims:
+    dims = [IN_SPACE.extents[each] for each in quantity.shape]
+    if not dims:
         return quantity.label, [Panel(quantity.unit, [Curve(values, quantity.label)])]
-    along = names[quantity.dims[0]]
+    along = names[dims[0]]
     if not along:
-        raise ViewError(
-            f"robot {run.robot.name!r} has no {quantity.dims[0]}s: there is nothing to show"
-        )
-    components = COMPONENTS[quantity.dims[1]] if len(quantity.dims) > 1 else ("",)
+        raise ViewError(f"robot {run.robot.name!r} has no {dims[0]}s: there is nothing to show")
+    components = COMPONENTS[dims[1]] if len(dims) > 1 else ("",)
     table: Floats = values.reshape(len(run.time), len(along), -1)
     together = OF_A_PANEL if len(along) <= MOST_NAMED else len(along)
     panels = [

@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.analysis.spatial.summary import spatial_lines, summarize_in_space
+from heelstrike.analysis.spatial.summary import summarize_in_space
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
-from heelstrike.sim.spatial.record import SpatialEventKind
-from heelstrike.sim.spatial.run import SpatialEvent, SpatialRun
+from heelstrike.sim.spatial import SpatialEvent, SpatialEventKind, SpatialRun
 from heelstrike.view.page.columns import TOLERANCE, packed
 from heelstrike.view.page.markup import data_block, document, escaped, shipped, table
 from heelstrike.view.page.page import MOST_EVENTS, MOST_PHASES, check_page
@@ -78,7 +77,7 @@ def page_in_space(run: SpatialRun, *, command: str = "") -> str:
     parts = {
         "title": escaped(run.robot.name),
         "headline": escaped(run.message),
-        "summary": table(dict(spatial_lines(summary)), "Summary"),
+        "summary": table(dict(summary.lines()), "Summary"),
         "certificates": table(_certificates(run), "Certificates: worst values over all steps"),
         "provenance": table(_provenance(run, command), "Where this comes from"),
         "camera": escaped(CAMERA),
@@ -151,18 +150,6 @@ OF_POINTS = (
     SpatialEventKind.SLIP,
     SpatialEventKind.STICK,
 )
-OF_VELOCITIES = (SpatialEventKind.JOINT_SLIP, SpatialEventKind.JOINT_STICK)
-
-
-def _where(event: SpatialEvent, run: SpatialRun) -> str:
-    """Name of the contact point, joint or velocity at which an event happened."""
-    if event.kind in OF_POINTS:
-        return in_words(run.robot.contact_names[event.contact])
-    if event.kind is SpatialEventKind.JOINT_STOP:
-        return in_words(run.robot.joint_names[event.contact])
-    if event.kind in OF_VELOCITIES:
-        return in_words(run.robot.velocity_names[event.contact])
-    return ""
 
 
 def _described(event: SpatialEvent, run: SpatialRun) -> dict[str, Any]:
@@ -170,7 +157,7 @@ def _described(event: SpatialEvent, run: SpatialRun) -> dict[str, Any]:
     return {
         "time": event.time,
         "kind": in_words(event.kind.name.lower()),
-        "where": _where(event, run),
+        "where": in_words(event.place(run.robot)),
         "contact": event.contact if of_a_point else -1,
         "impulse": event.impulse[0] if of_a_point else 0.0,
         "unit": "N s" if of_a_point else "",

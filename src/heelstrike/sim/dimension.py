@@ -1,0 +1,253 @@
+"""What depends on whether a robot lives in the plane or in space, and on nothing else.
+
+Simulation, batch, record and files are written once. What differs they ask of the dimension of the
+robot: the classes of its memory, ground and run, and what is to be said about its states.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
+
+from numpy.typing import NDArray
+
+from heelstrike.errors import SimulationError
+from heelstrike.robot.model import Floats
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
+from heelstrike.robot.state import State
+
+if TYPE_CHECKING:
+    from heelstrike.sim.controller.interface import Contacts
+    from heelstrike.sim.controller.law import Law
+    from heelstrike.sim.method import Method
+    from heelstrike.sim.run import AnyRun, Quantity
+    from heelstrike.sim.setting import Setting
+
+AnyRobot = Robot | SpatialRobot
+
+
+class Look(Protocol):
+    """A look at contact points that leaves the memory of a simulation as it is."""
+
+    def at_contacts(self, ground: Any, memory: Any) -> Contacts:
+        """Return the contact points of the state now, with the forces of the step before."""
+        ...
+
+
+class Shown(NamedTuple):
+    """What laws are shown.
+
+    Attributes
+    ----------
+    control : type
+        Class of what loops hand along.
+    state : type
+        Class of the state.
+    robot : Bundle
+        The robot.
+    """
+
+    control: Any
+    state: Any
+    robot: Any
+
+
+class Dimension(ABC):
+    """The plane, or space."""
+
+    ground: ClassVar[type]
+    """Class of its ground, which makes one of numbers by `of_numbers`."""
+    flat: ClassVar[Any]
+    """Its ground where nobody gives one."""
+    run: ClassVar[type[AnyRun]]
+    quantities: ClassVar[Mapping[str, Quantity]]
+    """run, quantities: Class of its runs, and what they record."""
+    record: ClassVar[Any]
+    """Class of its records."""
+    certificates: ClassVar[type]
+    """Worst values of a run, all of them in the tally of its memory."""
+    solved: ClassVar[tuple[str, ...]]
+    """What is counted of the contact problems of a run, in the tally of its solver."""
+
+    @abstractmethod
+    def way(self, method: Method | None) -> Method:
+        """Return what goes through time as a method says, or refuse one that is not for it."""
+
+    @abstractmethod
+    def row_extents(self, robot: Any) -> dict[str, int]:
+        """Extents of rows that the model of a robot does not tell."""
+
+    @abstractmethod
+    def checked_ground(self, ground: Any) -> Any:
+        """Return a ground, the usual one if none is given, or refuse what is none."""
+
+    @abstractmethod
+    def checked_state(self, robot: Any, state: Any) -> State:
+        """Return a state of a robot, or refuse what is none."""
+
+    @abstractmethod
+    def is_free(self, robot: Any) -> bool:
+        """Whether any finite numbers are a state of a robot."""
+
+    @abstractmethod
+    def height(self, robot: Any, state: State, ground: Any) -> float:
+        """Height of the centre of mass above the ground (m)."""
+
+    @abstractmethod
+    def held(
+        self, robot: Any, state: State, ground: Any, latched: Any, braked: Any
+    ) -> tuple[tuple[bool, ...], tuple[bool, ...]]:
+        """Which latches and brakes hold as a simulation begins."""
+
+    @abstractmethod
+    def check(self, way: Method, setting: Setting) -> None:
+        """Refuse what cannot be simulated."""
+
+    @abstractmethod
+    def new_memory(self, setting: Setting) -> Any:
+        """Allocate the memory of a simulation."""
+
+    @abstractmethod
+    def begin(self, setting: Setting, memory: Any) -> None:
+        """Let the memory of a simulation be as the setting says."""
+
+    @abstractmethod
+    def scratch(self, settings: Sequence[Setting]) -> Any:
+        """Allocate what solvers scribble on, for the largest of some simulations."""
+
+    @abstractmethod
+    def mold(self, setting: Setting) -> Any:
+        """Return the mold of the memory of a simulation, with nothing to scribble on."""
+
+    @abstractmethod
+    def with_scratch(self, memory: Any, scratch: Any) -> Any:
+        """Return a memory that its solvers scribble beside."""
+
+    @abstractmethod
+    def words_of(self, law: Law) -> Any:
+        """Words by which loops find the machine code of a law."""
+
+    @abstractmethod
+    def shown(self, robot: Any) -> Shown:
+        """Return what the laws of a robot are shown."""
+
+    @abstractmethod
+    def commands_voltage(self, controller: Any, robot: Any) -> bool:
+        """Return whether a controller commands voltages, or refuse one that cannot."""
+
+    @abstractmethod
+    def take_gains(self, robot: Any, law: Law | None, voltage: bool, memory: Any) -> None:
+        """Note which joint forces an implicit scheme takes at the end of a step."""
+
+    @abstractmethod
+    def look(self, robot: Any) -> Look:
+        """Return what looks at the contact points of a simulation."""
+
+    @abstractmethod
+    def gaps(self, robot: Any, state: State, ground: Any) -> tuple[Floats, Floats]:
+        """Gaps of contact points in a state (m), (nc,), and how far up their normals point."""
+
+    @abstractmethod
+    def latched(self, robot: Any, memory: Any) -> tuple[str, ...]:
+        """Joints that latches hold."""
+
+    @abstractmethod
+    def latch(
+        self, robot: Any, state: State, ground: Any, joints: Iterable[str | int], memory: Any
+    ) -> None:
+        """Let latches hold these joints and no others."""
+
+    @abstractmethod
+    def braked(self, robot: Any, memory: Any) -> tuple[str, ...]:
+        """Joints whose brakes are on."""
+
+    @abstractmethod
+    def brake(self, robot: Any, state: State, joints: Iterable[str | int], memory: Any) -> None:
+        """Put the brakes of these joints on, and let the others go."""
+
+    @abstractmethod
+    def still_latched(self, robot: Any, joints: Any, memory: Any) -> list[str]:
+        """Which of these joints a latch holds now."""
+
+    @abstractmethod
+    def would_brake(self, robot: Any, joints: Any, memory: Any) -> bool:
+        """Whether the brakes of these joints, and no others, are not those that are on."""
+
+    @abstractmethod
+    def moved(self, state: State, robot: Any, memory: Any) -> None:
+        """See to what follows from a state that was set from outside."""
+
+    @abstractmethod
+    def check_fit(self, ground: Any, memory: Any) -> None:
+        """Refuse a ground that a simulation which has begun has no memory for."""
+
+    @abstractmethod
+    def laid(self, memory: Any) -> None:
+        """Forget what touches the ground, because another has been laid."""
+
+    @abstractmethod
+    def unsolved(self, now: str, memory: Any) -> str:
+        """Say that nothing could certify a contact problem, and what it is like."""
+
+    def ground_of(self, numbers: Mapping[str, NDArray[Any]]) -> Any:
+        """Make a ground of its numbers."""
+        kind: Any = self.ground
+        return kind.of_numbers(numbers)
+
+    @property
+    def worst(self) -> tuple[str, ...]:
+        """What is in its certificates."""
+        kind: Any = self.certificates
+        return tuple(each.name for each in fields(kind))
+
+    @property
+    def tallied_names(self) -> tuple[str, ...]:
+        """Counts and worst values in the tally of a simulation."""
+        return ("steps", "saturations", *self.worst)
+
+    def counted(self, memory: Any) -> dict[str, Any]:
+        """Return counts and worst values of a simulation."""
+        return {
+            **{name: getattr(memory.tally, name) for name in self.tallied_names},
+            **{name: getattr(memory.solver.tally, name) for name in self.solved},
+        }
+
+    def nothing_counted(self) -> dict[str, Any]:
+        """Return the same of one that has not begun."""
+        return dict.fromkeys((*self.tallied_names, *self.solved), 0)
+
+    def tallied(self, memory: Any, solves_with: str) -> dict[str, Any]:
+        """Return counts and worst values of a simulation, as fields of a run."""
+        from heelstrike.sim.run import SolverCount
+
+        found = self.counted(memory)
+        return {
+            "certificates": self.certificates(**{name: found[name] for name in self.worst}),
+            "solver": SolverCount(solves_with, **{name: found[name] for name in self.solved}),
+            "steps": found["steps"],
+            "saturations": found["saturations"],
+        }
+
+
+def dimension_of(robot: Any) -> Dimension:
+    """Return the dimension that a robot lives in; space is loaded with the first of its robots.
+
+    Raises
+    ------
+    SimulationError
+        If it is no robot.
+    """
+    if isinstance(robot, SpatialRobot):
+        from heelstrike.sim.spatial.space import SPACE
+
+        return SPACE
+    if not isinstance(robot, Robot):
+        raise SimulationError(
+            f"robot must be a Robot, got {robot!r}; load_robot gives one by its name or file"
+        )
+    from heelstrike.sim.plane import PLANE
+
+    return PLANE
