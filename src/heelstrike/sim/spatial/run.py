@@ -17,6 +17,7 @@ from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.method import Method
+from heelstrike.sim.push import Push
 from heelstrike.sim.run import Timing
 from heelstrike.sim.spatial.memory import SpatialMemory
 from heelstrike.sim.spatial.record import SpatialEventKind, SpatialRecord
@@ -155,6 +156,8 @@ class SpatialRun:
     timing: Timing
     error: BaseException | None = field(default=None, repr=False)
     """What the controller raised, if that ended the run."""
+    pushes: tuple[Push, ...] = ()
+    """What pushed the robot, and what would have later."""
 
     def __repr__(self) -> str:
         last = self.time[-1] if len(self.time) else 0.0

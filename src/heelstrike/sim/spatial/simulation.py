@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.spatial.ground import SpatialGround
@@ -106,7 +107,10 @@ class SpatialSnapshot:
     arrays: Mapping[str, NDArray[Any]] = field(repr=False)
     """All numbers of the simulation, by name."""
     surroundings: Mapping[str, Any] = field(repr=False)
-    """What it is simulated with, by name: method, ground, pushes, control period."""
+    """What its simulation began with, by name: method, ground, pushes, control period."""
+    ground: SpatialGround = field(repr=False)
+    pushes: tuple[Push, ...] = field(repr=False)
+    """ground, pushes: What it had then: others may have been laid and applied since it began."""
     numbers: NDArray[Any] | None = field(default=None, repr=False)
     """The memory of a controller in Python."""
 
@@ -207,6 +211,7 @@ class SpatialSimulation:
             stop_when_fallen = robot.floating and len(robot.feet) > 1
         height = height_of_mass(robot.model, self._ground.model(), self._memory.equations)
         clock.fallen_height = FALL_FRACTION * height if stop_when_fallen else -np.inf
+        self._begun_with = self._surroundings()
         self.status: RunStatus = RunStatus.COMPLETED
         self.message = "not begun"
         self.error: BaseException | None = None
@@ -274,8 +279,55 @@ class SpatialSimulation:
 
     @property
     def ground(self) -> SpatialGround:
-        """The ground."""
+        """The ground; one of the same shape but another friction or restitution may be laid."""
         return self._ground
+
+    @ground.setter
+    def ground(self, ground: SpatialGround) -> None:
+        if not isinstance(ground, SpatialGround):
+            raise SimulationError(f"ground must be a SpatialGround, got {type(ground).__name__}")
+        if not ground.has_shape_of(self._ground):
+            raise SimulationError(
+                "in space the shape of the ground stays while a simulation goes on: lay one that "
+                "differs in friction and restitution only, as dataclasses.replace(ground, "
+                "friction=...) makes it, or begin another simulation"
+            )
+        self._ground = ground
+
+    @takes(SimulationError)
+    def apply(self, push: Push | Sequence[Push]) -> None:
+        """Let a push act; see :meth:`heelstrike.Simulation.apply`.
+
+        Parameters
+        ----------
+        push : Push or sequence of Push
+            What pushes, with its own beginning and duration.
+
+        Raises
+        ------
+        SimulationError
+            If the robot has no such link, or the push would be over.
+        """
+        added = (push,) if isinstance(push, Push) else tuple(push)
+        spatial_pushes(self.robot, added)  # which refuses what cannot be
+        for each in added:
+            if each.end < self.time:
+                raise SimulationError(
+                    f"the push on {each.link!r} would be over since t = {each.end:.6g} s: now is "
+                    f"{self._now}. Let it start later"
+                )
+        self._push_by((*self._pushes, *added))
+
+    def forget(self) -> None:
+        """Forget what was; see :meth:`heelstrike.Simulation.forget`."""
+        self._records.clear()
+        self._push_by(tuple(push for push in self._pushes if push.end >= self.time))
+
+    def _push_by(self, pushes: tuple[Push, ...]) -> None:
+        """Let these pushes act and no others."""
+        if pushes != self._pushes:
+            self._pushes = pushes
+            self._memory = self._memory.replaced(pushes=spatial_pushes(self.robot, pushes))
 
     @property
     def controller(self) -> Controller | None:
@@ -310,8 +362,9 @@ class SpatialSimulation:
             for name, values in bundle.storage(prefix)
         }
         return SpatialSnapshot(
-            self.time, self.robot, self._controller, arrays, self._surroundings(), numbers
-        )
+            self.time, self.robot, self._controller, arrays, self._begun_with, self._ground,
+            self._pushes, numbers,
+        )  # fmt: skip
 
     def _surroundings(self) -> dict[str, Any]:
         """What a snapshot must have been simulated with, too, in numbers that compare."""
@@ -331,9 +384,9 @@ class SpatialSimulation:
         Parameters
         ----------
         snapshot : SpatialSnapshot
-            Of this simulation, or of one of the same robot, controller, method, ground, pushes and
-            control period, in this process. The rows of its record are as far apart as those of
-            the snapshot.
+            Of this simulation, or of one that began with the same robot, controller, method,
+            ground, pushes and control period, in this process. Ground and pushes are again those
+            of the snapshot, and the rows of the record as far apart as they were.
 
         Raises
         ------
@@ -348,8 +401,7 @@ class SpatialSimulation:
             "robot": snapshot.robot is self.robot,
             "controller": snapshot.controller is self._controller,
         } | {
-            what: snapshot.surroundings.get(what) == mine
-            for what, mine in self._surroundings().items()
+            what: snapshot.surroundings.get(what) == mine for what, mine in self._begun_with.items()
         }
         for what, alike in same.items():
             if not alike:
@@ -357,6 +409,9 @@ class SpatialSimulation:
                     f"the snapshot is one of another {what}: restore it into a simulation with "
                     f"the same {what}"
                 )
+        now = self._ground, self._pushes
+        self._push_by(snapshot.pushes)
+        self._ground = snapshot.ground
         mine = {
             name: values
             for prefix, bundle in self._kept().items()
@@ -366,6 +421,8 @@ class SpatialSimulation:
             values.shape == snapshot.arrays[name].shape for name, values in mine.items()
         )
         if not fits:
+            self._ground = now[0]
+            self._push_by(now[1])
             raise SimulationError("the snapshot is damaged: its arrays are not those of this one")
         if self._python is not None and snapshot.numbers is not None:
             self._partaking().restore(snapshot.numbers.copy())
@@ -574,6 +631,7 @@ class SpatialSimulation:
             **counts_of(self._memory),
             timing=Timing(self._compile_s, self._wall_s),
             error=self.error,
+            pushes=self._pushes,
         )
 
     def _decide_last(self) -> None:
