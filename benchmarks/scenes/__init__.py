@@ -17,6 +17,8 @@ committed table, ``causes.md`` says what lies behind it. The modules, from the b
     The same scene mirrored, with its links in another order, or begun again.
 ``methods``, ``running``
     The simulation methods by name; one scene under one of them.
+``space``
+    Scenes in space: the same judge of time stepping, with mechanics and distances of its own.
 ``checks``
     Questions that are put to many scenes one by one: energy, twins, orders, bridges.
 ``campaign``, ``table``

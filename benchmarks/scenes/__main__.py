@@ -8,7 +8,8 @@
     python benchmarks/scenes costs
 
 `run` goes on where a file of results ends; `show` judges one scene and prints what is wrong. Of
-the family `tied` scenes have closed loops, coupled joints, latches and brakes (scenes/ties).
+the family `tied` scenes have closed loops, coupled joints, latches and brakes (scenes/ties);
+`--family space` draws robots in space (scenes/space), for the methods that these have.
 `energy`, `twins`, `orders` and `bridges` put one question each to many scenes (scenes/checks):
 a line of JSON a scene, then what they add up to; with --out FILE they go on where it ends, too.
 `costs` measures a step in scenes whose contact problems are awkward, at 1e-5 s and at 1e-3 s.
@@ -30,7 +31,8 @@ from scenes.campaign import Task, add_arguments, campaign, results_in  # noqa: E
 from scenes.checks.commands import CHECKS, check  # noqa: E402
 from scenes.costs import costs  # noqa: E402
 from scenes.methods import METHODS  # noqa: E402
-from scenes.running import FAMILIES, prepare, run_scene  # noqa: E402
+from scenes.running import FAMILIES, SPACE, prepare, run_scene  # noqa: E402
+from scenes.space.running import SCHEMES  # noqa: E402
 from scenes.table import page  # noqa: E402
 
 
@@ -43,7 +45,8 @@ def main() -> None:
     run = commands.add_parser("run", help="run scenes and append what comes out to a file")
     add_arguments(run, 300, kept=True, of="methods", choices=METHODS)
     run.add_argument("--without-twins", action="store_true")
-    run.add_argument("--family", choices=FAMILIES, default="free", help="tied: loops, brakes …")
+    families = (*FAMILIES, SPACE)
+    run.add_argument("--family", choices=families, default="free", help="tied: loops, brakes …")
     sums = commands.add_parser("page", help="sum a file of results up")
     sums.add_argument("results", type=Path)
     sums.add_argument("--out", type=Path)
@@ -51,7 +54,7 @@ def main() -> None:
     show = commands.add_parser("show", help="run and judge one scene")
     show.add_argument("method", choices=METHODS)
     show.add_argument("seed", type=int)
-    show.add_argument("--family", choices=FAMILIES, default="free")
+    show.add_argument("--family", choices=families, default="free")
     for name, (_, words) in CHECKS.items():
         asks = commands.add_parser(name, help=words)
         add_arguments(asks, 100, kept=False)
@@ -66,12 +69,15 @@ def main() -> None:
         others = {one.get("family", "free") for one in results_in(options.out)}
         if others - {options.family}:
             parser.error(f"{options.out} has scenes of another family: {', '.join(sorted(others))}")
+        known = set(SCHEMES) if options.family == SPACE else set(METHODS)
         for one in campaign(
             options.out,
-            options.methods,
+            [name for name in options.methods if name in known],
             options.seeds,
             workers=options.workers,
-            task=Task(partial(run_scene, family=options.family), prepare),
+            task=Task(
+                partial(run_scene, family=options.family), partial(prepare, family=options.family)
+            ),
             twins=twins,
         ):
             found = one.get("objections", []) + one.get("twins", {}).get("objections", [])

@@ -80,6 +80,15 @@ class Findings:
         self.objections = kept + [one for one in other.objections if one.law in laws]
         self.worst |= {law: size for law, size in other.worst.items() if law in laws}
 
+    def take(self, other: Findings) -> None:
+        """Take all that was found of another part of the same record."""
+        for law, size in other.worst.items():
+            self.worst[law] = max(size, self.worst.get(law, 0.0))
+        for one in other.objections:
+            self._object(one)
+        for name, size in other.figures.items():
+            self.figures[name] = max(size, self.figures.get(name, 0.0))
+
     def broken(self) -> tuple[str, ...]:
         """Names of the laws that were broken."""
         return tuple(dict.fromkeys(one.law for one in self.objections))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.sim import EventKind
 from scenes.findings import Findings
 from scenes.mechanics import Metric, Poses, Tree, generalised, rates
 from scenes.terrain import Terrain
@@ -84,8 +85,12 @@ class Rows:
         self.smooth -= model.damping * self.v + model.stiffness * (self.q - model.rest)
         self.smooth[:, model.actuator_joint] += run.torque
         self.low, self.high = self.measured.lowest_friction, self.measured.highest_friction
+        self.slip = run.slip_velocity[..., None]
         self.contacts = tuple(run.robot.contact_names)
         self.joints = tuple(run.robot.joint_names)
+        self.coordinate, self.lower, self.upper = self.q, model.lower, model.upper
+        self.driven = model.actuator_joint
+        self.of_balls = np.zeros(self.tree.size, dtype=bool)
 
     def ahead(self) -> tuple[Array, Array]:
         """Where the discs are at the next row, and where they would be had they gone straight.
@@ -95,6 +100,41 @@ class Rows:
         moved = np.diff(self.q, axis=0, append=self.q[-1:])
         straight = rates(self.poses.jacobian(self.model.contact_link, self.center), moved)
         return np.concatenate((self.center[1:], self.center[-1:])), self.center + straight
+
+    def chord(self, h: float, some: Array) -> Array:
+        """Velocities with which positions moved in some steps of length h."""
+        chord: Array = self.ties.straight(h, some)
+        return chord
+
+    def missed(self, h: float, velocity: Array) -> Array:
+        """How far positions (T − 1, n) are from where velocities lead in steps of length h."""
+        there = self.ties.put_back(self.q[:-1] + h * velocity)
+        missed: Array = np.abs(self.q[1:] - there) / (1.0 + np.abs(self.q[1:]))
+        return missed
+
+    def wedges(self, touching: float) -> Array:
+        """Steps (T − 1,) from where the run tells of a wedge until everything is out of it."""
+        time, going_on = self.time[:-1], np.zeros(len(self.time) - 1, dtype=bool)
+        way = np.minimum(self.q - self.model.lower, self.model.upper - self.q)
+        out = np.minimum(way.min(axis=1), self.gap.min(axis=1, initial=0.0)) >= -touching
+        for event in self.run.events:
+            if event.kind is EventKind.WEDGED:
+                begin = int(np.argmin(np.abs(time - event.time)))
+                ends = np.flatnonzero(out[begin + 1 : -1])
+                going_on[begin : begin + 1 + ends[0] if len(ends) else None] = True
+        return going_on
+
+    def stops_of_balls(self) -> tuple[tuple[str, Array, Array, Array], ...]:
+        """Name, row (T, n), gap (T,) and force (T,) of stops of joints with several velocities."""
+        return ()
+
+    def lowered(self) -> float:
+        """How much farther below its centre a contact touches after a step; a disc never."""
+        return 0.0
+
+    def explained(self, left: Array) -> Array:
+        """Generalised impulses (T − 1, n) less what a record may leave open; here nothing."""
+        return left
 
     def metric_of(self, some: slice) -> Metric:
         """Sizes at some of the rows only."""
@@ -178,15 +218,24 @@ class Rows:
 
 
 def excess_over_cone(force: Array, friction: Array) -> Array:
-    """How far forces (..., 2) pull, or exceed the friction that there is."""
-    return np.maximum(-force[..., 0], np.abs(force[..., 1]) - friction * force[..., 0])
+    """How far forces (..., d), normal first, pull, or exceed the friction that there is."""
+    sideways = np.linalg.norm(force[..., 1:], axis=-1)
+    return np.maximum(-force[..., 0], sideways - friction * force[..., 0])
 
 
 def friction_that_does_not_oppose(
-    force: Array, speed: Array, low: Array, high: Array, force_unit: Array, speed_unit: Array
+    force: Array, slide: Array, low: Array, high: Array, force_unit: Array, speed_unit: Array
 ) -> Array:
-    """How far friction differs from μ λ_n against the sliding, or sliding from zero: the less."""
+    """How far friction differs from μ λ_n against the sliding, or sliding from zero: the less.
+
+    `force` (..., d) has the normal first; `slide` is (..., d − 1), or (...) in the plane.
+    """
     normal = np.maximum(force[..., 0], 0.0)
-    opposing = -np.sign(speed) * force[..., 1]
-    lacks = np.maximum(np.maximum(low * normal - opposing, opposing - high * normal), 0.0)
-    return np.minimum(np.abs(speed) / speed_unit, lacks / force_unit)
+    velocity = slide[..., None] if slide.ndim < force.ndim else slide
+    speed = np.linalg.norm(velocity, axis=-1)
+    way = velocity / np.where(speed > 0.0, speed, 1.0)[..., None]
+    opposing = -np.einsum("...i,...i->...", way, force[..., 1:])
+    across = np.linalg.norm(force[..., 1:] + opposing[..., None] * way, axis=-1)
+    across = np.where(speed > 0.0, across, 0.0)
+    lacks = np.maximum(np.maximum(low * normal - opposing, opposing - high * normal), 0.0) + across
+    return np.minimum(speed / speed_unit, lacks / force_unit)

@@ -10,11 +10,15 @@ from typing import Any
 from heelstrike.errors import HeelstrikeError
 from scenes.methods import Setting
 from scenes.scene import Scene, random_scene
+from scenes.space.running import SpaceSetting, run_space_scene
+from scenes.space.scene import random_space_scene
 from scenes.ties.scene import tied_scene
 from scenes.twins import compare_twins
 
 FAMILIES: dict[str, Callable[[int], Scene]] = {"free": random_scene, "tied": tied_scene}
-"""Where scenes come from: without ties, and with loops, couplings, latches and brakes."""
+"""Where scenes in the plane come from: without ties, and with loops, couplings, latches, brakes."""
+SPACE = "space"
+"""The family of scenes in space, for those methods that robots in space have."""
 
 TWINS_EVERY = 3
 """Every so many seeds a scene is compared with its twins, which costs more than the scene."""
@@ -34,9 +38,12 @@ def run_scene(
 ) -> dict[str, Any]:
     """Run, judge and compare one scene; everything in the result is numbers and text.
 
-    Scenes with ties have no twins: of a state under time stepping the velocity is that of a chord,
-    which does not fit the ties to the last digit.
+    Of the family `SPACE` that is done by :mod:`scenes.space`. Scenes with ties have no twins: of a
+    state under time stepping the velocity is that of a chord, which does not fit the ties to the
+    last digit.
     """
+    if family == SPACE:
+        return run_space_scene(method, seed, twins=twins and seed % TWINS_EVERY == 0)
     begin = time.process_time()
     scene = FAMILIES[family](seed)
     setting = Setting.of(scene)
@@ -62,7 +69,10 @@ def run_scene(
     return result
 
 
-def prepare(method: str) -> None:
+def prepare(method: str, family: str = "free") -> None:
     """Compile a method, so that no scene has to wait for it."""
     with suppress(HeelstrikeError):
+        if family == SPACE:
+            SpaceSetting.of(random_space_scene(WARM)).run(method, duration=0.01)
+            return
         Setting.of(random_scene(WARM)).run(method, duration=0.01)

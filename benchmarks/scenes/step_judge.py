@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.sim import EventKind, Scheme
+from heelstrike.sim import Scheme
 from scenes.findings import Findings
 from scenes.mechanics import Metric, generalised, rates
 from scenes.record import Rows, excess_over_cone, friction_that_does_not_oppose
@@ -68,8 +68,13 @@ def judge_steps(run: Any, controller: Any = None) -> Findings:
     controller : JointFeedback, optional
         What controlled it: the linearly implicit scheme takes its gains at the end of the step.
     """
+    near = IN_CORNER if run.method.scheme in BOUND else DEEP_IN_CORNER
+    return judge_rows(Rows(run, corners=near), controller)
+
+
+def judge_rows(rows: Any, controller: Any = None) -> Findings:
+    """Judge the rows of a run of time stepping, in the plane or in space; see `judge_steps`."""
     found = Findings()
-    rows = Rows(run, corners=IN_CORNER if run.method.scheme in BOUND else DEEP_IN_CORNER)
     rows.geometry(found)
     depth = np.max(-rows.gap, initial=0.0)
     found.figures["penetration"] = float(max(depth, 0.0))
@@ -78,8 +83,15 @@ def judge_steps(run: Any, controller: Any = None) -> Findings:
     return found
 
 
+def unexplained_steps(rows: Any) -> Array:
+    """Return the indices of steps whose momentum nothing explains, the worst first."""
+    broken = _Steps(rows, None).unexplained()
+    worst: Array = np.argsort(-broken)
+    return worst[broken[worst] > BALANCE]
+
+
 class _Steps:
-    def __init__(self, rows: Rows, controller: Any) -> None:
+    def __init__(self, rows: Any, controller: Any) -> None:
         run, model = rows.run, rows.model
         self.rows = rows
         self.scheme = run.method.scheme
@@ -114,15 +126,14 @@ class _Steps:
         self.size = np.maximum(self.size, 1e-100)
         self.gap = rows.gap[:-1]
         self.cornered = rows.cornered[:-1]
-        self.moved = np.diff(rows.q, axis=0) / self.h
         self.split = np.zeros(len(self.time), dtype=bool)
         """Steps whose positions move with another velocity than the one behind them."""
+        self.moved = self.after.copy()
         if self.scheme is Scheme.IMPACT_RESOLVED:
-            self.split = np.any(self.missed(self.after) > MOTION, axis=1)
-            self.moved = self.after.copy()
+            self.split = np.any(rows.missed(self.h, self.after) > MOTION, axis=1)
             split = np.flatnonzero(self.split)
-            self.moved[split] = rows.ties.straight(self.h, split)
-        self.wedged = self.wedges()
+            self.moved[split] = rows.chord(self.h, split)
+        self.wedged = rows.wedges(TOUCHING)
         """Whether a wedge is going on, in which steps may leave in the ground what is there."""
         self.asked_for = np.zeros(len(self.time))
         """Energy that the bounds b of the normal velocities ask for."""
@@ -136,31 +147,15 @@ class _Steps:
         self.dry_joints(found)
         self.energy(found)
 
-    def wedges(self) -> Array:
-        """Steps (T,) from where the run tells of a wedge until everything is out of it."""
-        rows, going_on = self.rows, np.zeros(len(self.time), dtype=bool)
-        way = np.minimum(rows.q - rows.model.lower, rows.model.upper - rows.q)
-        out = np.minimum(way.min(axis=1), rows.gap.min(axis=1, initial=0.0)) >= -TOUCHING
-        for event in rows.run.events:
-            if event.kind is EventKind.WEDGED:
-                begin = int(np.argmin(np.abs(self.time - event.time)))
-                ends = np.flatnonzero(out[begin + 1 : -1])
-                going_on[begin : begin + 1 + ends[0] if len(ends) else None] = True
-        return going_on
-
     def balance(self, found: Findings) -> None:
+        found.look("balance", self.unexplained(), BALANCE, self.time)
+
+    def unexplained(self) -> Array:
+        """Momentum (T,) of each step that nothing explains, relative to S."""
         momentum = np.einsum("tij,tj->ti", self.matrix, self.after - self.before)
         acted = generalised(self.acting, self.impulse) + self.stop + self.dry + self.tied
-        left = momentum - self.h * self.known - acted
-        unexplained = self.metric.of_force(left) / self.size
-        found.look("balance", unexplained, BALANCE, self.time)
-
-    def missed(self, velocity: Array) -> Array:
-        """How far (T, n) positions are from where a velocity leads in a step."""
-        q = self.rows.q
-        there = self.rows.ties.put_back(q[:-1] + self.h * velocity)
-        missed: Array = np.abs(q[1:] - there) / (1.0 + np.abs(q[1:]))
-        return missed
+        left = self.rows.explained(momentum - self.h * self.known - acted)
+        return self.metric.of_force(left) / self.size
 
     def motion(self, found: Findings) -> None:
         velocity = self.after
@@ -170,7 +165,7 @@ class _Steps:
             velocity = self.before
         elif self.scheme is Scheme.MOREAU_JEAN:
             velocity = 0.5 * (self.before + self.after)
-        left = self.missed(velocity)
+        left = self.rows.missed(self.h, velocity)
         found.look("teleport", left, MOTION, self.time, self.rows.joints)
         dt = np.abs(np.diff(self.rows.time) - self.h)
         found.look("length of a step", dt, 1e-9, self.time)
@@ -261,14 +256,15 @@ class _Steps:
             names,
         )
         size = self.size[:, None]
-        unit = size / np.maximum(weight[..., 1], 1e-300)
+        sideways = weight[..., 1:].max(axis=-1)
+        unit = size / np.maximum(sideways, 1e-300)
         low, high = rows.low[:-1], rows.high[:-1]
         cone = excess_over_cone(impulse, high) / unit
         found.look("friction cone", cone, LAW, self.time, names)
-        speed_unit = np.maximum(weight[..., 1] * size, 1e-300)
-        wrong = friction_that_does_not_oppose(impulse, speed[..., 1], low, high, unit, speed_unit)
+        speed_unit = np.maximum(sideways * size, 1e-300)
+        wrong = friction_that_does_not_oppose(impulse, speed[..., 1:], low, high, unit, speed_unit)
         found.look("friction opposes", wrong, LAW, self.time, names)
-        slip = np.abs(rows.run.slip_velocity[:-1] - speed[..., 1]) / speed_unit
+        slip = np.linalg.norm(rows.slip[:-1] - speed[..., 1:], axis=-1) / speed_unit
         pressed = impulse[..., 0] > 0.0
         found.look("recorded slip", np.where(pressed, slip, 0.0), LAW, self.time, names)
         self.sink(found, speed[..., 0])
@@ -279,6 +275,7 @@ class _Steps:
             return
         rows = self.rows
         moved = np.einsum("tpc,tpc->tp", np.diff(rows.center, axis=0), rows.normal[:-1])
+        moved -= rows.lowered()
         turning = moved - self.h * (
             rates(self.jacobian, self.moved)[..., 0] if self.split.any() else speed
         )
@@ -286,27 +283,43 @@ class _Steps:
         if self.cornered.any():  # the nearest face afterwards may be the other one
             world = rows.poses.jacobian(rows.model.contact_link, rows.center)[:-1]
             left = np.diff(rows.center, axis=0) - self.h * rates(world, self.moved)
-            explained = np.where(self.cornered, np.linalg.norm(left, axis=-1), explained)
+            own = np.abs(turning - np.einsum("tpc,tpc->tp", left, rows.normal[:-1]))
+            explained = np.where(self.cornered, np.linalg.norm(left, axis=-1) + own, explained)
         left = np.where(self.wedged[:, None], np.maximum(-rows.gap[:-1], 0.0), 0.0)
         deep = -rows.gap[1:] - explained - left
         found.look("sunk at a corner", np.maximum(deep, 0.0), SINK, self.time, rows.contacts)
 
     def stops(self, found: Findings) -> None:
-        rows, model = self.rows, self.rows.model
+        rows = self.rows
         weight = self.metric.joint_weight()
         nothing = np.zeros_like(self.stop)
-        for side, limit, name in ((1.0, model.lower, "lower"), (-1.0, model.upper, "upper")):
+        for side, limit, name in ((1.0, rows.lower, "lower"), (-1.0, rows.upper, "upper")):
             has = np.isfinite(limit)
-            gap = side * (rows.q[:-1] - np.where(has, limit, -side * 1e9))
+            gap = side * (rows.coordinate[:-1] - np.where(has, limit, -side * 1e9))
             mine = None
             if self.scheme is Scheme.IMPACT_RESOLVED:
                 mine = self.arrives(found, f"{name} stop", gap, side * self.moved, side * self.free)
             least, near = self.bound(gap, side * self.before, nothing, mine)
             pressed = np.where(rows.ties.latched[:-1], 0.0, np.maximum(side * self.stop, 0.0))
+            pressed = np.where(rows.of_balls, 0.0, pressed)
             near = near | rows.ties.latched[:-1]
             self.normals(
                 f"{name} stop", found, pressed, side * self.after, weight, least, near, rows.joints
             )
+
+        for name, row, gap, force in rows.stops_of_balls():
+            weight = self.metric.weight(row[:-1, None, None])[..., 0]
+
+            def along(velocity: Array, row: Array = row) -> Array:
+                return np.einsum("tn,tn->t", row[:-1], velocity)[:, None]
+
+            least, near = self.bound(gap[:-1, None], along(self.before), 0.0 * weight, self.arrives(
+                found, "ball stop", gap[:-1, None], along(self.moved), along(self.free)
+            ) if self.scheme is Scheme.IMPACT_RESOLVED else None)  # fmt: skip
+            self.normals(
+                "ball stop", found, self.h * force[:-1, None], along(self.after), weight, least,
+                near, (name,),
+            )  # fmt: skip
 
     def dry_joints(self, found: Findings) -> None:
         model, names = self.rows.model, self.rows.joints
@@ -333,7 +346,7 @@ class _Steps:
         model, run = self.rows.model, self.rows.run
         acted = generalised(self.acting, self.impulse) + self.stop + self.dry + self.tied
         motors = np.zeros_like(mean)
-        motors[:, model.actuator_joint] = run.torque[:-1]
+        motors[:, self.rows.driven] = run.torque[:-1]
         forces = motors + self.pushed - model.damping * self.before
         work = (acted + self.h * forces) * mean
         change = np.diff(kinetic + potential) - work.sum(axis=1)

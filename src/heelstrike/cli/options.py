@@ -38,6 +38,8 @@ class Method(StrEnum):
 
 
 METHODS = tuple(each.value for each in Method)
+METHODS_IN_SPACE = (Method.TIME_STEPPING, Method.GAP_LINEARISED)
+"""Those that robots in space have."""
 METHOD = "Simulation method: one of three, a law of compliant ground, or a scheme of time stepping."
 SEVERAL = "Simulation method; repeat the option to see several side by side."
 USUAL_METHOD = f"{Method.TIME_STEPPING}; {Method.EVENT_DRIVEN} without motors"

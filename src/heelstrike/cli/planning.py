@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -16,9 +16,10 @@ from heelstrike.cli.values import ground_called, pushes_called
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle
     from heelstrike.experiments.laws import Entry
+    from heelstrike.experiments.space import SpatialLaw
     from heelstrike.experiments.walk import Case
     from heelstrike.gait import Gait
-    from heelstrike.robot import Robot
+    from heelstrike.robot import Robot, SpatialRobot
     from heelstrike.sim import Run
     from heelstrike.sim.method import Method as TimeMethod
 
@@ -40,6 +41,36 @@ def law_asked(words: str | None, robot: Robot | None = None) -> Entry | None:
     if robot is not None:
         check_law(law, robot)
     return law
+
+
+def spatial_law_asked(words: str) -> SpatialLaw:
+    """Return the law of an option for robots in space, and tell whose code was run for it."""
+    from heelstrike.experiments.space import spatial_law_called
+
+    law = spatial_law_called(words)
+    if law.source:
+        tell(f"controller {law.name}: the code of {law.source} has been run")
+    return law
+
+
+def robots_named(
+    names: Sequence[str], dimension: int | None, how: Reading
+) -> tuple[dict[str, SpatialRobot], dict[str, Robot]]:
+    """Load robots in space by their names or files; or, of the plane, the first if it is a file.
+
+    All are lifted into space if the first is there, by its file or because that was asked for.
+    """
+    from heelstrike.robot.library import builtin_robots, load_robot
+    from heelstrike.robot.spatial.robot import SpatialRobot
+
+    options: Any = how.keywords()
+    if dimension is None and names[0] in builtin_robots():
+        return {}, {}
+    first: Any = load_robot(names[0], **options | {"dimension": dimension})
+    if not isinstance(first, SpatialRobot):
+        return {}, {names[0]: first}
+    others = {name: load_robot(name, dimension=3, **options) for name in names[1:]}
+    return {names[0]: first, **others}, {}
 
 
 def hint_of_balance(*runs: Run) -> None:

@@ -70,8 +70,7 @@ def simulate(
     wrong, 130 after Ctrl-C, which keeps the results so far.
     """
     with stage("loading"):
-        from heelstrike.control.spatial.gains import bearable_gains
-        from heelstrike.control.spatial.hold_posture import HoldPosture
+        from heelstrike.experiments.space import hold as hold_posture
         from heelstrike.robot.library import load_robot
         from heelstrike.robot.spatial.robot import SpatialRobot
         from heelstrike.sim import RunStatus, TimeStepping, simulate
@@ -86,10 +85,7 @@ def simulate(
         method = TimeStepping(step=step)
         loaded = load_robot(robot, dimension=3, **how.keywords())
         assert isinstance(loaded, SpatialRobot)  # which is what was asked for
-        law = None
-        if hold and loaded.nu:
-            stiffness, damping = bearable_gains(loaded, step, kp=kp, kd=kd)
-            law = HoldPosture(loaded, kp=stiffness, kd=damping)
+        law = hold_posture(loaded, step, kp=kp, kd=kd) if hold else None
         state = placed_in_space(loaded, surface, above=above)
         out.mkdir(parents=True, exist_ok=True)
     with stage(f"simulating {duration:g} s", when_slow=FIRST_TIME) as going:

@@ -16,13 +16,15 @@ from heelstrike.compiler.bundle import Bundle
 from heelstrike.errors import ControllerError
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim import Controller
 from heelstrike.sim.controller.law import ControllerFunction, Law
 
 FACTORY = "a class, or a function, of (robot, gait) that returns a controller"
 
 
-Making = Callable[[Robot, Gait], Law | Controller]
+Making = Callable[[Any, Gait | None], Law | Controller]
+"""Makes a controller of a robot and its gait; of a robot in space, which has none, of it alone."""
 
 
 def own_law(words: str) -> tuple[Making, str]:
@@ -118,15 +120,17 @@ def _making(words: str, made: Any) -> Making:
     if not callable(made):
         raise ControllerError(f"{words} is of type {type(made).__name__}: it must be {FACTORY}")
 
-    def make(robot: Robot, gait: Gait) -> Law | Controller:
+    def make(robot: Robot | SpatialRobot, gait: Gait | None) -> Law | Controller:
+        given = (robot,) if gait is None else (robot, gait)
         try:
-            inspect.signature(made).bind(robot, gait)
+            inspect.signature(made).bind(*given)
         except TypeError as error:
             raise ControllerError(
-                f"{words} is called with a robot and its gait, which it does not take: {error}"
+                f"{words} is called with a robot{' and its gait' if gait is not None else ''}, "
+                f"which it does not take: {error}"
             ) from error
         try:
-            controller: Law | Controller = made(robot, gait)
+            controller: Law | Controller = made(*given)
         except Exception as error:
             raise ControllerError(
                 f"{words} makes no controller for robot {robot.name!r}: {_told(error)}"

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol, Unpack
+from typing import TYPE_CHECKING, Any, Protocol, Unpack
 
 import numpy as np
 
@@ -30,13 +30,13 @@ from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.library import load_planar_robot
 from heelstrike.sim import Simulation
 from heelstrike.sim.method import Method
-from heelstrike.view.live.stage import Control, Stage, friction_control
+from heelstrike.view.live.stage import Control, Stage, friction_control, step_control, step_of
+
+if TYPE_CHECKING:
+    from heelstrike.view.live.dimension import AnySimulation
 
 DESIGNED, CYCLE = "designed for the speed", "limit cycle"
 NOTHING = "no torque"
-MILLISECONDS = " ms"
-STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-"""Steps that are offered, in ms."""
 SPEEDS = (0.4, 1.6)
 """Slowest and fastest walk that is offered, as shares of the speed that suits the robot."""
 STEEPEST = 8.0
@@ -92,6 +92,8 @@ class WalkStage(Stage):
         The names, the usual one first.
     first : First, optional
         What is chosen at first.
+    loaded : mapping of str to Robot, optional
+        Robots that have been loaded already, by name or file.
     **how
         How the robots' files are read, as for :func:`heelstrike.load_robot`.
 
@@ -108,11 +110,16 @@ class WalkStage(Stage):
         methods: Methods,
         method_names: tuple[str, ...],
         first: First | None = None,
+        *,
+        loaded: Mapping[str, Robot] | None = None,
         **how: Unpack[LoadOptions],
     ) -> None:
         self._first = First() if first is None else first
+        known = loaded or {}
         self._robots = {
-            str(each): load_planar_robot(each, **({} if str(each) in builtin_robots() else how))
+            str(each): known[str(each)]
+            if str(each) in known
+            else load_planar_robot(each, **({} if str(each) in builtin_robots() else how))
             for each in _several(robot)
         }
         self._asked = tuple(self._robots)
@@ -159,7 +166,7 @@ class WalkStage(Stage):
         usual = "event-driven" if passive else self._method_names[0]
         asked = self._first.method if name == self._name else None
         found.append(Control("method", "method", asked or usual, self._method_names))
-        return (*found, self._step_control())
+        return (*found, step_control(self._first.step))
 
     def simulation(self, values: Mapping[str, Any], progress: Callable[[str], None]) -> Simulation:
         """Put the robot on its ground as its gait begins."""
@@ -168,7 +175,7 @@ class WalkStage(Stage):
         law = self._laws(robot).get(values.get("controller", NOTHING))
         walked = self._walked(robot, law, values, ground, progress)
         start = beginning(robot, walked, ground, law)
-        step = 1e-3 * float(values["step"].removesuffix(MILLISECONDS))
+        step = step_of(values["step"])
         return Simulation(
             robot,
             None if law is None else start.controller,
@@ -188,7 +195,7 @@ class WalkStage(Stage):
         except HeelstrikeError:  # of what cannot stand the picture is no less
             return robot, robot.reference_state(), ground
 
-    def ground(self, values: Mapping[str, Any], simulation: Simulation | None = None) -> Ground:  # noqa: ARG002
+    def ground(self, values: Mapping[str, Any], simulation: AnySimulation | None = None) -> Ground:  # noqa: ARG002
         """Make the ground of a slope, a roughness and a friction."""
         friction = values["friction"]
         if self._first.ground is not None:
@@ -249,12 +256,6 @@ class WalkStage(Stage):
             Control("roughness", "roughness ±", rough, high=highest, step=0.001, unit="m")
         )
         return shapes
-
-    def _step_control(self) -> Control:
-        step = 1e3 * self._first.step
-        offered = sorted({*STEPS, float(f"{step:.6g}")})
-        words = tuple(f"{each:g}{MILLISECONDS}" for each in offered)
-        return Control("step", "step", f"{step:.6g}{MILLISECONDS}", words)
 
     def _walked(
         self,

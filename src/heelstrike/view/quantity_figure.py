@@ -35,7 +35,7 @@ def draw_quantity(excerpt: Excerpt, name: str) -> Figure:
         told = run.log[name]
         shape, unit, label, values = told.extents, told.unit, told.label or name, told.values
     known = IN_THE_PLANE.labels(run.robot)
-    along = dimensions(name, shape, IN_THE_PLANE.extents)
+    along = dimensions(name, tuple(map(str, shape)), IN_THE_PLANE.extents)
     sizes = values.shape[1:]
     names = [
         known.get(each, [str(i) for i in range(size)])

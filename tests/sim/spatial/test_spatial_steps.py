@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -114,6 +115,23 @@ def test_a_ball_joint_stops_at_its_cone(made: Maker) -> None:
     assert any(event.kind is SpatialEventKind.JOINT_STOP for event in run.events)
 
 
+def test_the_stop_of_a_ball_joint_turns_it_straight_back(made: Maker) -> None:
+    """What is recorded acts along the turn of the instant before the step, and only back."""
+    robot = made(
+        "<body name='bob' pos='0 0 1'><joint type='ball' range='0 0.4' limited='true'/>"
+        "<geom type='box' pos='0.02 0.01 -0.3' size='0.05 0.02 0.1' mass='1'/></body>"
+    )
+    state = hs.State(robot.reference_state().q, np.array([3.0, 1.0, 6.0]))
+    run = hs.simulate(robot, state=state, duration=0.6)
+    pressed = np.flatnonzero(np.linalg.norm(run.stop_torque, axis=1) > 0.1)
+    assert len(pressed) > 20
+    way = run.position[pressed, 1:] * np.sign(run.position[pressed, :1])
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    torque = run.stop_torque[pressed]
+    back = -np.einsum("ij,ij->i", torque, way)
+    np.testing.assert_allclose(back, np.linalg.norm(torque, axis=1), rtol=1e-9)
+
+
 def test_dry_friction_of_a_joint_holds_and_brakes(made: Maker) -> None:
     """Held against gravity by more than m g l; with less it moves, braked by just that."""
     weight = 1.0 * G * 0.2
@@ -163,6 +181,21 @@ def test_a_ball_lands_on_a_box_and_rolls_off_its_edge(made: Maker) -> None:
     assert run.position[-1, 0] > 0.7
     assert run.position[-1, 2] == pytest.approx(0.1, abs=1e-9)
     assert np.min(run.gap) >= -2e-5  # the way round the edge bends by (h v)² / r in a step
+
+
+@pytest.mark.parametrize("beyond", [2e-3, -2e-3])
+def test_a_ball_meets_the_edge_of_a_box_along_the_line_to_its_middle(
+    made: Maker, beyond: float
+) -> None:
+    """Before the edge as in it: the gap is what is left of the way to the edge."""
+    robot = made(BALL)
+    ground = hs.SpatialGround(boxes=(hs.Box(center=(0.0, 0.0, 0.1), size=(1.0, 1.0, 0.2)),))
+    slant = np.array([0.6, 0.0, 0.8])
+    q = robot.reference_state().q
+    q[:3] = np.array([0.5, 0.0, 0.2]) + (0.1 + beyond) * slant
+    seen = hs.Simulation(robot, state=hs.State(q, np.zeros(6)), ground=ground).contacts
+    assert seen.gap[0] == pytest.approx(beyond, abs=1e-12)
+    np.testing.assert_allclose(seen.normal[0], slant, atol=1e-12)
 
 
 def test_a_controller_in_python_is_asked_every_period(made: Maker) -> None:
@@ -371,6 +404,39 @@ def test_a_snapshot_is_taken_up_exactly(made: Maker) -> None:
     other = made(BALL)
     with pytest.raises(SimulationError, match="another robot"):
         hs.Simulation(other, state=other.reference_state()).restore(kept)
+
+
+def test_pushes_and_another_friction_while_it_goes_on(made: Maker) -> None:
+    """A push acts from now on and is forgotten when it is over; a snapshot brings both back."""
+    robot = made(BLOCK)
+    simulation = hs.Simulation(robot, state=robot.reference_state(), ground=hs.SpatialGround())
+    simulation.advance(0.05)
+    push = hs.Push("block", force=(0.0, 1e3, 0.0), start=0.05, duration=0.02)
+    simulation.apply(push)
+    kept = simulation.snapshot()
+    simulation.advance(0.07)
+    there = simulation.state
+    assert there.v[1] > 1.0
+    assert simulation.record.pushes == (push,)
+    simulation.advance(0.08)
+    simulation.forget()
+    assert not len(simulation.record.time)
+    assert simulation.record.pushes == ()
+    simulation.ground = dataclasses.replace(simulation.ground, friction=0.0)
+    before = simulation.state.v[1]
+    simulation.advance(0.1)
+    assert simulation.state.v[1] == pytest.approx(before, rel=1e-9)  # nothing brakes
+    simulation.restore(kept)
+    assert simulation.ground.friction == 0.75
+    simulation.advance(0.07)
+    assert np.array_equal(simulation.state.v, there.v)
+    with pytest.raises(SimulationError, match="the shape of the ground stays"):
+        simulation.ground = hs.SpatialGround(height=-1.0)
+    simulation.advance(0.08)
+    with pytest.raises(SimulationError, match="would be over since"):
+        simulation.apply(push)
+    with pytest.raises(SimulationError, match="three numbers"):
+        simulation.apply(hs.Push("block", force=(1.0, 0.0), start=1.0, duration=0.1))
 
 
 def test_a_controller_in_python_takes_part_in_snapshots_or_is_asked_to(made: Maker) -> None:

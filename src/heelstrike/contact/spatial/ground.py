@@ -32,9 +32,6 @@ COVERED = 1e-9
 BESIDE = 1e-6
 """Depth (m) below the rim of a face from which on a point meets it as a wall."""
 
-PARALLEL = 1.0 - 1e-9
-"""Cosine of the angle below which two faces are one."""
-
 
 OF_LENGTH_ONE = 1e-15
 """How far the length of a normal is from one by rounding: it stays as it is then, in files too."""
@@ -164,6 +161,25 @@ class SpatialGround:
         object.__setattr__(self, "boxes", boxes)
         object.__setattr__(self, "normal", tuple(normal.tolist()))
         object.__setattr__(self, "_model", model)
+
+    def has_shape_of(self, other: SpatialGround) -> bool:
+        """Whether the plane and the boxes are where they are in another ground.
+
+        Parameters
+        ----------
+        other : SpatialGround
+            The other, whose friction and restitution do not count.
+
+        Returns
+        -------
+        bool
+            Whether they are.
+        """
+        mine, its = self._model, other._model
+        return mine.height == its.height and all(
+            np.array_equal(getattr(mine, name), getattr(its, name))
+            for name in ("normal", "center", "rotation", "half")
+        )
 
     @classmethod
     @takes(SimulationError)
@@ -375,18 +391,6 @@ def distance_to_face(ground: SpatialGroundModel, face: int, point: Triple) -> tu
 
 
 @kernel
-def nearest_face(ground: SpatialGroundModel, point: Triple) -> tuple[int, float, Triple]:
-    """Return the face that is nearest to a point, its signed distance and the direction away."""
-    best = 0
-    distance, normal = distance_to_face(ground, 0, point)
-    for box in range(ground.half.shape[0]):
-        other, away = distance_to_box(ground, box, point)
-        if other < distance:
-            best, distance, normal = box + 1, other, away
-    return best, distance, normal
-
-
-@kernel
 def is_beside(ground: SpatialGroundModel, box: int, point: Triple) -> bool:
     """Whether a point is before or behind one exposed face of a box, and not at its rim.
 
@@ -405,23 +409,3 @@ def is_beside(ground: SpatialGroundModel, box: int, point: Triple) -> bool:
             return False
         shallow += seen and beyond > -BESIDE
     return shallow == 1
-
-
-@kernel
-def faces_at(ground: SpatialGroundModel, point: Triple) -> tuple[int, int]:
-    """Return the face that a point meets, and the wall beside it; -1 if there is none.
-
-    In a corner the first is the one that points more upwards.
-    """
-    best, distance, normal = nearest_face(ground, point)
-    wall, least, across = -1, math.inf, normal
-    for face in range(ground.half.shape[0] + 1):
-        if face == best or (face > 0 and not is_beside(ground, face - 1, point)):
-            continue
-        other, away = distance_to_face(ground, face, point)
-        along = away[0] * normal[0] + away[1] * normal[1] + away[2] * normal[2]
-        if other < least and along < PARALLEL:
-            wall, least, across = face, other, away
-    if wall >= 0 and least <= distance + BESIDE and across[2] > normal[2]:
-        return wall, best
-    return best, wall

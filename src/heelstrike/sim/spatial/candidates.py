@@ -11,11 +11,12 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.spatial.ground import (
+    BESIDE,
     SpatialGroundModel,
     distance_to_face,
-    faces_at,
+    is_beside,
 )
-from heelstrike.dynamics.spatial.algebra import dot, spatial, velocity_at
+from heelstrike.dynamics.spatial.algebra import Vector, dot, spatial, velocity_at
 from heelstrike.dynamics.spatial.configurations import turn_between
 from heelstrike.dynamics.spatial.kinematics import place_of
 from heelstrike.dynamics.spatial.rotations import matrix, quaternion_at
@@ -49,6 +50,9 @@ FAR = 20.0
 CLOSING_TURN = 20.0
 """The same of joints at their stops (rad/s, m/s)."""
 
+PARALLEL = 1.0 - 1e-9
+"""Cosine of the angle below which two faces are one."""
+
 NO_ANGLE = 1e-12
 """Turn (rad) of a ball joint that has no axis."""
 
@@ -60,24 +64,73 @@ def is_point(kind: int) -> bool:
 
 
 @kernel
+def meet_face(
+    model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, contact: int,
+    face: int,
+) -> tuple[Vector, float, Vector]:  # fmt: skip
+    """Point of a contact that comes first against a face, its gap, and the normal there.
+
+    A sphere meets the edge of a box along the line from there to its middle, in the box as before
+    it; what a rim meets is told by its lowest point.
+    """
+    center = contact_center(model, tree, contact)
+    distance, normal = distance_to_face(ground, face, center)
+    point = contact_point(model, tree, contact, normal)
+    if face > 0 and model.contact_rim[contact] == 0.0:
+        return point, distance - model.contact_radius[contact], normal
+    gap, normal = distance_to_face(ground, face, point)
+    return point, gap, normal
+
+
+@kernel
+def faces_of(
+    model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, contact: int
+) -> tuple[int, int]:
+    """Return the face that a contact meets, and the wall beside it; -1 if there is none.
+
+    In a corner the first is the one that points more upwards.
+    """
+    best, distance, normal = 0, math.inf, (0.0, 0.0, 1.0)
+    for face in range(ground.half.shape[0] + 1):
+        _, gap, away = meet_face(model, ground, tree, contact, face)
+        if gap < distance:
+            best, distance, normal = face, gap, away
+    wall, least, across = -1, math.inf, normal
+    for face in range(ground.half.shape[0] + 1):
+        point, gap, away = meet_face(model, ground, tree, contact, face)
+        probe = point if model.contact_rim[contact] > 0.0 else contact_center(model, tree, contact)
+        if face == best or (face > 0 and not is_beside(ground, face - 1, probe)):
+            continue
+        if gap < least and dot(away, normal) < PARALLEL:
+            wall, least, across = face, gap, away
+    if wall >= 0 and least <= distance + BESIDE and across[2] > normal[2]:
+        return wall, best
+    return best, wall
+
+
+@kernel
+def keep_foot(entry: int, point: Vector, gap: float, normal: Vector, feet: SpatialFeet) -> None:
+    """Keep where the rows of an entry are taken, and their directions."""
+    frame = contact_frame(normal)
+    for k in range(3):
+        feet.foot[entry, k] = point[k] - gap * normal[k]
+    for k in range(9):
+        feet.frame[entry, k] = frame[k]
+
+
+@kernel
 def locate_points(
     model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, table: BlockTable,
     contacts: Contacts, feet: SpatialFeet,
 ) -> None:  # fmt: skip
     """Find where the contact points are, and the ground that is nearest to each."""
     for contact in range(model.nc):
-        center = contact_center(model, tree, contact)
-        face, wall = faces_at(ground, center)
-        _, normal = distance_to_face(ground, face, center)
-        point = contact_point(model, tree, contact, normal)
-        gap, normal = distance_to_face(ground, face, point)
-        frame = contact_frame(normal)
+        face, wall = faces_of(model, ground, tree, contact)
+        point, gap, normal = meet_face(model, ground, tree, contact, face)
         for k in range(3):
             contacts.position[contact, k] = point[k]
             contacts.normal[contact, k] = normal[k]
-            feet.foot[contact, k] = point[k] - gap * normal[k]
-        for k in range(9):
-            feet.frame[contact, k] = frame[k]
+        keep_foot(contact, point, gap, normal, feet)
         contacts.gap[contact] = gap
         table.gap[contact] = gap
         table.friction[contact] = model.friction_scale[contact] * ground.friction[face]
@@ -97,14 +150,8 @@ def locate_wall(
     table.gap[entry] = math.inf
     if wall < 0:
         return
-    _, normal = distance_to_face(ground, wall, contact_center(model, tree, contact))
-    point = contact_point(model, tree, contact, normal)
-    gap, normal = distance_to_face(ground, wall, point)
-    frame = contact_frame(normal)
-    for k in range(3):
-        feet.foot[entry, k] = point[k] - gap * normal[k]
-    for k in range(9):
-        feet.frame[entry, k] = frame[k]
+    point, gap, normal = meet_face(model, ground, tree, contact, wall)
+    keep_foot(entry, point, gap, normal, feet)
     table.gap[entry] = gap
     table.friction[entry] = model.friction_scale[contact] * ground.friction[wall]
     table.restitution[entry] = min(model.restitution_scale[contact] * ground.restitution[wall], 1.0)

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from heelstrike.analysis.spatial.summary import SpatialSummary
 
 
-SpatialEvent, SpatialSolverCount = Event, SolverCount
+SpatialEvent = Event
+SpatialSolverCount = SolverCount
 """Those of the plane: an event has three components of impulse in space."""
 
 

@@ -2,8 +2,8 @@
 
 The scheme is that of the plane (:mod:`heelstrike.sim.time_stepping.method`): gaps linearised over
 the step, impacts whole within it. A step whose contact problem is not certified is halved, three
-times at most; if that does not help it goes on with a residual of up to 1e-6, marked, and above
-that the run ends.
+times at most, and then solved with fifty times the effort; if that does not help it goes on with a
+residual of up to 1e-6, marked, and above that the run ends.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ from heelstrike.sim.spatial.candidates import (
 )
 from heelstrike.sim.spatial.impact import closes, solve_impact_of, touches_at_end
 from heelstrike.sim.spatial.memory import (
+    MOST_ITERATIONS,
     SpatialAssembly,
     SpatialEquations,
     SpatialFeet,
@@ -69,6 +70,9 @@ HALVINGS_OF_A_STEP = 3
 
 BEARABLE = 1e-6
 """Residual up to which an uncertified step goes on, marked."""
+
+LAST_EFFORT = 20000
+"""Iterations of a contact problem that no part of a step could be certified without."""
 
 CALLS = 6
 """How often a step is solved again for what it would throw through the ground."""
@@ -317,7 +321,8 @@ def share_forces(
 ) -> None:  # fmt: skip
     """Write the mean forces of the step where records and controllers look for them.
 
-    Those of walls are added in the axes of the face below the point.
+    Those of walls are added in the axes of the face below the point; stops of balls turn them back
+    about the axis that they have at q, where the step begins.
     """
     for k in range(model.nv):
         stop_torque[k] = 0.0
@@ -410,6 +415,10 @@ def take_step(
             parts *= 2
             done *= 2
             continue
+        if worst > 0.0:  # before the run ends, or goes on marked, no effort is too much
+            memory.solver.settings.effort = LAST_EFFORT
+            worst = solve_step_of(model, time + done * step, step, number, resolves, memory)
+            memory.solver.settings.effort = MOST_ITERATIONS
         if not worst <= BEARABLE:
             tally.unsolved = reaction.residual = worst
             return False
@@ -437,7 +446,8 @@ def take_step(
         counts.parts += 1
         done += 1
     share_forces(
-        model, memory.q, memory.blocks, memory.feet, memory.contacts.force, reaction.stop_torque,
+        model, memory.kept_q, memory.blocks, memory.feet, memory.contacts.force,
+        reaction.stop_torque,
         reaction.friction_torque,
     )  # fmt: skip
     return True

@@ -21,22 +21,23 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import QUANTITIES, Run
-from heelstrike.tolerances import SAME_ROW
 from heelstrike.view.drawing import legs
+from heelstrike.view.live.layout import (
+    MOST_PUSHES,
+    FrameLayout,
+    acting_pushes,
+    slider,
+)
 from heelstrike.view.page.curves import DASHED, SIDES, Plot, Trace, alike, limits_in_words
 from heelstrike.view.page.motion import frames as drawn
 from heelstrike.view.style import in_words
 
-MOST_PUSHES = 4
-"""Pushes that are drawn at once."""
-FARTHEST = 1.0
-"""Metres that a slider moves a joint without ends at most, either way."""
 ROOM = 0.15
 """Share of a sole's length that its plot shows beyond either end."""
 
 
-class Layout:
-    """Where in the vector of a frame each quantity of a robot is.
+class Layout(FrameLayout):
+    """The frames of a robot in the plane.
 
     Parameters
     ----------
@@ -46,46 +47,18 @@ class Layout:
 
     def __init__(self, robot: Robot) -> None:
         nc, feet = robot.nc, len(robot.feet)
-        self.robot = robot
         self.joints = movable(robot)
-        self.widths = {
+        widths = {
             "time": 1, "pose": 3 * robot.nl, "point": 2 * nc, "normal": 2 * nc, "force": 2 * nc,
             "friction": nc, "center": 2, "capture": 2, "pressure": 2, "support": 4,
             "push": 4 * MOST_PUSHES, "joint": len(self.joints), "torque": robot.nu,
             "ahead": feet, "pressing": feet, "dragging": feet, "used": feet,
             "energy": 3,
         }  # fmt: skip
-        self.width = sum(self.widths.values())
-        ends = np.cumsum(list(self.widths.values())).tolist()
-        self.begin = {
-            name: end - self.widths[name] for name, end in zip(self.widths, ends, strict=True)
-        }
-
-    def described(self) -> dict[str, Any]:
-        """Return where each quantity begins and how many numbers it has, and what is plotted."""
-        return {
-            "width": self.width,
-            "fields": {name: [self.begin[name], wide] for name, wide in self.widths.items()},
-            "panels": self._panels(),
-            "joints": self._sliders(),
-        }
+        super().__init__(robot, widths)
 
     def frames(self, run: Run, rows: Sequence[int], pushes: Iterable[Push]) -> Floats:
-        """Return the frames of some rows but the first, (len(rows) − 1, width).
-
-        Contact forces are means since the row before, impulses of impacts included, so that what
-        pushes for one step is seen; where there is no time between, those of the row itself, which
-        act from it on.
-
-        Parameters
-        ----------
-        run : Run
-            Rows and events.
-        rows : sequence of int
-            Their indices, in order; the first is where the means begin.
-        pushes : iterable of Push
-            What pushes the robot.
-        """
+        """Return the frames of some rows but the first; see `FrameLayout`."""
         rows_shown = np.asarray(rows[1:], dtype=np.int64)
         each = _only(run, rows_shown, mean_forces(run, np.asarray(rows, dtype=np.int64)))
         every = np.arange(len(rows_shown))
@@ -107,11 +80,7 @@ class Layout:
                 (motion.kinetic, motion.potential, motion.kinetic + motion.potential), axis=-1
             ),
         }
-        table = np.empty((len(every), self.width))
-        for name, begin in self.begin.items():
-            wide = self.widths[name]
-            table[:, begin : begin + wide] = found[name].reshape(len(every), wide)
-        return table
+        return self.table(len(every), found)
 
     def still(self, state: State, ground: Ground) -> Floats:
         """Return the frame of a robot of which nothing is known but where it is, (1, width)."""
@@ -122,91 +91,57 @@ class Layout:
             "pose": np.column_stack((poses.origin, poses.angle)),
             "point": contact_positions(robot, state.q),
             "normal": seen.normal,
-            "force": 0.0,
+            "force": np.zeros((robot.nc, 2)),
             "center": center_of_mass(robot, state.q),
             "joint": state.q[self.joints],
-            "torque": 0.0,
+            "torque": np.zeros(robot.nu),
         }
-        frame = np.full(self.width, np.nan)
-        for name, numbers in known.items():
-            begin, wide = self.begin[name], self.widths[name]
-            frame[begin : begin + wide] = np.ravel(numbers)
-        return frame[None]
+        return self.table(1, known)
 
     def _pushes(
         self, since: Floats, until: Floats, motion: Motion, pushes: Iterable[Push]
     ) -> Floats:
         """Where those pushes act that did between some times, (n, 4 a push) in m and N, or NaN."""
         table = np.full((len(until), MOST_PUSHES, 4), np.nan)
-        used = np.zeros(len(until), dtype=np.int64)
-        for push in pushes:
-            if push.end <= since[0] or push.start >= until[-1]:
-                continue
-            acted = (push.start < until - SAME_ROW) & (push.end > since + SAME_ROW)
-            for row in np.flatnonzero(acted & (used < MOST_PUSHES)).tolist():
-                link, place = push.place(self.robot)
-                pose = motion.link_origin[row, link], motion.link_angle[row, link]
-                table[row, used[row]] = (*in_world(*pose, np.array(place)), *push.force)
-                used[row] += 1
+        for row, place, push in acting_pushes(since, until, pushes):
+            link, point = push.place(self.robot)
+            pose = motion.link_origin[row, link], motion.link_angle[row, link]
+            table[row, place] = (*in_world(*pose, np.array(point)), *push.force)
         return table
 
-    def _panels(self) -> list[dict[str, Any]]:
+    def plots(self) -> Iterator[Plot]:
         """Plots beside the picture, each curve with its place in a frame."""
         robot, model = self.robot, self.robot.model
         names = [robot.joint_names[joint] for joint in self.joints]
-        found = [*self._of_joints("joint", self.joints, names)]
+        yield from self._of_joints("joint", self.joints, names)
         limits = np.column_stack((model.torque_lower, model.torque_upper))
-        found += self._of_joints("torque", model.actuator_joint, robot.actuator_names, limits)
+        yield from self._of_joints("torque", model.actuator_joint, robot.actuator_names, limits)
         if robot.feet:
             heel, toe = zero_moment_point_limits(robot)
             room = ROOM * max(toe - heel, 1e-3)
-            found += [
-                self._of_feet(
-                    "ahead", "zero moment point, from ankle", "m", [("heel", heel), ("toe", toe)],
-                    span=(heel - room, toe + room) if toe > heel else None,
-                ),
-                self._of_feet(
-                    "pressing", "normal force", "N", [("weight", robot.weight)],
-                    usual=(0.0, 1.5 * robot.weight),
-                ),
-                self._of_feet(
-                    "dragging", "tangential force", "N",
-                    usual=(-0.5 * robot.weight, 0.5 * robot.weight),
-                ),
-                self._of_feet(
-                    "used", "friction, share of cone", "1", [("edge of the cone", 1.0)],
-                    span=(-0.05, 1.1),
-                ),
-            ]  # fmt: skip
-        begin = self.begin["energy"]
-        kinetic = [Trace(None, "", color=0, at=begin)]
-        others = [
-            Trace(None, "potential", dash=DASHED, color=1, at=begin + 1),
-            Trace(None, "mechanical", at=begin + 2),
-        ]
-        found += [
-            Plot("kinetic energy", "J", kinetic, group="energy"),
-            Plot("potential and mechanical energy", "J", others, group="energy"),
-        ]
-        return [plot.described() for plot in found]
-
-    def _sliders(self) -> list[dict[str, Any]]:
-        """Joints that a viewer can move, with the ends of their ranges."""
-        robot, model = self.robot, self.robot.model
-        found = []
-        for i, joint in enumerate(self.joints.tolist()):
-            hinge = model.axis[joint, 0] != 0.0
-            ends = (float(model.lower[joint]), float(model.upper[joint]))
-            farthest = np.pi if hinge else FARTHEST
-            low, high = (float(np.clip(end, -farthest, farthest)) for end in ends)
-            found.append(
-                {
-                    "name": robot.joint_names[joint], "label": in_words(robot.joint_names[joint]),
-                    "unit": "rad" if hinge else "m", "low": low, "high": high,
-                    "at": self.begin["joint"] + i,
-                }
+            yield self.of_feet(
+                "ahead", "zero moment point, from ankle", "m", [("heel", heel), ("toe", toe)],
+                span=(heel - room, toe + room) if toe > heel else None,
             )  # fmt: skip
-        return found
+            yield self.pressing()
+            yield self.of_feet(
+                "dragging", "tangential force", "N",
+                usual=(-0.5 * robot.weight, 0.5 * robot.weight),
+            )  # fmt: skip
+            yield self.using()
+        yield from self.energies()
+
+    def sliders(self) -> list[dict[str, Any]]:
+        """Joints that a viewer can move, with the ends of their ranges."""
+        model = self.robot.model
+        return [
+            slider(
+                self.robot.joint_names[joint], hinge=bool(model.axis[joint, 0] != 0.0),
+                ends=(float(model.lower[joint]), float(model.upper[joint])),
+                at=self.begin["joint"] + i,
+            )
+            for i, joint in enumerate(self.joints.tolist())
+        ]  # fmt: skip
 
     def _of_joints(
         self, field: str, joints: Integers, names: Sequence[str], ends: Floats | None = None
@@ -232,19 +167,6 @@ class Layout:
                     steps=ends is not None, note=limits_in_words(limits),
                     group="joints" if ends is None else "torques",
                 )  # fmt: skip
-
-    def _of_feet(
-        self, field: str, title: str, unit: str, limits: Sequence[tuple[str, float]] = (),
-        **ends: Any,
-    ) -> Plot:  # fmt: skip
-        traces = [
-            Trace(
-                None, in_words(foot.name).removesuffix(" foot"), i, DASHED if i else 0,
-                at=self.begin[field] + i,
-            )
-            for i, foot in enumerate(self.robot.feet)
-        ]  # fmt: skip
-        return Plot(title, unit, traces, limits, group="feet", **ends)
 
 
 def _side(name: str) -> str:

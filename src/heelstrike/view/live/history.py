@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import takewhile
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from heelstrike.robot.model import Floats
-from heelstrike.sim.run import QUANTITIES, Event, Run
+from heelstrike.sim.run import QUANTITIES
 from heelstrike.tolerances import SAME_ROW
+
+if TYPE_CHECKING:
+    from heelstrike.view.live.dimension import AnyEvent, AnyRun
 
 MOST_ROWS = 100_000
 """Rows that are kept; some 60 MB of bravo7."""
@@ -23,15 +27,21 @@ class History:
     A piece begins with the instant at which the one before ended, and that row is replaced: what
     was set in between acts from it on.
 
+    Parameters
+    ----------
+    quantities : sequence of str
+        What its runs record beside the time; by default those of the plane.
+
     Attributes
     ----------
     events : list of Event
         In the order of time.
     """
 
-    def __init__(self) -> None:
-        self.events: list[Event] = []
-        self._run: Run | None = None
+    def __init__(self, quantities: Sequence[str] = tuple(QUANTITIES)) -> None:
+        self.events: list[AnyEvent] = []
+        self._run: AnyRun | None = None
+        self._names = ("time", *quantities)
         self._rows: dict[str, Floats] = {}
         self._first = self._end = 0
 
@@ -44,11 +54,11 @@ class History:
         return self._kept("time") if self._rows else np.zeros(0)
 
     @property
-    def newest(self) -> Run | None:
+    def newest(self) -> AnyRun | None:
         """The piece that was taken last."""
         return self._run
 
-    def take(self, run: Run) -> list[Event]:
+    def take(self, run: AnyRun) -> list[AnyEvent]:
         """Take a piece that follows on the last; return its events that are new."""
         self._run = run
         if not len(run.time):
@@ -73,27 +83,29 @@ class History:
         """Index of the last row that is not later than a time (s), or of the first row."""
         return max(int(np.searchsorted(self.time, time + SAME_ROW)) - 1, 0)
 
-    def part(self, first: int, last: int) -> Run:
+    def part(self, first: int, last: int) -> AnyRun:
         """Rows from one index to another, the last one included, as a run with their events."""
         assert self._run is not None
         rows: dict[str, Any] = {name: self._kept(name)[first : last + 1] for name in self._rows}
         begin, end = rows["time"][0] - SAME_ROW, rows["time"][-1] + SAME_ROW
-        events = []
+        events: list[Any] = []
         for event in reversed(self.events):
             if event.time < begin:
                 break
             if event.time <= end:
                 events.append(event)
-        return replace(self._run, **rows, events=tuple(reversed(events)))
+        whole: Any = self._run
+        part: AnyRun = replace(whole, **rows, events=tuple(reversed(events)))
+        return part
 
     def _kept(self, name: str) -> Floats:
         return self._rows[name][self._first : self._end]
 
-    def _make_room(self, run: Run) -> None:
+    def _make_room(self, run: AnyRun) -> None:
         """See to it that the rows of a piece fit behind those that are kept."""
         if not self._rows:
             self._rows = {
-                name: np.zeros((0, *getattr(run, name).shape[1:])) for name in ("time", *QUANTITIES)
+                name: np.zeros((0, *getattr(run, name).shape[1:])) for name in self._names
             }
         size, needed = len(self._rows["time"]), self._end + len(run.time)
         if needed <= size:

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from contextlib import suppress
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from heelstrike.contact.ground import Ground
-from heelstrike.contact.queries.kinematics import contact_kinematics
-from heelstrike.errors import RobotError, SimulationError
-from heelstrike.robot.robot import Robot
-from heelstrike.robot.state import State
+from heelstrike.errors import SimulationError
 from heelstrike.sim.closed_sets import OnError
-from heelstrike.sim.push import Push, pushes_of_numbers
-from heelstrike.sim.run import Run
-from heelstrike.sim.simulation import CAN_GO_ON, Simulation
-from heelstrike.sim.snapshot import Snapshot
+from heelstrike.sim.push import Push
+from heelstrike.sim.simulation import CAN_GO_ON
+from heelstrike.view.live.dimension import Dimension, dimension_of
 from heelstrike.view.live.stage import snapshot_of
+
+if TYPE_CHECKING:
+    from heelstrike.view.live.dimension import AnyGround, AnyRobot, AnyRun, AnySimulation
 
 KEEP_EVERY = 0.25
 """Simulated seconds between two snapshots."""
@@ -25,10 +21,7 @@ MOST_SNAPSHOTS = 400
 """Of some 0.2 MB each."""
 MOST_PUSHES = 2000
 
-SEEN_TO_STAND = 1e-3
-"""Metres above the ground up to which a robot stands on it."""
-
-Hold = tuple[int, tuple[float, float], tuple[float, float]]
+Hold = tuple[int, tuple[float, ...], tuple[float, ...]]
 
 
 class LiveSimulation:
@@ -36,8 +29,10 @@ class LiveSimulation:
 
     Parameters
     ----------
-    simulation : Simulation
+    simulation : Simulation or SpatialSimulation
         The simulation; its record is taken from it piece by piece.
+    dimension : Dimension, optional
+        That of its robot.
 
     Attributes
     ----------
@@ -45,26 +40,29 @@ class LiveSimulation:
         Link, point in its axes (m) and force (N) of what each viewer pulls at.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
-        self.simulation = simulation
+    def __init__(self, simulation: AnySimulation, dimension: Dimension | None = None) -> None:
+        self.simulation: Any = simulation
+        self._dimension = dimension or dimension_of(simulation.robot)
         if simulation.on_error is OnError.RAISE:  # nobody is there to catch it
             simulation.on_error = OnError.WARN
         self.held: dict[str, Hold] = {}
         self._given: tuple[Push, ...] | None = None
         self._added: tuple[Push, ...] = ()
-        self._snapshots: list[Snapshot] = []
+        self._snapshots: list[tuple[Any, tuple[Push, ...]]] = []
+        """Snapshots, with the pushes that had been added until then."""
         self._last = self.time
         self._keep()
 
     @property
-    def robot(self) -> Robot:
+    def robot(self) -> AnyRobot:
         """The robot."""
-        return self.simulation.robot
+        robot: AnyRobot = self.simulation.robot
+        return robot
 
     @property
     def time(self) -> float:
         """Now, in s."""
-        return self.simulation.time
+        return float(self.simulation.time)
 
     @property
     def can_go_on(self) -> bool:
@@ -84,17 +82,33 @@ class LiveSimulation:
     @property
     def message(self) -> str:
         """How it goes, in words."""
-        return self.simulation.message
+        return str(self.simulation.message)
 
-    def record(self) -> Run:
+    def record(self) -> AnyRun:
         """Return what it has recorded since it was last asked."""
-        run = self.simulation.record
+        run: AnyRun = self.simulation.record
         if self._given is None:
             self._given = run.pushes
         self.simulation.forget()
         return run
 
-    def advance(self, until: float | None) -> Run | None:
+    def seen(self) -> AnyRun:
+        """Return how it is now.
+
+        Where the record ends a step before now, a step is taken and taken back; of a controller
+        that takes no part in snapshots it is not taken back.
+        """
+        run = self.record()
+        if len(run.time) or not self.can_go_on:
+            return run
+        before = snapshot_of(self.simulation)
+        self.simulation.step()
+        run = self.record()
+        if before is not None:
+            self.simulation.restore(before)
+        return run
+
+    def advance(self, until: float | None) -> AnyRun | None:
         """Go on to about a time (s), or by one step; return what was recorded.
 
         None if the next step ends later than that.
@@ -120,7 +134,7 @@ class LiveSimulation:
         self.simulation.apply(push)
         self._added = (*self._added[-MOST_PUSHES:], push)
 
-    def lay(self, ground: Ground) -> None:
+    def lay(self, ground: AnyGround) -> None:
         """Lay another ground."""
         self.simulation.ground = ground
         self._keep()
@@ -135,20 +149,7 @@ class LiveSimulation:
         HeelstrikeError
             If there is no such joint, or the robot cannot be like that.
         """
-        robot, simulation = self.robot, self.simulation
-        moved = robot.joint_index(joint)
-        low, high = robot.model.lower[moved], robot.model.upper[moved]
-        now = simulation.state
-        q = now.q.copy()
-        q[moved] = np.clip(position, low, high)
-        state = robot.closed(State(q, now.v), keep=[moved])
-        if robot.nc:
-            stood = float(simulation.contacts.gap.min()) < SEEN_TO_STAND
-            gap = contact_kinematics(robot, state.q, state.v, simulation.ground).gap
-            if stood or gap.min() < 0.0:
-                with suppress(RobotError):  # nothing lifts it
-                    state = robot.placed(state, simulation.ground)
-        simulation.state = state
+        self.simulation.state = self._dimension.moved(self.simulation, joint, position)
         self._keep()
 
     def go_back(self, time: float) -> None:
@@ -159,7 +160,7 @@ class LiveSimulation:
         SimulationError
             If its controller takes no part in snapshots, or that is too long ago.
         """
-        times = [snapshot.time for snapshot in self._snapshots]
+        times = [snapshot.time for snapshot, _ in self._snapshots]
         place = bisect_right(times, time + 1e-9) - 1
         if place < 0:
             raise SimulationError(
@@ -167,11 +168,10 @@ class LiveSimulation:
                 + ("that is too long ago" if times else "the controller takes no part in snapshots")
             )
         del self._snapshots[place + 1 :]
-        snapshot = self._snapshots[place]
+        snapshot, known = self._snapshots[place]
         self.simulation.restore(snapshot)
         self._last = snapshot.time
         self._added = tuple(push for push in self._added if push.start < time - 1e-9)
-        known = pushes_of_numbers(snapshot.part("push"))
         self.simulation.apply([p for p in self._added if p.end > snapshot.time and p not in known])
         if time > snapshot.time + 1e-9:
             self.simulation.advance(time)
@@ -182,7 +182,7 @@ class LiveSimulation:
         self._last = self.time
         kept = snapshot_of(self.simulation)
         if kept is not None:
-            if self._snapshots and self._snapshots[-1].time >= kept.time:
+            if self._snapshots and self._snapshots[-1][0].time >= kept.time:
                 self._snapshots.pop()  # a slider sets many values at one instant, the last holds
-            self._snapshots.append(kept)
+            self._snapshots.append((kept, self._added))
             del self._snapshots[: max(len(self._snapshots) - MOST_SNAPSHOTS, 0)]

@@ -4,18 +4,36 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from heelstrike.view.page.markup import document, shipped
+from heelstrike.view.page.markup import document
 
-SCRIPTS = ("course", "picture", "curves", "strip", "settings", "sharing", "live")
-"""Each stands on those before it."""
+PICTURES = {
+    "plane": ("live/browser/picture.js",),
+    "space": ("spatial/space.js", "spatial/picture.js"),
+}
+"""What draws the robots of a dimension, and hears the mouse."""
+BEFORE = ("page/drawing.js", "live/browser/course.js")
+AFTER = ("curves", "strip", "settings", "sharing", "live")
+"""BEFORE, AFTER: Scripts that pictures stand on, and those that follow; each stands on those before
+it."""
 
 
-def live_page() -> str:
-    """Return the page; it asks for nothing but the socket of the server that it came from."""
-    here = files(__package__).joinpath("browser")
+def live_page(dimension: str = "plane") -> str:
+    """Return the page; it asks for nothing but the socket of the server that it came from.
+
+    Parameters
+    ----------
+    dimension : str
+        Of the robots that it shows, as `PICTURES` calls it.
+
+    Returns
+    -------
+    str
+        The document.
+    """
+    room = files("heelstrike.view")
+    names = (*BEFORE, *PICTURES[dimension], *(f"live/browser/{name}.js" for name in AFTER))
     body, style, *scripts = (
-        here.joinpath(name).read_text(encoding="utf-8")
-        for name in ("live.html", "live.css", *(f"{script}.js" for script in SCRIPTS))
+        room.joinpath(name).read_text(encoding="utf-8")
+        for name in ("live/browser/live.html", "live/browser/live.css", *names)
     )
-    script = shipped("drawing.js") + "".join(scripts)
-    return document("heelstrike", body, style=style, script=script, connect="'self'")
+    return document("heelstrike", body, style=style, script="".join(scripts), connect="'self'")

@@ -11,27 +11,24 @@ import queue
 import threading
 import time as clock_time
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from heelstrike.contact.ground import Ground
 from heelstrike.errors import HeelstrikeError
-from heelstrike.robot.robot import Robot
-from heelstrike.robot.state import State
-from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.push import Push
-from heelstrike.sim.run import Event, Run
 from heelstrike.tolerances import SAME_ROW
 from heelstrike.view.live.board import Board
-from heelstrike.view.live.frames import Layout
+from heelstrike.view.live.dimension import Dimension, dimension_of
 from heelstrike.view.live.history import History
-from heelstrike.view.live.light import light_of
+from heelstrike.view.live.layout import FrameLayout
+from heelstrike.view.live.light import NOTHING_YET
 from heelstrike.view.live.live_simulation import LiveSimulation
 from heelstrike.view.live.stage import Stage
-from heelstrike.view.page.events import contact_of, kind_in_words, place_of
-from heelstrike.view.page.scene import scene
 from heelstrike.view.style import in_words
+
+if TYPE_CHECKING:
+    from heelstrike.view.live.dimension import AnyEvent, AnyGround, AnyRobot, AnyRun, Outline
 
 UPDATES = 64.0
 """Updates a second that are offered to viewers."""
@@ -68,7 +65,7 @@ class Session:
         Where it is shown.
     stage : Stage, optional
         Makes the simulation.
-    run : Run, optional
+    run : Run or SpatialRun, optional
         What is looked at instead.
     rate : float
         Simulated seconds a second.
@@ -79,10 +76,15 @@ class Session:
         board: Board,
         *,
         stage: Stage | None = None,
-        run: Run | None = None,
+        run: AnyRun | None = None,
         rate: float = 1.0,
     ) -> None:
         self._board, self._stage, self._run = board, stage, run
+        self.dimension: Dimension = (
+            stage.dimension
+            if stage is not None
+            else dimension_of(None if run is None else run.robot)
+        )
         self.values: dict[str, Any] = {}
         self._controls: list[dict[str, Any]] = []
         if stage is not None:
@@ -90,18 +92,18 @@ class Session:
         self.rate = rate
         self.playing = True
         self.cursor = 0.0
-        self.history = History()
+        self.history = History(self.dimension.quantities)
         self.live: LiveSimulation | None = None
         self._commands: queue.SimpleQueue[tuple[str, dict[str, Any]]] = queue.SimpleQueue()
         self._closing = threading.Event()
         self._random = np.random.default_rng(7)
-        self._layout: Layout | None = None
+        self._layout: FrameLayout | None = None
         self._shown = 0.0  # time of the frame that was kept last
         self._goal = 0.0
         self._reached, self._span = rate, 0.05  # of one update, in s
         self._gained = self._elapsed = 0.0
         self._note = self._busy = ""
-        self._light, self._light_until = light_of(None), 0.0
+        self._light, self._light_until = NOTHING_YET, 0.0
         self._thread = threading.Thread(target=self._go, name="heelstrike-watch", daemon=True)
 
     def start(self) -> None:
@@ -221,7 +223,9 @@ class Session:
         ahead = int(command["direction"]) > 0
         kinds = {str(kind) for kind in command.get("kinds", ())}
         times = sorted(
-            event.time for event in self.history.events if not kinds or _kind(event) in kinds
+            event.time
+            for event in self.history.events
+            if not kinds or event.kind.name.lower() in kinds
         )
         wanted = [
             t
@@ -242,10 +246,10 @@ class Session:
 
     def _hold(self, viewer: str, command: Mapping[str, Any]) -> None:
         live = self._needs_live()
-        force = (_finite(command["force"][0]), _finite(command["force"][1]))
-        place = (_finite(command["point"][0]), _finite(command["point"][1]))
+        force, place = (tuple(map(_finite, command[name])) for name in ("force", "point"))
         link = int(command["link"])
-        Push(link, force=force, start=0.0, duration=0.0, point=place).place(live.robot)
+        push = Push(link, force=force, start=0.0, duration=0.0, point=place)
+        self.dimension.check(push, live.robot)
         if not self._at_end:
             self._go_on_from_cursor()
         live.held[viewer] = (link, place, force)
@@ -261,8 +265,7 @@ class Session:
         robot = live.robot
         link = int(self._random.choice(np.flatnonzero(robot.model.mass > 0.0)))
         size = self._random.uniform(*RANDOM_PUSH) * robot.weight
-        turn = self._random.choice([0.0, np.pi]) + self._random.uniform(-0.5, 0.5)
-        force = (float(size * np.cos(turn)), float(size * np.sin(turn)))
+        force = tuple(size * along for along in self.dimension.somewhere(self._random))
         live.push(Push(link, force=force, start=live.time, duration=RANDOM_PUSH_LASTS))
         self._note = (
             f"{size:.3g} N on {in_words(robot.link_names[link])} for {RANDOM_PUSH_LASTS:g} s"
@@ -277,7 +280,7 @@ class Session:
         if not live.can_go_on:
             raise RefusedError(f"{live.message}. Start again, or move it at an earlier time")
         live.move(joint, position)
-        self.history.take(_seen(live))
+        self.history.take(live.seen())
         assert self._layout is not None
         now = self.history.part(len(self.history) - 1, len(self.history) - 1)
         self._board.look(self._layout.frames(now, [0, 0], self._pushes)[0])
@@ -337,33 +340,33 @@ class Session:
                     self._show_outline(self._stage.outline(wanted))
                 simulation = self._stage.simulation(wanted, self._tell_busy)
                 self._tell_busy("loading the simulator (compiling it, once: about 20 s)")
-                live = LiveSimulation(simulation)
-                run = _seen(live)
+                live = LiveSimulation(simulation, self.dimension)
+                run = live.seen()
             except HeelstrikeError as error:
                 self._note = str(error)
                 return
             finally:
                 self._tell_busy("")
-            self.live, self.history = live, History()
+            self.live, self.history = live, History(self.dimension.quantities)
             self._set(self._stage.found(wanted, simulation))
             self.history.take(run)
             self._show_scene(run)
         self._tell()
 
-    def _begin_scene(self, robot: Robot, ground: Ground, method: str) -> None:
+    def _begin_scene(self, robot: AnyRobot, ground: AnyGround, method: str) -> None:
         """Show a robot on its ground, of which frames are still to come."""
-        self._layout = Layout(robot)
+        self._layout = self.dimension.layout(robot)
         self._board.begin(
             {
-                "scene": scene(robot, ground),
+                "scene": self.dimension.scene(robot, ground),
                 "layout": self._layout.described(),
-                "events": [kind.name.lower() for kind in EventKind],
+                "events": list(self.dimension.kinds),
                 "method": method,
                 "live": self._stage is not None,
             }
         )
 
-    def _show_outline(self, outline: tuple[Robot, State, Ground] | None) -> None:
+    def _show_outline(self, outline: Outline | None) -> None:
         """Show where the robot is to begin, while its simulation is being made."""
         if outline is None:
             return
@@ -372,7 +375,7 @@ class Session:
         assert self._layout is not None
         self._board.add(self._layout.still(state, ground))
 
-    def _show_scene(self, run: Run) -> None:
+    def _show_scene(self, run: AnyRun) -> None:
         """Show a course from its beginning on: of a simulation what has been of it."""
         times = self.history.time
         self._begin_scene(run.robot, run.ground, str(run.method))
@@ -436,13 +439,16 @@ class Session:
         if not self.live.can_go_on:
             self.playing = False
 
-    def _keep(self, rows: list[int], events: list[Event]) -> None:
+    def _keep(self, rows: list[int], events: list[AnyEvent]) -> None:
         """Show rows of the history for good, and events with them; forces begin at the first."""
         assert self._layout is not None
         part = self.history.part(rows[0], rows[-1])
         frames = self._layout.frames(part, [row - rows[0] for row in rows], self._pushes)
         self._shown = self.cursor = float(part.time[-1])
-        told = [[event.time, int(event.kind), contact_of(event)] for event in events]
+        told = [
+            [event.time, int(event.kind), self.dimension.shown_at(event, part.robot)]
+            for event in events
+        ]
         self._board.add(frames, told)
 
     def _move(self, time: float) -> None:
@@ -501,12 +507,12 @@ class Session:
         places: dict[str, list[str]] = {}
         for event in self.history.events:
             if abs(event.time - time) <= SAME_ROW:
-                places.setdefault(kind_in_words(event), []).append(self._where(event))
+                places.setdefault(self.dimension.words_of(event), []).append(self._where(event))
         told = [f"{kind} ({', '.join(filter(None, each))})" for kind, each in places.items()]
         return f"at {time:.6g} s: {'; '.join(told)}".replace(" ()", "")
 
-    def _where(self, event: Event) -> str:
-        return "" if self._layout is None else place_of(event, self._layout.robot)
+    def _where(self, event: AnyEvent) -> str:
+        return "" if self._layout is None else self.dimension.place_of(event, self._layout.robot)
 
     def _tell_busy(self, what: str) -> None:
         self._busy = what
@@ -535,7 +541,8 @@ class Session:
 
     def _lit(self) -> dict[str, str]:
         """Return the light, whose words change twice a second at most while time goes on."""
-        light, now = light_of(self.history.newest), clock_time.perf_counter()
+        run, now = self.history.newest, clock_time.perf_counter()
+        light = NOTHING_YET if run is None else self.dimension.light(run)
         waits = self.playing and light["level"] == self._light["level"]
         if not waits or now > self._light_until:
             self._light, self._light_until = light, now + WORDS_LAST
@@ -545,16 +552,6 @@ class Session:
     def _over_here(self) -> bool:
         """Whether viewers look at the end of what cannot go on."""
         return self._at_end and (self.live is None or not self.live.can_go_on)
-
-
-def _seen(live: LiveSimulation) -> Run:
-    """Return how a simulation is now, or a step later where its controller is asked for good."""
-    run = live.record()
-    return run if len(run.time) else live.advance(None) or run
-
-
-def _kind(event: Event) -> str:
-    return event.kind.name.lower()
 
 
 def _finite(value: Any) -> float:

@@ -5,17 +5,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from heelstrike.contact.ground import Ground
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.robot import Robot
-from heelstrike.robot.state import State
-from heelstrike.sim.simulation import Simulation
-from heelstrike.sim.snapshot import Snapshot
+from heelstrike.view.live.dimension import Dimension, dimension_of
+
+if TYPE_CHECKING:
+    from heelstrike.view.live.dimension import AnyGround, AnySimulation, Outline
 
 Value = float | str
 FRICTION = "friction"
@@ -58,6 +57,13 @@ class Control:
 class Stage(ABC):
     """Makes the simulation that is watched, of the values of its controls."""
 
+    @property
+    def dimension(self) -> Dimension:
+        """That of its robots; the plane by default."""
+        from heelstrike.view.live.plane import PLANE
+
+        return PLANE
+
     @abstractmethod
     def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:
         """What can be set, where some things are set already; with none, what there is at first."""
@@ -69,7 +75,9 @@ class Stage(ABC):
         return {c.name: wanted[c.name] if c.accepts(wanted[c.name]) else c.value for c in controls}
 
     @abstractmethod
-    def simulation(self, values: Mapping[str, Any], progress: Callable[[str], None]) -> Simulation:
+    def simulation(
+        self, values: Mapping[str, Any], progress: Callable[[str], None]
+    ) -> AnySimulation:
         """Make the simulation at its beginning.
 
         Parameters
@@ -85,14 +93,14 @@ class Stage(ABC):
             If there is none of these values.
         """
 
-    def outline(self, values: Mapping[str, Any]) -> tuple[Robot, State, Ground] | None:  # noqa: ARG002
+    def outline(self, values: Mapping[str, Any]) -> Outline | None:  # noqa: ARG002
         """Where the robot is to begin, to be shown until there is a simulation, and at once.
 
         None where the simulation is there at once.
         """
         return None
 
-    def found(self, values: Mapping[str, Any], simulation: Simulation) -> dict[str, Any]:
+    def found(self, values: Mapping[str, Any], simulation: AnySimulation) -> dict[str, Any]:
         """Values as they are in a simulation that has started again, or was taken back.
 
         What was set at once and later than that is forgotten with all else that came later.
@@ -102,7 +110,7 @@ class Stage(ABC):
         return {**values, FRICTION: float(np.min(simulation.ground.model().friction))}
 
     @abstractmethod
-    def ground(self, values: Mapping[str, Any], simulation: Simulation) -> Ground:
+    def ground(self, values: Mapping[str, Any], simulation: AnySimulation) -> AnyGround:
         """Make the ground of the values that act at once."""
 
 
@@ -111,15 +119,20 @@ class GivenStage(Stage):
 
     Parameters
     ----------
-    simulation : Simulation
+    simulation : Simulation or SpatialSimulation
         The simulation.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: AnySimulation) -> None:
         self._simulation, self._begun = simulation, False
         self._start = snapshot_of(simulation)
         friction = float(np.min(simulation.ground.model().friction))
         self._controls = (friction_control(friction),)
+
+    @property
+    def dimension(self) -> Dimension:
+        """That of its robot."""
+        return dimension_of(self._simulation.robot)
 
     def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:  # noqa: ARG002
         """The friction of the ground, everywhere."""
@@ -129,7 +142,7 @@ class GivenStage(Stage):
         self,
         values: Mapping[str, Any],  # noqa: ARG002
         progress: Callable[[str], None],  # noqa: ARG002
-    ) -> Simulation:
+    ) -> AnySimulation:
         """Return it as it is; when asked again, as it was then."""
         if not self._begun:
             self._begun = True
@@ -142,12 +155,12 @@ class GivenStage(Stage):
             self._simulation.restore(self._start)
         return self._simulation
 
-    def ground(self, values: Mapping[str, Any], simulation: Simulation) -> Ground:
+    def ground(self, values: Mapping[str, Any], simulation: AnySimulation) -> AnyGround:
         """Return its ground with another friction."""
         return replace(simulation.ground, friction=values["friction"])
 
 
-def snapshot_of(simulation: Simulation) -> Snapshot | None:
+def snapshot_of(simulation: AnySimulation) -> Any:
     """Return a snapshot; None if the controller takes no part in them."""
     try:
         return simulation.snapshot()
@@ -160,3 +173,21 @@ def friction_control(value: float) -> Control:
     return Control(
         FRICTION, "friction μ", value, low=0.0, high=max(1.5, value), step=0.01, at_once=True
     )
+
+
+MILLISECONDS = " ms"
+STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+"""Steps that are offered, in ms."""
+
+
+def step_control(first: float) -> Control:
+    """Return the control of the time step, which is some length (s) at first."""
+    step = 1e3 * first
+    offered = sorted({*STEPS, float(f"{step:.6g}")})
+    words = tuple(f"{each:g}{MILLISECONDS}" for each in offered)
+    return Control("step", "step", f"{step:.6g}{MILLISECONDS}", words)
+
+
+def step_of(words: str) -> float:
+    """Return a step (s) that was chosen there."""
+    return 1e-3 * float(words.removesuffix(MILLISECONDS))

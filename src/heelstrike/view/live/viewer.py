@@ -11,6 +11,7 @@ import webbrowser
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING, Any
 
 from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
@@ -20,6 +21,11 @@ from heelstrike.view.live.page import live_page
 from heelstrike.view.live.server import Server, check_installed
 from heelstrike.view.live.session import RATES, Session
 from heelstrike.view.live.stage import GivenStage, Stage
+
+if TYPE_CHECKING:
+    from heelstrike.sim.spatial.run import SpatialRun
+    from heelstrike.sim.spatial.simulation import SpatialSimulation
+    from heelstrike.view.live.dimension import AnyRun
 
 LOOK_EVERY = 0.1
 """Seconds between two looks whether Ctrl-C has come, which Windows keeps from what waits."""
@@ -124,7 +130,7 @@ class Viewer:
 
 
 def watch(
-    what: Run | Simulation,
+    what: Run | Simulation | SpatialRun | SpatialSimulation,
     *,
     rate: float = 1.0,
     port: int = 0,
@@ -140,7 +146,7 @@ def watch(
 
     Parameters
     ----------
-    what : Run or Simulation
+    what : Run, Simulation, SpatialRun or SpatialSimulation
         What is shown.
     rate : float
         Simulated seconds a second, at first.
@@ -169,11 +175,12 @@ def watch(
     >>> simulation = hs.Simulation(robot, state=robot.reference_state())
     >>> viewer = hs.watch(simulation)  # doctest: +SKIP
     """
-    if isinstance(what, Run):
+    runs, simulations = _of_dimension(what)
+    if isinstance(what, runs):
         if not len(what.time):
             raise ViewError(f"there is nothing to watch: the run has no rows ({what.message})")
         viewer = view(run=what, rate=rate, port=port)
-    elif isinstance(what, Simulation):
+    elif isinstance(what, simulations):
         viewer = view(stage=GivenStage(what), rate=rate, port=port)
     else:
         raise ViewError(f"watch takes a Run or a Simulation, got {type(what).__name__}")
@@ -188,7 +195,7 @@ def watch(
 
 
 def view(
-    *, stage: Stage | None = None, run: Run | None = None, rate: float = 1.0, port: int = 0
+    *, stage: Stage | None = None, run: AnyRun | None = None, rate: float = 1.0, port: int = 0
 ) -> Viewer:
     """Begin to serve what a stage makes, or a run, without opening anything.
 
@@ -204,7 +211,17 @@ def view(
         raise ViewError(f"a port is a number from 0 to 65535, got {port}")
     board = Board()
     session = Session(board, stage=stage, run=run, rate=rate)
-    return Viewer(session, Server(board, session.ask, live_page(), port=port))
+    return Viewer(session, Server(board, session.ask, live_page(session.dimension.name), port=port))
+
+
+def _of_dimension(what: object) -> tuple[Any, Any]:
+    """Classes of runs and simulations that can be watched, in the dimension of one."""
+    if isinstance(what, Run | Simulation):
+        return Run, Simulation
+    from heelstrike.sim.spatial.run import SpatialRun
+    from heelstrike.sim.spatial.simulation import SpatialSimulation
+
+    return SpatialRun, SpatialSimulation
 
 
 def _in_terminal() -> bool:

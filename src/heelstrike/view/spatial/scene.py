@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 from heelstrike.contact.spatial.ground import SpatialGround
 from heelstrike.robot.model import Floats
+from heelstrike.robot.spatial.model import HINGE, SLIDE
 from heelstrike.robot.spatial.robot import SpatialRobot, quaternion_places
 from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.view.page.curves import DASHED, Plot, Trace, alike
@@ -113,7 +115,7 @@ def moving_columns(run: SpatialRun, rows: Rows) -> dict[str, Floats]:
         "center": motion.center_of_mass,
         "capture": found.capture_point,
         "pressure": middle_of_pressure(forces, run.robot.weight),
-        "support": _polygons(found.polygon),
+        "support": polygon_table(found.polygon),
     }
     for i, group in enumerate(force_groups(run.robot)):
         ever = pressed[:, i]
@@ -136,11 +138,11 @@ def _continuous(run: SpatialRun, rows: Rows) -> Floats:
     return position
 
 
-def _polygons(polygons: tuple[Floats, ...]) -> Floats:
-    """Corners of all polygons as one table (n, 3 k), NaN behind the last."""
+def polygon_table(polygons: tuple[Floats, ...], least: int = 0) -> Floats:
+    """Corners of all polygons as one table (n, 3 k), NaN behind the last; k ≥ `least`."""
     fewer = [each[:: -(-len(each) // MOST_EDGES) or 1] for each in polygons]
     most = max((len(each) for each in fewer), default=0)
-    table = np.full((len(fewer), max(most, 1), 3), np.nan)
+    table = np.full((len(fewer), max(most, least, 1), 3), np.nan)
     for row, corners in enumerate(fewer):
         table[row, : len(corners)] = corners
     return table.reshape(len(fewer), -1)
@@ -201,27 +203,45 @@ def _center(run: SpatialRun, rows: Rows) -> list[Plot]:
 
 
 def _joints(run: SpatialRun, rows: Rows) -> list[Plot]:
-    """Positions and torques of what motors drive, left and right together."""
-    robot = run.robot
+    return joint_plots(
+        run.robot,
+        lambda place: {"values": run.position[rows, place]},
+        lambda motor: {"values": run.torque[rows, motor]},
+    )
+
+
+Numbers = Callable[[int], dict[str, Any]]
+
+
+def joint_plots(robot: SpatialRobot, position: Numbers, torque: Numbers) -> list[Plot]:
+    """Make the panels of what motors drive, left and right together.
+
+    Parameters
+    ----------
+    robot : SpatialRobot
+        The robot.
+    position, torque : callable
+        Return the numbers of a position and of a motor, as a `Trace` has them, by their indices.
+    """
     model = robot.model
     if not robot.nu:
         return []
     joint = model.velocity_joint[model.actuator_velocity]
     leg = legs_in_space(robot)[joint]
     names = [robot.velocity_names[k] for k in model.actuator_velocity.tolist()]
-    position = model.first_position[joint]
-    simple = model.joint_kind[joint] >= 2
+    place = model.first_position[joint].tolist()
+    kind = model.joint_kind[joint]
     found = []
     for name, several in alike(names, np.arange(robot.nu)).items():
-        look = [(in_words(names[i]), int(leg[i]), place) for place, i in enumerate(several)]
-        if all(simple[several]):
-            unit = "rad" if model.joint_kind[joint[several[0]]] == 3 else "m"
-            traces = [
-                Trace(run.position[rows, position[i]], *each)
-                for i, each in zip(several, look, strict=True)
-            ]
-            found.append(Plot(name, unit, traces, group="joint positions"))
-        unit = "N" if model.joint_kind[joint[several[0]]] == 2 else "N m"
-        traces = [Trace(run.torque[rows, i], *each) for i, each in zip(several, look, strict=True)]
-        found.append(Plot(f"{name} torque", unit, traces, steps=True, group="joint torques"))
+        look: dict[int, dict[str, Any]] = {
+            i: {"label": in_words(names[i]), "foot": int(leg[i]), "dash": n}
+            for n, i in enumerate(several)
+        }
+        if all(kind[several] >= SLIDE):
+            unit = "rad" if kind[several[0]] == HINGE else "m"
+            traces = [Trace(**{"values": None} | position(place[i]) | look[i]) for i in several]
+            found.append(Plot(name, unit, traces, group="joints"))
+        unit = "N" if kind[several[0]] == SLIDE else "N m"
+        traces = [Trace(**{"values": None} | torque(i) | look[i]) for i in several]
+        found.append(Plot(f"{name} torque", unit, traces, steps=True, group="torques"))
     return found

@@ -1,7 +1,8 @@
 /* A run in space on a canvas: robot, ground, forces, seen by a camera that turns about the robot.
 
    HeelstrikeSpace.read(run) takes what `contents` of view/spatial/page.py returns, and answers as
-   HeelstrikeRecording.read does, so that the player plays both.
+   HeelstrikeRecording.read does, so that the player plays both. HeelstrikeSpace.stage(scene) draws
+   single frames of a scene, which the live view has as well.
 
    scene: what does not change
      tree       {parent, kind, first, axis, offset, turn, reference} of the joints, as the model of
@@ -18,10 +19,9 @@
 
 var HeelstrikeSpace = (() => {
   const { palette, footColor, fit, words } = HeelstrikeDrawing;
-  const { unpacked, bytes, before } = HeelstrikeRecording;
   const WEIGHT_LENGTH = 0.35, LONGEST = 1.1, HEAD = 0.035, CONE = 0.45; // of the robot's size
-  const FAR_AWAY = 4.5, WIDE = 3, NEAREST = 0.05;
-  const HOME = { azimuth: -0.95, elevation: 0.24, zoom: 1, aside: 0, up: 0 };
+  const FAR_AWAY = 4.5, WIDE = 3, NEAREST = 0.05, TRAIL = 1.5;
+  const HOME = { azimuth: -0.95, elevation: 0.24, zoom: 1, aside: 0, up: 0, stays: null };
   const SUN = unit([-0.35, -0.25, 0.9]), DARKEST = 0.55;
   const TRUNK = { light: "#5B646B", dark: "#AAB3BA" }, STONE = { light: "#C9C9C2", dark: "#4A5157" };
   const SIDES = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
@@ -95,14 +95,39 @@ var HeelstrikeSpace = (() => {
     const distance = FAR_AWAY * scene.size;
     const scale = (look.zoom * Math.min(height, 1.1 * width)) / (1.35 * Math.max(scene.highest, 0.6 * scene.size));
     const middle = plus(plus(target, right, look.aside), up, look.up);
+    /** Pixels a metre at some place. */
+    const nearness = (place) =>
+      (scale * distance) / Math.max(distance - dot(plus(place, middle, -1), near), NEAREST * distance);
     const seen = (place) => {
-      const away = plus(place, middle, -1);
-      const by = (scale * distance) / Math.max(distance - dot(away, near), NEAREST * distance);
+      const away = plus(place, middle, -1), by = nearness(place);
       return [0.5 * width + by * dot(away, right), 0.5 * height - by * dot(away, up)];
     };
     const place = plus(middle, near, distance);
-    return { seen, place, right, up, near, scale,
+    return { seen, nearness, place, right, up, near, scale,
       far: (point) => Math.hypot(...plus(point, place, -1)) };
+  }
+
+  /** The place on a triangle that is seen nearest to a place of the canvas: {place, away} (pixels). */
+  function nearestOn(points, corners, [x, y]) {
+    const [[ax, ay], [bx, by], [cx, cy]] = corners;
+    const area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);
+    const u = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / area;
+    const v = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / area;
+    if (u >= 0 && v >= 0 && u + v <= 1) {
+      const inside = [0, 1, 2].map((k) =>
+        u * points[0][k] + v * points[1][k] + (1 - u - v) * points[2][k]);
+      return { place: inside, away: 0 };
+    }
+    let best = { away: Infinity };
+    for (let k = 0; k < 3; k++) {
+      const [p, q] = [corners[k], corners[(k + 1) % 3]], dx = q[0] - p[0], dy = q[1] - p[1];
+      const along = Math.max(0, Math.min(1,
+        ((x - p[0]) * dx + (y - p[1]) * dy) / (dx * dx + dy * dy || 1)));
+      const away = Math.hypot(x - p[0] - along * dx, y - p[1] - along * dy);
+      if (away < best.away)
+        best = { away, place: plus(points[k], plus(points[(k + 1) % 3], points[k], -1), along) };
+    }
+    return best;
   }
 
   function path(context, points) {
@@ -111,72 +136,31 @@ var HeelstrikeSpace = (() => {
     context.closePath();
   }
 
-  function read(run) {
-    const { scene, data } = run;
-    const time = new Float64Array(bytes(data.time)), count = data.rows;
-    const columns = unpacked(data);
-    const row = (name, k) => {
-      const { width, rows, values } = columns.get(name);
-      const first = rows === 1 ? 0 : k * width;
-      return values.subarray(first, first + width);
-    };
-    const curve = (name) => {
-      const { rows, values } = columns.get(name);
-      return rows === 1 ? new Float32Array(count).fill(values[0]) : values;
-    };
-    const rowAt = (t) => Math.max(0, before(time, t));
-    const start = time[0], end = time[count - 1];
+  /** What draws frames of a scene, seen by a camera that a person moves.
+
+      frame: position (q), center, capture, pressure [x, y, z]; support [x, y, z, …]; contacts
+      [{place, force, normal, friction}]; trace [[x, y, z]] of the pressure, the newest first; and,
+      of a live view, flashes [{place, label, strength}] and pushes [{place, force}]. */
+  function stage(scene) {
     const { normal, height, boxes } = scene.ground;
     const below = ([x, y]) => [x, y, height - (normal[0] * x + normal[1] * y) / normal[2]];
-    const look = { ...HOME, follow: true };
-    let shown = null, moved = 0, redraw = () => {};
+    const look = { ...HOME };
+    let shown = null, redraw = () => {};
 
-    const between = (name, k, share) => {
-      const now = row(name, k);
-      if (!(share > 0)) return Array.from(now);
-      const next = row(name, k + 1);
-      return Array.from(now, (value, i) => value + share * (next[i] - value));
-    };
-    function frameAt(t) {
-      const k = rowAt(t);
-      const share = k + 1 < count ? (t - time[k]) / (time[k + 1] - time[k] || 1) : 0;
-      const frame = { time: t, row: k };
-      for (const name of ["position", "center", "capture"]) frame[name] = between(name, k, share);
-      for (const name of ["pressure", "support"]) frame[name] = Array.from(row(name, k));
-      frame.contacts = scene.contacts.map((_, i) => ({ place: Array.from(row(`place ${i}`, k)),
-        force: Array.from(row(`force ${i}`, k)), normal: Array.from(row(`normal ${i}`, k)),
-        friction: row(`friction ${i}`, k)[0] }));
-      return frame;
-    }
-
-    /** Where the camera looks: below the centre of mass, evened out over 0.3 s, and up from there. */
-    function target(t) {
-      let total = [0, 0, 0], weight = 0;
-      for (let n = -6; n <= 6; n++) {
-        const near = look.follow ? Math.min(end, Math.max(start, t + 0.05 * n)) : start;
-        const k = rowAt(near), l = Math.min(k + 1, count - 1);
-        const part = time[l] > time[k] ? (near - time[k]) / (time[l] - time[k]) : 0;
-        const place = between("center", k, k < l ? part : 0), share = 7 - Math.abs(n);
-        if (known(place)) [total, weight] = [plus(total, place, share), weight + share];
-      }
-      const middle = weight ? total.map((value) => value / weight) : [0, 0, 0];
-      return plus(below(middle), [0, 0, 0.46 * scene.highest]);
-    }
-
-    function draw(canvas, t, { dark, hide }) {
-      listen(canvas);
+    /** Draw a frame on a canvas; the camera looks at a place, or stays where it was told to. */
+    function draw(canvas, frame, place, { dark, hide, steady = (_, text) => text }) {
       const { context, width, height: tall } = fit(canvas);
       if (!width || !tall) return null;
-      const frame = frameAt(t), colors = palette(dark), tone = dark ? "dark" : "light";
-      const aim = target(t), camera = cameraAt(aim, look, scene, width, tall);
-      const picture = { context, camera, colors, frame, aim };
-      shown = { canvas, camera };
+      const colors = palette(dark), tone = dark ? "dark" : "light";
+      const aim = look.stays || place, camera = cameraAt(aim, look, scene, width, tall);
+      const picture = { context, camera, colors, frame, aim, steady };
       context.save();
       context.fillStyle = colors.paper;
       context.fillRect(0, 0, width, tall);
       context.lineJoin = "round";
       drawGround(picture);
-      const faces = facesOf(frame);
+      const poses = placed(scene.tree, frame.position), faces = facesOf(poses);
+      shown = { canvas, camera, aim, poses, faces };
       drawShadows(picture, faces);
       drawBoxes(picture, STONE[tone]);
       if (!hide.support) drawSupport(picture);
@@ -187,6 +171,8 @@ var HeelstrikeSpace = (() => {
       if (!hide.capture) mark(picture, frame.capture, "cross", colors.center);
       if (!hide.center) drawCenter(picture);
       if (!hide.pressure) mark(picture, frame.pressure, "diamond", colors.pressure);
+      drawFlashes(picture);
+      drawPushes(picture);
       if (!hide.forces && scene.contacts.length) drawScale(picture, tall);
       context.restore();
       return frame;
@@ -223,15 +209,15 @@ var HeelstrikeSpace = (() => {
     }
 
     /** Triangles of the robot in the world with their normals. */
-    function facesOf(frame) {
-      const { origin, rotation } = placed(scene.tree, frame.position), faces = [];
+    function facesOf({ origin, rotation }) {
+      const faces = [];
       for (const { link, foot, corners, faces: list } of scene.solids) {
         const places = [];
         for (let k = 0; k < corners.length; k += 3)
           places.push(plus(origin[link], turned(rotation[link], corners.slice(k, k + 3))));
         for (let k = 0; k < list.length; k += 3) {
           const [a, b, c] = [places[list[k]], places[list[k + 1]], places[list[k + 2]]];
-          faces.push({ points: [a, b, c], foot, across: unit(cross(plus(b, a, -1), plus(c, a, -1))) });
+          faces.push({ link, points: [a, b, c], foot, across: unit(cross(plus(b, a, -1), plus(c, a, -1))) });
         }
       }
       return faces;
@@ -318,9 +304,8 @@ var HeelstrikeSpace = (() => {
       context.lineWidth = 1.2;
       context.beginPath();
       let down = false;
-      for (let k = frame.row; k >= 0 && frame.time - time[k] < 1.5; k--) {
-        const place = row("pressure", k);
-        if (!known(Array.from(place))) {
+      for (const place of frame.trace) {
+        if (!known(place)) {
           down = false;
           continue;
         }
@@ -404,6 +389,41 @@ var HeelstrikeSpace = (() => {
       context.fillText(`${words(scene.weight)} N`, 8, tall - 24);
     }
 
+    /** What happened a moment ago, at the forces of its contact points. */
+    function drawFlashes({ context, camera, colors, frame }) {
+      for (const { place, label, strength } of frame.flashes || []) {
+        if (!known(place)) continue;
+        const [x, y] = camera.seen(place);
+        context.globalAlpha = strength;
+        context.strokeStyle = context.fillStyle = colors.warn;
+        context.lineWidth = 2.5;
+        context.beginPath();
+        context.arc(x, y, 6 + 14 * (1 - strength), 0, 2 * Math.PI);
+        context.stroke();
+        context.globalAlpha = 1;
+        context.font = "600 13px system-ui, sans-serif";
+        context.textAlign = "center";
+        context.textBaseline = "top";
+        if (label) context.fillText(label, x, y + 22);
+      }
+    }
+
+    function drawPushes(picture) {
+      const { context, camera, colors, frame, steady } = picture;
+      (frame.pushes || []).forEach(({ place, force }, k) => {
+        const newtons = Math.hypot(...force);
+        if (!known(place) || !(newtons > 0)) return;
+        const length = Math.min(newtons * scale, LONGEST * scene.size);
+        const from = camera.seen(place), to = camera.seen(plus(place, force, length / newtons));
+        arrow(picture, from, [to[0] - from[0], to[1] - from[1]], colors.push);
+        context.fillStyle = colors.push;
+        context.font = "600 14px system-ui, sans-serif";
+        context.textAlign = to[0] < from[0] ? "right" : "left";
+        context.textBaseline = "middle";
+        context.fillText(steady(`push ${k}`, ` ${words(newtons)} N `), ...to);
+      });
+    }
+
     function drawCenter(picture) {
       const { context, camera, colors, frame } = picture;
       if (!known(frame.center)) return;
@@ -443,62 +463,189 @@ var HeelstrikeSpace = (() => {
       context.stroke();
     }
 
-    /* The camera: dragging turns it, with Shift or two buttons it moves, a wheel comes nearer. */
-    let heard = null;
-    const touches = new Map();
-    function listen(canvas) {
-      if (heard === canvas) return;
-      heard = canvas;
-      canvas.style.touchAction = "none";
-      canvas.style.cursor = "grab";
-      canvas.addEventListener("pointerdown", (happened) => {
-        touches.set(happened.pointerId, [happened.clientX, happened.clientY]);
-        canvas.setPointerCapture(happened.pointerId);
-        moved = 0;
-      });
-      canvas.addEventListener("pointermove", (happened) => {
-        const last = touches.get(happened.pointerId);
-        if (!last) return;
-        const [dx, dy] = [happened.clientX - last[0], happened.clientY - last[1]];
-        const others = [...touches].filter(([id]) => id !== happened.pointerId).map(([, at]) => at);
-        touches.set(happened.pointerId, [happened.clientX, happened.clientY]);
-        moved += Math.abs(dx) + Math.abs(dy);
-        if (others.length) {
-          const [x, y] = others[0];
-          const was = Math.hypot(last[0] - x, last[1] - y) || 1;
-          zoom(Math.hypot(happened.clientX - x, happened.clientY - y) / was);
-        } else if (happened.shiftKey || happened.buttons === 2) {
-          look.aside -= dx / shown.camera.scale;
-          look.up += dy / shown.camera.scale;
-        } else {
-          look.azimuth -= 0.008 * dx;
-          look.elevation = Math.min(1.55, Math.max(-0.1, look.elevation + 0.008 * dy));
-        }
-        redraw();
-      });
-      for (const name of ["pointerup", "pointercancel"])
-        canvas.addEventListener(name, (happened) => touches.delete(happened.pointerId));
-      canvas.addEventListener("wheel", (happened) => {
-        happened.preventDefault();
-        zoom(Math.exp(-0.0015 * happened.deltaY));
-        redraw();
-      }, { passive: false });
-      canvas.addEventListener("contextmenu", (happened) => happened.preventDefault());
+    /** The part that is seen at a place of the canvas, or within some pixels of it, and where on it
+        in the axes of its link; null if there is none. */
+    function partAt([x, y], within) {
+      if (!shown) return null;
+      const { camera, faces, poses } = shown;
+      let best = null;
+      for (const { link, points, across } of faces) {
+        if (dot(across, plus(camera.place, points[0], -1)) <= 0) continue;
+        const found = nearestOn(points, points.map(camera.seen), [x, y]);
+        if (found.away > within) continue;
+        const far = camera.far(found.place);
+        const nearer = !best || (found.away === best.away ? far < best.far : found.away < best.away);
+        if (nearer) best = { link, far, ...found };
+      }
+      if (!best) return null;
+      const { origin, rotation } = poses, back = rotation[best.link];
+      const arm = plus(best.place, origin[best.link], -1);
+      const point = [0, 1, 2].map((k) => back[k] * arm[0] + back[3 + k] * arm[1] + back[6 + k] * arm[2]);
+      return { link: best.link, point };
     }
-    function zoom(by) { look.zoom = Math.min(12, Math.max(0.2, look.zoom * by)); }
 
-    const keys = {
-      "f": () => { look.follow = !look.follow; redraw(); },
-      "r": () => { Object.assign(look, HOME); redraw(); },
-      "+": () => { zoom(1.2); redraw(); },
-      "-": () => { zoom(1 / 1.2); redraw(); },
-    };
+    /** Where a point of a link is in the world, as it was drawn last. */
+    const placeOf = ({ link, point }) =>
+      plus(shown.poses.origin[link], turned(shown.poses.rotation[link], point));
+
+    /** The place that is seen at a place of the canvas and is as far away as another. */
+    function placeBeside(place, [x, y]) {
+      const { camera } = shown, [sx, sy] = camera.seen(place), by = camera.nearness(place);
+      return plus(plus(place, camera.right, (x - sx) / by), camera.up, (sy - y) / by);
+    }
+
+    function follow() {
+      look.stays = look.stays ? null : shown?.aim ?? null;
+      redraw();
+    }
+    function home() {
+      Object.assign(look, HOME);
+      redraw();
+    }
+    function turn(dx, dy) {
+      look.azimuth -= 0.008 * dx;
+      look.elevation = Math.min(1.55, Math.max(-0.1, look.elevation + 0.008 * dy));
+      redraw();
+    }
+    function move(dx, dy) {
+      look.aside -= dx / shown.camera.scale;
+      look.up += dy / shown.camera.scale;
+      redraw();
+    }
+    function zoom(by) {
+      look.zoom = Math.min(12, Math.max(0.2, look.zoom * by));
+      redraw();
+    }
+
+    const keys = { "f": follow };
     for (const [name, angle] of [["1", HOME.azimuth], ["2", -Math.PI / 2], ["3", 0], ["4", Math.PI]])
       keys[name] = () => { look.azimuth = angle; redraw(); };
 
-    return { ...run, time, count, start, end, curve, rowAt, draw, keys, look,
-      dragged: () => moved > 4,
-      whenMoved: (then) => { redraw = then; },
+    return { draw, partAt, placeOf, placeBeside, look, keys, turn, move, zoom, home,
+      /** Where a camera looks that follows a centre of mass. */
+      above: (center) => plus(below(center), [0, 0, 0.46 * scene.highest]),
+      /** Where something is seen on the canvas. */
+      seen: (place) => shown.camera.seen(place),
+      whenMoved: (then) => { redraw = then; } };
+  }
+
+  /** Hear a canvas: dragging turns the camera of the stage that there is, with Shift or two fingers
+      it moves and comes nearer, as a wheel does. `hands` may take a pointer for something else:
+      {grasp, pull, release, hover}. */
+  function listen(canvas, stageNow, hands = {}) {
+    const touches = new Map();
+    let pulling = null, moved = 0;
+    canvas.style.touchAction = "none";
+    canvas.addEventListener("pointerdown", (happened) => {
+      touches.set(happened.pointerId, [happened.clientX, happened.clientY]);
+      canvas.setPointerCapture(happened.pointerId);
+      moved = 0;
+      if (touches.size > 1) letGo();
+      else if (happened.button === 0 && !happened.shiftKey && hands.grasp?.(happened))
+        pulling = happened.pointerId;
+    });
+    canvas.addEventListener("pointermove", (happened) => {
+      const last = touches.get(happened.pointerId), stage = stageNow();
+      if (!last) hands.hover?.(happened);
+      if (!last || !stage) return;
+      touches.set(happened.pointerId, [happened.clientX, happened.clientY]);
+      if (pulling === happened.pointerId) {
+        hands.pull(happened);
+        return;
+      }
+      const [dx, dy] = [happened.clientX - last[0], happened.clientY - last[1]];
+      const others = [...touches].filter(([id]) => id !== happened.pointerId).map(([, at]) => at);
+      moved += Math.abs(dx) + Math.abs(dy);
+      if (others.length) {
+        const [x, y] = others[0];
+        const was = Math.hypot(last[0] - x, last[1] - y) || 1;
+        stage.zoom(Math.hypot(happened.clientX - x, happened.clientY - y) / was);
+      } else if (happened.shiftKey || happened.buttons === 2) stage.move(dx, dy);
+      else stage.turn(dx, dy);
+    });
+    function letGo() {
+      if (pulling !== null) hands.release();
+      pulling = null;
+    }
+    for (const name of ["pointerup", "pointercancel", "lostpointercapture"])
+      canvas.addEventListener(name, (happened) => {
+        touches.delete(happened.pointerId);
+        if (pulling === happened.pointerId) letGo();
+      });
+    canvas.addEventListener("wheel", (happened) => {
+      happened.preventDefault();
+      stageNow()?.zoom(Math.exp(-0.0015 * happened.deltaY));
+    }, { passive: false });
+    canvas.addEventListener("contextmenu", (happened) => happened.preventDefault());
+    return { dragged: () => moved > 4 };
+  }
+
+  function read(run) {
+    const { unpacked, bytes, before } = HeelstrikeRecording;
+    const { scene, data } = run;
+    const time = new Float64Array(bytes(data.time)), count = data.rows;
+    const columns = unpacked(data);
+    const row = (name, k) => {
+      const { width, rows, values } = columns.get(name);
+      const first = rows === 1 ? 0 : k * width;
+      return values.subarray(first, first + width);
+    };
+    const curve = (name) => {
+      const { rows, values } = columns.get(name);
+      return rows === 1 ? new Float32Array(count).fill(values[0]) : values;
+    };
+    const rowAt = (t) => Math.max(0, before(time, t));
+    const start = time[0], end = time[count - 1];
+    const picture = stage(scene);
+    let heard = null, heardBy = null;
+
+    const between = (name, k, share) => {
+      const now = row(name, k);
+      if (!(share > 0)) return Array.from(now);
+      const next = row(name, k + 1);
+      return Array.from(now, (value, i) => value + share * (next[i] - value));
+    };
+    function frameAt(t) {
+      const k = rowAt(t);
+      const share = k + 1 < count ? (t - time[k]) / (time[k + 1] - time[k] || 1) : 0;
+      const frame = { time: t, row: k };
+      for (const name of ["position", "center", "capture"]) frame[name] = between(name, k, share);
+      for (const name of ["pressure", "support"]) frame[name] = Array.from(row(name, k));
+      frame.contacts = scene.contacts.map((_, i) => ({ place: Array.from(row(`place ${i}`, k)),
+        force: Array.from(row(`force ${i}`, k)), normal: Array.from(row(`normal ${i}`, k)),
+        friction: row(`friction ${i}`, k)[0] }));
+      frame.trace = [];
+      for (let n = k; n >= 0 && t - time[n] < TRAIL; n--)
+        frame.trace.push(Array.from(row("pressure", n)));
+      return frame;
+    }
+
+    /** Where the camera looks: below the centre of mass, evened out over 0.3 s, and up from there. */
+    function target(t) {
+      let total = [0, 0, 0], weight = 0;
+      for (let n = -6; n <= 6; n++) {
+        const near = Math.min(end, Math.max(start, t + 0.05 * n));
+        const k = rowAt(near), l = Math.min(k + 1, count - 1);
+        const part = time[l] > time[k] ? (near - time[k]) / (time[l] - time[k]) : 0;
+        const place = between("center", k, k < l ? part : 0), share = 7 - Math.abs(n);
+        if (known(place)) [total, weight] = [plus(total, place, share), weight + share];
+      }
+      return picture.above(weight ? total.map((value) => value / weight) : [0, 0, 0]);
+    }
+
+    function draw(canvas, t, how) {
+      if (heard !== canvas) {
+        heard = canvas;
+        canvas.style.cursor = "grab";
+        heardBy = listen(canvas, () => picture);
+      }
+      return picture.draw(canvas, frameAt(t), target(t), how);
+    }
+    const keys = { ...picture.keys, "r": picture.home, "+": () => picture.zoom(1.2),
+      "-": () => picture.zoom(1 / 1.2) };
+
+    return { ...run, time, count, start, end, curve, rowAt, draw, keys, look: picture.look,
+      dragged: () => Boolean(heardBy?.dragged()), whenMoved: picture.whenMoved,
       pressed: (frame, k) => {
         const { place, force, normal: up } = frame.contacts[k];
         return { normal: known(place) ? dot(force, up) : 0 };
@@ -508,5 +655,5 @@ var HeelstrikeSpace = (() => {
         traces: "trace of the zero moment point" } };
   }
 
-  return { read, placed };
+  return { read, stage, listen, placed, HOME };
 })();

@@ -65,6 +65,7 @@
       settings.paint();
     },
   };
+  at("hint").textContent = picture.hint;
   const sharing = HeelstrikeSharing(view, [picture, curves, settings, theme]);
 
   /* The socket. */
@@ -197,6 +198,15 @@
     at("time").setAttribute("aria-valuetext", told);
   }
 
+  /** Keep on the picture what is drawn: its time, frames so far, force of all pushes. */
+  function noteDrawn({ time, push }) {
+    const { components } = picture, { dataset } = at("plane");
+    const forces = Array.from(push).filter((_, i) => i % (2 * components) >= components);
+    dataset.time = time;
+    dataset.frames = view.course.count;
+    dataset.pushed = Math.hypot(...forces.filter(Number.isFinite));
+  }
+
   let turn = 0, looked = 0, was = null, due = true;
   function show(now) {
     requestAnimationFrame(show);
@@ -210,7 +220,7 @@
       return;
     }
     dirty = false;
-    picture.draw(vector);
+    noteDrawn(picture.draw(vector));
     showTime(vector[0]);
     const thorough = now - looked > READ_FOR || !playing || was !== playing;
     if (thorough) {
@@ -264,8 +274,7 @@
 
   const KEYS = { " ": "play", ArrowLeft: "back", ArrowRight: "forth", r: "reset", p: "random",
     g: "resume", i: "shot", v: "film", l: "link", d: "theme", 0: "view-reset", "?": "help" };
-  const WAYS = [["drag a part", "push it there"], ["drag the ground, wheel", "move, zoom"],
-    ["double click, 0", "the usual view"], ["space", "play, pause"],
+  const WAYS = [...picture.ways, ["double click, 0", "the usual view"], ["space", "play, pause"],
     ["← →", "one step back, forth"], ["shift ← →", "event before, next event"],
     ["+ −", "zoom"], ["g", "go on from the time that is looked at"], ["r", "start again"],
     ["p", "random push"], ["i, v", "save the picture; record a film"], ["l", "copy a link"],
@@ -284,6 +293,10 @@
     if (tagName === "SELECT") return; // it looks for what begins so
     if (["+", "-", "="].includes(event.key)) {
       picture.zoom(event.key === "-" ? 1 / 1.25 : 1.25);
+      return;
+    }
+    if (picture.keys[event.key]) {
+      picture.keys[event.key]();
       return;
     }
     let name = KEYS[event.key];

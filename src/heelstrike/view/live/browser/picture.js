@@ -1,6 +1,7 @@
 /* The picture: where the camera is, what is drawn, and what is pulled at.
 
-   HeelstrikePicture(view) returns {draw, followPull, zoom, settings, use}. */
+   HeelstrikePicture(view) returns {draw, followPull, zoom, components, hint, ways, keys, settings,
+   use}; view/spatial/picture.js is that of robots in space. */
 "use strict";
 
 var HeelstrikePicture = (view) => {
@@ -67,10 +68,6 @@ var HeelstrikePicture = (view) => {
       trail: trail(frame.time), flashes: flashes(frame), steady: view.steady };
     draw(context, view.scene, frame, look);
     if (pull) drawPull(context, look, frame);
-    plane.dataset.time = frame.time;
-    plane.dataset.frames = view.course.count;
-    plane.dataset.pushed = Array.from(frame.push).filter((_, i) => i % 4 > 1)
-      .reduce((sum, f) => sum + (Number.isFinite(f) ? f * f : 0), 0) ** 0.5;
     return frame;
   }
 
@@ -232,6 +229,10 @@ var HeelstrikePicture = (view) => {
 
   return {
     draw: drawFrame, followPull, zoom,
+    components: 2, // of a place and a force
+    hint: "drag a part of the robot to push it",
+    ways: [["drag a part", "push it there"], ["drag the ground, wheel", "move, zoom"]],
+    keys: {},
     /** How it is looked at, as numbers: what a link to it carries. */
     settings: () => ({ zoom: camera.zoom === 1 ? "" : camera.zoom.toPrecision(3),
       at: camera.follows ? "" : `${camera.x.toFixed(3)},${camera.z.toFixed(3)}` }),

@@ -1,0 +1,1 @@
+"""Random scenes in space, and the mechanics with which their records are judged."""
