@@ -26,13 +26,14 @@ import numpy as np
 from numba import types
 
 from heelstrike.compiler.bundle_type import Fixed
-from heelstrike.compiler.compilation import AddressedLoop, dissolved_kernel
+from heelstrike.compiler.compilation import AddressedLoop, dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.solvers.certified_solve import try_solvers
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
+from heelstrike.sim.contacts.loops import begin_closed
 from heelstrike.sim.controller.asking import ask
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.law import controller_in
@@ -97,9 +98,10 @@ class Scene(NamedTuple):
 class Kernels:
     """What a method supplies to the frame; ``work`` is the bundle of the method."""
 
-    begin: Callable[..., int]
-    """Kernel ``begin(model, ground, memory, work, record)``: prepare the first instant; returns
-    ``DONE`` or what is in the way."""
+    begin: Callable[..., int] | None
+    """Kernel ``begin(model, ground, memory, work, record)``: prepare the first instant, at which
+    the loops have been closed; returns ``DONE`` or what is in the way. None of a method that has
+    nothing to prepare."""
     prepare: Callable[..., None]
     """Kernel ``prepare(model, ground, memory, work)``: find kinematics, velocities and contacts of
     the state in ``memory.q`` and ``memory.v``."""
@@ -116,10 +118,11 @@ class Kernels:
 
 
 @dissolved_kernel
-def is_full(record: Record, clock: Clock) -> bool:
-    """Whether there may be no room for what an instant adds to the record."""
-    rows = record.rows + clock.row_margin > record.time.shape[0]
-    return bool(rows or record.events + clock.event_margin > record.event_time.shape[0])
+def is_full(rows: int, events: int, record: Record) -> bool:
+    """Whether there may be no room in the record for so many rows and events more."""
+    told = record.told
+    full = record.rows + rows > record.time.shape[0]
+    return bool(full or told.events + events > told.event_time.shape[0])
 
 
 @dissolved_kernel
@@ -132,7 +135,13 @@ def is_due(clock: Clock) -> bool:
 
 def frame(kernels: Kernels) -> Callable[..., int]:
     """Return the loop of a method."""
-    begin, prepare, decide = kernels.begin, kernels.prepare, kernels.decide
+
+    @kernel
+    def nothing(model: Any, ground: Any, memory: Any, work: Any, record: Any) -> int:  # noqa: ARG001
+        return DONE
+
+    begin = nothing if kernels.begin is None else kernels.begin
+    prepare, decide = kernels.prepare, kernels.decide
     report, move = kernels.report, kernels.move
 
     def advance(
@@ -142,14 +151,17 @@ def frame(kernels: Kernels) -> Callable[..., int]:
         """Advance a simulation until its time is up or something stops it; return what."""
         controller = controller_in(control.function)
         scene = Scene(controller, model, ground)
+        q, v, equations = memory.q, memory.v, memory.equations
         if clock.moving == TOLD:  # taken up again, to be left or looked at
             if clock.finishing == 0 and clock.time >= clock.until:
                 return DONE
             clock.moving = 1 - clock.finishing
         while True:
-            if is_full(record, clock):
+            if is_full(clock.row_margin, clock.event_margin, record):
                 return RECORD_FULL
             if clock.begun == 0:
+                if not begin_closed(model, q, equations, memory.loops, v):
+                    return DIVERGED
                 code = begin(model, ground, memory, work, record)
                 if code != DONE:
                     return code
@@ -160,18 +172,19 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                         return DONE
                     if clock.index >= clock.pause:
                         return PAUSED
-                if not sound(memory):
+                if not sound(q, v):
                     return DIVERGED
                 prepare(model, ground, memory, work)
                 if is_due(clock):
                     if control.in_python == 0:
-                        q, v, command = memory.q, memory.v, memory.command
-                        ask(controller, clock.time, q, v, model, memory, control, command)
+                        tree, contacts, command = equations.tree, memory.contacts, memory.command
+                        ask(controller, clock.time, q, v, model, tree, contacts, control, command)
                     elif clock.answered == 0:
                         return ASKING
                     clock.answered = 0
                     clock.calls += 1
-                if not limit_torque(model, control, memory):
+                command, torque = memory.command, memory.torque
+                if not limit_torque(model, control.voltage, v, memory.tally, command, torque):
                     return BAD_CONTROLLER
                 if control.robot.ending >= 0:
                     clock.finishing = 1
@@ -181,7 +194,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                 note_log(control.kept, control.logged, record)
                 if code != DONE:
                     return code
-                if center_height(model, ground, memory.equations.tree) < clock.fallen_height:
+                if center_height(model, ground, equations.tree) < clock.fallen_height:
                     clock.moving = TOLD
                     return FELL
                 if control.robot.ending >= 0:

@@ -4,31 +4,40 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from heelstrike.compiler.bundle import Bundle, array, cell
+from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.run import QUANTITIES
+
+
+class Told(Bundle):
+    """The events of a run, as far as they are known."""
+
+    events: int = cell(int)
+    """How many there are."""
+    event_time: Floats = array("ne")
+    event_kind: Integers = array("ne", of=int)
+    event_contact: Integers = array("ne", of=int)
+    event_impulse: Floats = array("ne", "components")
+    """event_time, event_kind, event_contact, event_impulse: When each was (s), what, of which
+    contact point, joint or constraint, and its impulse (N s)."""
 
 
 class Record(Bundle):
     """Rows of a run, filled by the compiled loop, one row an instant.
 
     Forces and torques of a row are those decided at its instant and acting over the step that
-    follows. `rows` and `events` are the numbers of rows used. Every recorded quantity of a
+    follows. `rows` is how many are used. Every recorded quantity of a
     :class:`~heelstrike.Run` has an array by its name. `log` holds the words of what the controller
     logged, of the first `logged` rows.
     """
 
     rows: int = cell(int)
-    events: int = cell(int)
+    told: Told = part(Told, flat=True)
     logged: int = cell(int)
     time: Floats = array("nt")
     vars().update({name: array("nt", *each.shape) for name, each in QUANTITIES.items()})
     log: Integers = array("nt", "words", of=int)
-    event_time: Floats = array("ne")
-    event_kind: Integers = array("ne", of=int)
-    event_contact: Integers = array("ne", of=int)
-    event_impulse: Floats = array("ne", "components")
 
     if TYPE_CHECKING:
 

@@ -136,14 +136,14 @@ def show_state(
 
 @kernel
 def ask_law(
-    controller: Any, time: float, model: SpatialModel, control: SpatialControl,
-    memory: SpatialMemory,
+    controller: Any, time: float, model: SpatialModel, q: Floats, v: Floats,
+    control: SpatialControl, command: Floats,
 ) -> None:  # fmt: skip
     """Ask a compiled controller for its commands."""
-    show_state(model, control.robot, memory.q, memory.v, control.state)
+    show_state(model, control.robot, q, v, control.state)
     controller(
         time, address_of(control.state), address_of(control.contacts), address_of(control.robot),
-        control.parameters_at, control.memory_at, control.log_at, memory.command,
+        control.parameters_at, control.memory_at, control.log_at, command,
     )  # fmt: skip
 
 

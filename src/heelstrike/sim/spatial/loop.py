@@ -149,7 +149,7 @@ def advance_in_space(
         )  # fmt: skip
         if clock.index % clock.control_every == 0 or clock.begun == 0:
             if control.in_python == 0:
-                ask_law(controller, time, model, control, memory)
+                ask_law(controller, time, model, memory.q, memory.v, control, memory.command)
             elif clock.answered == 0:
                 return ASKING
         clock.answered = 0
