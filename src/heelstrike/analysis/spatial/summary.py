@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.support import pushing_in_space
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
-from heelstrike.analysis.summary import UNKNOWN, Words, plain
+from heelstrike.analysis.summary import UNKNOWN
+from heelstrike.analysis.told_summary import ToldSummary, Words
 from heelstrike.field_texts import dataclass
-from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.model import Floats
-from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.spatial.record import SpatialEventKind
 from heelstrike.sim.spatial.run import SpatialRun, SpatialSolverCount
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    pass
 
 SHORTEST_WAY = 1e-3
 """Distance (m) below which energy a distance means nothing."""
@@ -30,7 +27,7 @@ MOST_LOOKED_AT = 2000
 
 
 @dataclass(frozen=True)
-class SpatialSummary(ShownInNotebooks):
+class SpatialSummary(ToldSummary):
     """Figures of a run in space. Those that do not exist for it are NaN (null in JSON)."""
 
     robot: str
@@ -86,46 +83,8 @@ class SpatialSummary(ShownInNotebooks):
     energy_gain_J: float = 0.0  # noqa: N815 - units keep their capitals
     """Kinetic energy that restitution with friction made in impacts."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain dictionaries, lists and numbers, with None for what does not exist."""
-        found: dict[str, Any] = plain(asdict(self))
-        return found
-
-    def to_json(self, *, indent: int | None = 2) -> str:
-        """Return the summary as JSON text.
-
-        Parameters
-        ----------
-        indent : int or None
-            Spaces of indentation; None for one line.
-
-        Returns
-        -------
-        str
-            What :meth:`to_dict` returns, as JSON.
-        """
-        return json.dumps(self.to_dict(), indent=indent, allow_nan=False, ensure_ascii=False)
-
-    def __str__(self) -> str:
-        rows = spatial_lines(self)
-        width = max(len(label) for label, _ in rows)
-        return "\n".join([self._title(), *(f"{label:<{width}}  {value}" for label, value in rows)])
-
-    def __rich__(self) -> Table:
-        from rich.table import Table
-
-        good = self.status == RunStatus.COMPLETED.value
-        table = Table(
-            title=self._title(), title_style="bold green" if good else "bold red", show_header=False
-        )
-        table.add_column(style="cyan", no_wrap=True)
-        table.add_column()
-        for label, value in spatial_lines(self):
-            table.add_row(label, value)
-        return table
-
-    def _title(self) -> str:
-        return f"{self.robot}: {self.message}"
+    def _lines(self) -> list[tuple[str, str]]:
+        return spatial_lines(self)
 
 
 def summarize_in_space(run: SpatialRun) -> SpatialSummary:
