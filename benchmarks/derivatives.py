@@ -44,8 +44,8 @@ def differentiate_often(
     for _ in range(count):
         differentiate_step(
             model, work.step, work.scheme, memory.stiffness, memory.next_v, memory.equations.added,
-            memory.contacts.normal, memory.rows, memory.surface, memory.pushes, memory.assembly,
-            work.impact, slopes,
+            memory.contacts.normal, memory.rows, memory.surface, memory.assembly, work.impact,
+            memory.pushes, slopes,
         )  # fmt: skip
 
 

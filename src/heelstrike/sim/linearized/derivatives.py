@@ -361,7 +361,7 @@ class _TimeSteps:
             differentiate_step(
                 robot.model, work.step, work.scheme, memory.stiffness, memory.next_v,
                 memory.equations.added, memory.contacts.normal, memory.rows, memory.surface,
-                memory.pushes, memory.assembly, work.impact, slopes,
+                memory.assembly, work.impact, memory.pushes, slopes,
             )  # fmt: skip
             close_positions(robot.model, work, memory, slopes)
             moved = slopes.state[:, :size] @ change[:size]

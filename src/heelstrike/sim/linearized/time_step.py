@@ -139,8 +139,8 @@ def allocate_slopes(
 @kernel
 def differentiate_step(
     model: Model, step: float, scheme: int, stiffness: Floats, next_v: Floats, added: Floats,
-    normal: Floats, table: Rows, surface: Surface, pushes: Pushes, assembly: Assembly,
-    impact: Impact, slopes: StepSlopes,
+    normal: Floats, table: Rows, surface: Surface, assembly: Assembly, impact: Impact,
+    pushes: Pushes, slopes: StepSlopes,
 ) -> None:  # fmt: skip
     """Differentiate the step that has just been taken from ``slopes.q``, ``slopes.v``.
 
@@ -148,7 +148,7 @@ def differentiate_step(
 
     Parameters
     ----------
-    stiffness, next_v, added, normal, table, surface, pushes, assembly
+    stiffness, next_v, added, normal, table, surface, assembly, pushes
         As the simulation's memory has them; `added` is that of its equations, `normal` that of its
         contacts.
     impact : Impact

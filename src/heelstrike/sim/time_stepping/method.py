@@ -437,8 +437,8 @@ def are_usual(candidate: Integers, near: int, program: int, usual: UsualPoints) 
 
 @dissolved_kernel
 def select_candidates(
-    model: Model, curved: bool, rule: Rule, contacts: Contacts, surface: Surface, tree: Workspace,
-    next_v: Floats, called: Integers, usual: UsualPoints, bounce: Floats, listing: Listing,
+    model: Model, curved: bool, rule: Rule, contacts: Contacts, surface: Surface, next_v: Floats,
+    called: Integers, tree: Workspace, usual: UsualPoints, bounce: Floats, listing: Listing,
 ) -> int:  # fmt: skip
     """List the contact points that could act in this step, with their free terms.
 
@@ -778,8 +778,8 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         )  # fmt: skip
         if impact.relaxed == 1:
             push_out(
-                model, near, count, straight, step, work.order, gap, contacts, points, equations,
-                problem, memory.solver, usual.point_impulse, assembly, impact,
+                model, near, count, straight, step, work.order, gap, contacts, points, problem,
+                equations, memory.solver, usual.point_impulse, assembly, impact,
             )  # fmt: skip
         members = find_members(step, before, gap, impact.touching, problem, assembly, impact.member)
         for place in range(members):
@@ -810,7 +810,7 @@ def write_unit(joint: int, sign: float, row: Floats) -> None:
 @kernel
 def push_out(
     model: Model, near: int, count: int, straight: bool, step: float, order: Integers, gap: Floats,
-    contacts: Contacts, points: Integers, equations: Equations, problem: ContactProblem,
+    contacts: Contacts, points: Integers, problem: ContactProblem, equations: Equations,
     solver: ContactWorkspace, point_impulse: Floats, assembly: Assembly, impact: Impact,
 ) -> None:  # fmt: skip
     """Let the positions of a wedge come out of the ground, where a way without friction leads."""
@@ -884,7 +884,7 @@ def far_beyond(step: float, own: int, outside: Writers) -> float:
 
 @kernel
 def call_points(
-    model: Model, step: float, v: Floats, tree: Workspace, contacts: Contacts, usual: UsualPoints,
+    model: Model, step: float, v: Floats, contacts: Contacts, tree: Workspace, usual: UsualPoints,
     calls: Calls,
 ) -> None:  # fmt: skip
     """Call the contact points that would go through at the velocity that was found."""
@@ -945,7 +945,7 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
             assembly.answer.residual[i] = 0.0
         rule = Rule(step, scheme, work.activation, calls.count, impact.relaxed)
         near = select_candidates(
-            model, curved, rule, contacts, surface, tree, next_v, called, usual, impact.bounce,
+            model, curved, rule, contacts, surface, next_v, called, tree, usual, impact.bounce,
             listing,
         )  # fmt: skip
         note_group(POINT, 0, near, assembly)
@@ -988,7 +988,7 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
                 assembly, usual,
             )  # fmt: skip
             if again:
-                call_points(model, step, moved, tree, contacts, usual, calls)
+                call_points(model, step, moved, contacts, tree, usual, calls)
                 call_joints(step, q, moved, rows, calls)
                 again = calls.count > rule.calls
     if calls.count > 0:
