@@ -172,7 +172,7 @@ def recorded_run(
     recorded: dict[str, Any] = {
         name: np.ascontiguousarray(
             np.broadcast_to(
-                given.get(name, 0.0), (rows, *(extents[each] for each in quantity.shape))
+                given.get(name, 0.0), (rows, *(extents[str(each)] for each in quantity.shape))
             ),
             dtype=np.float64,
         )

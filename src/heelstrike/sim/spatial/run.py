@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from heelstrike.analysis.spatial.summary import SpatialSummary
 
 
-SpatialEvent, SpatialSolverCount = Event, SolverCount
-"""Those of the plane: an event has three components of impulse in space."""
+SpatialEvent = Event
+SpatialSolverCount = SolverCount
+"""SpatialEvent, SpatialSolverCount: Those of the plane. In space an event has three components of
+impulse."""
 
 
 @dataclass(frozen=True)
