@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 SpatialEvent = Event
 SpatialSolverCount = SolverCount
-"""Those of the plane: an event has three components of impulse in space."""
+"""SpatialEvent, SpatialSolverCount: Those of the plane. In space an event has three components of
+impulse."""
 
 
 @dataclass(frozen=True)
