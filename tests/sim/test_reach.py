@@ -47,8 +47,9 @@ NOT_YET: dict[str, int] = {
     "sim.frame": 1,
     "sim.linearized.time_step": 2,
     "sim.record.recording": 7,
-    "sim.spatial.candidates": 2,
-    "sim.spatial.controlled": 1,
+    "sim.spatial.candidates": 1,
+    "sim.spatial.controlled": 2,  # the frame asks in space as in the plane
+    "sim.spatial.method": 4,
     "sim.time_stepping.corners": 1,
     "sim.time_stepping.method": 16,
 }

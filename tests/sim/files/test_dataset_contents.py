@@ -97,7 +97,7 @@ EVENT_KINDS = {
     "touchdown": 0, "liftoff": 1, "slip": 2, "stick": 3, "slip_reversal": 4, "impact": 5, "zeno": 6,
     "painleve": 7, "energy_gain": 8, "joint_stop": 9, "joint_slip": 10, "joint_stick": 11,
     "bridge": 12, "wedged": 13, "joint_release": 14,
-    "joint_brake": 15, "constraint_holds": 16, "constraint_lets_go": 17,
+    "joint_brake": 15, "constraint_holds": 16, "constraint_lets_go": 17, "uncertified": 18,
 }  # fmt: skip
 
 ROWS = 3

@@ -103,7 +103,6 @@ def _attributes(run: AnyRun, layout: Layout) -> dict[str, Any]:
     return {
         "heelstrike_format": FORMAT,
         "title": f"heelstrike run of {run.robot.name}",
-        "dimension": layout.axes,
         "robot": run.robot.name,
         "status": run.status.value,
         "message": _writable(run.message),

@@ -127,7 +127,8 @@ class _Space(Layout):
         }
 
     def attributes(self, run: SpatialRun) -> dict[str, Any]:
-        return {f"ground_{name}": float(getattr(run.ground, name)) for name in SCALARS}
+        ground = {f"ground_{name}": float(getattr(run.ground, name)) for name in SCALARS}
+        return {"dimension": SPATIAL, **ground}
 
     def stored_ground(
         self,

@@ -168,10 +168,7 @@ def height_of_mass(
 
 
 @dissolved_kernel
-def begin(
-    model: SpatialModel, ground: SpatialGroundModel, memory: SpatialMemory,
-    work: SpatialStepping, record: SpatialRecord,
-) -> int:  # fmt: skip
+def begin(model: Any, ground: Any, memory: Any, work: Any, record: Any) -> int:
     """Nothing has to be done before the first instant."""
     return DONE
 

@@ -41,7 +41,7 @@ note_row = row_writer(RECORDED, __name__)
 @kernel
 def log_spatial_event(
     time: float, kind: int, contact: int, impulse: tuple[float, float, float],
-    record: SpatialRecord,
+    record: RowsAndEvents,
 ) -> None:  # fmt: skip
     """Append an event."""
     event = record.events
@@ -63,7 +63,7 @@ def note_deepest(faces: int, gap: Floats, tally: SpatialTally) -> None:
 @kernel
 def note_spatial_events(
     time: float, end: float, step: float, first_step: bool, v: Floats, slip: Floats,
-    table: BlockTable, reported: SpatialReported, record: SpatialRecord,
+    table: BlockTable, reported: SpatialReported, record: RowsAndEvents,
 ) -> None:  # fmt: skip
     """Find what happened in a step that ends at `end`, to every entry of the table.
 

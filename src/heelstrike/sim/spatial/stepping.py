@@ -355,8 +355,8 @@ def share_forces(
 
 @kernel
 def find_slip(
-    model: SpatialModel, v: Floats, feet: SpatialFeet, table: BlockTable,
-    assembly: SpatialAssembly, tree: SpatialWorkspace, slip: Floats,
+    model: SpatialModel, v: Floats, feet: SpatialFeet, kind: Integers, count: int,
+    candidate: Integers, tree: SpatialWorkspace, slip: Floats,
 ) -> None:  # fmt: skip
     """Write the tangential velocity of the contact points that take part, at the end of the step.
 
@@ -365,9 +365,9 @@ def find_slip(
     link_velocities(model, v, tree)
     for contact in range(model.nc):
         slip[contact, 0] = slip[contact, 1] = 0.0
-    for place in range(assembly.count):
-        contact = assembly.candidate[place]
-        if table.kind[contact] != POINT:  # points come first in the table, each in its own place
+    for place in range(count):
+        contact = candidate[place]
+        if kind[contact] != POINT:  # points come first in the table, each in its own place
             continue
         foot = feet.foot[contact, 0], feet.foot[contact, 1], feet.foot[contact, 2]
         speed = point_velocity(tree, model.contact_link[contact], foot)
@@ -437,8 +437,8 @@ def take_step(
         counts.relaxed += memory.wedge.relaxed
         if done + 1 == parts:
             find_slip(
-                model, memory.next_v, memory.feet, memory.blocks, memory.assembly,
-                memory.equations.tree, reaction.slip,
+                model, memory.next_v, memory.feet, memory.blocks.kind, memory.assembly.count,
+                memory.assembly.candidate, memory.equations.tree, reaction.slip,
             )  # fmt: skip
         integrate(model, memory.q, memory.impact.arriving, step, memory.q)
         for k in range(model.nv):
