@@ -175,7 +175,7 @@ class PoincareMap:
     control_period : float, optional
         Seconds between two calls of the controller, counted from the beginning of the step.
     carried : Carried
-        What the controller remembers from step to step; of the rest it begins afresh.
+        What the controller remembers from step to step; the rest starts again.
 
     Raises
     ------

@@ -345,7 +345,7 @@ _MOLDS: WeakKeyDictionary[Robot, dict[Method, Mold[Any]]] = WeakKeyDictionary()
 class UnknownMethod:
     """What a file tells of a method whose class, or that of a law of it, is not known.
 
-    Runs made with it can be looked at, compared and saved again, but not gone on with.
+    Runs made with it can be looked at, compared and saved again, but not continued.
     """
 
     name: str

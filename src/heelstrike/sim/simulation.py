@@ -499,7 +499,7 @@ class Simulation:
             instant = self.method.instant(self._clock, until)
         if instant < self.time:
             raise SimulationError(
-                f"until must not be before the present time, {self._now} s; got {until}"
+                f"until must not be before the present time, {self._now}; got {until}"
             )
         return self._advance(instant, NEVER, progress)
 

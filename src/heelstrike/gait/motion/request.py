@@ -52,7 +52,7 @@ class MotionRequest:
     landing_speed: float
     """Least speed towards the ground (m/s) of points that come down."""
     cost: Any
-    """What is to be least."""
+    """What is minimised."""
     speed: float | None
     """Mean speed (m/s)."""
     total: float | None

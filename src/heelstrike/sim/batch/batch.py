@@ -293,7 +293,7 @@ class Batch:
         Raises
         ------
         SimulationError
-            If that is no whole number ≥ 1, or the mask none.
+            If that is not a whole number ≥ 1, or the mask is not a mask.
         """
         given: object = steps
         if not (isinstance(given, int | np.integer) and given >= 1):

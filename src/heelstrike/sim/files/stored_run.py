@@ -184,7 +184,7 @@ def _events(stored: Stored, robot: Robot, sizes: dict[str, int]) -> tuple[Event,
     known = {each.value for each in EventKind}
     for k, c in zip(kind.tolist(), contact.tolist(), strict=True):
         if k not in known:
-            raise DamageError(f"an event is of kind {k}, which is none")
+            raise DamageError(f"an event has the unknown kind {k}")
         # A bridge is one of the whole robot, but every robot has a joint.
         of_joint = EventKind(k).of_joint or k == EventKind.BRIDGE
         where, count = ("joint", robot.nv) if of_joint else ("contact point", robot.nc)
