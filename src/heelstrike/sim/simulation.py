@@ -847,7 +847,9 @@ class Simulation:
         for what, mine in self._identity.items():
             its = snapshot.identity.get(what)
             if its != mine:
-                raise SimulationError(f"the snapshot is one of another {what}: {its}, not {mine}")
+                raise SimulationError(
+                    f"the snapshot has another {what}, {its}; the simulation has {mine}"
+                )
         self._put_back(snapshot)
         self._recorded_until = snapshot.time
         self._records.clear()
