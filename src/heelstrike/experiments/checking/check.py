@@ -42,7 +42,7 @@ KNOTS = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """What a check of a motion came to."""
+    """The result of a check of a motion."""
 
     motion: RecordedMotion
     """The motion."""

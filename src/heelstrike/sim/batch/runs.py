@@ -52,7 +52,7 @@ SHOWN = 10
 
 @dataclass(frozen=True, eq=False)
 class BatchResult:
-    """What many simulations came to."""
+    """How many simulations ended, with their records if they were kept."""
 
     position: Floats
     """(n, nq)"""
