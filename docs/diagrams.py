@@ -91,7 +91,7 @@ def stick(axes: Axes, robot: hs.Robot, q: np.ndarray, shift: Point = (0.0, 0.0))
 
 def frames() -> Figure:
     """World frame, a link that turns, zero and sense of the joints."""
-    figure = new_figure(10.0, 3.6)
+    figure = new_figure(8.6, 3.2)
     world, link, zero, bent = figure.subplots(1, 4, width_ratios=(1.0, 1.0, 0.75, 0.95))
 
     bare(world, "World frame", (-0.35, 1.25), (-0.75, 1.25))
@@ -141,10 +141,10 @@ def frames() -> Figure:
         before = turned["root_pitch"] + whole
         whole += turned[f"right_{joint}"]
         along = -np.pi / 2 - before  # where the link would point at zero
-        far = 0.34
+        far = 0.2 if joint == "ankle" else 0.34
         ahead = at + far * np.array([np.cos(along), np.sin(along)])
         bent.plot(*np.array([at, ahead]).T, color=GREY, linestyle=":", zorder=4)
-        turn(bent, at, 0.28, along, along - turned[f"right_{joint}"], VERMILION)
+        turn(bent, at, 0.8 * far, along, along - turned[f"right_{joint}"], VERMILION)
         above = 0.14 if joint == "ankle" else 0.08
         word(bent, (at[0] - 0.1, at[1] + above), joint, VERMILION, "right")
     hip = dynamics.point_position(robot, q, "trunk", (0.0, 0.0))

@@ -200,7 +200,7 @@ def test_a_search_that_is_given_no_time() -> None:
 
 def test_usable_arguments() -> None:
     robot, state = mechanisms.compass_gait(), compass_state(-0.2, 0.34, 1.05, 0.35)
-    with pytest.raises(hs.SimulationError, match="event-driven"):
+    with pytest.raises(hs.SimulationError, match="need EventDriven"):
         hs.find_limit_cycle(robot, state, method=hs.TimeStepping())  # type: ignore[arg-type]
     stairs = hs.Ground.stairs(rise=-0.01, tread=0.3, count=3)
     with pytest.raises(hs.SimulationError, match="flat or sloping"):
@@ -375,7 +375,7 @@ def test_a_walk_that_does_not_keep_step_with_its_samples() -> None:
 def test_arguments_of_controllers_that_begin_afresh() -> None:
     robot, state = mechanisms.compass_gait(), compass_state(-0.2, 0.34, 1.05, 0.35)
     for points in ([0], np.array([0, 1])):
-        with pytest.raises(hs.SimulationError, match="landing is of controllers that begin afresh"):
+        with pytest.raises(hs.SimulationError, match="landing is for controllers that restart"):
             hs.find_limit_cycle(robot, state, landing=points, afresh=False)  # type: ignore[arg-type]
     kept = hs.Simulation(robot, state=state).snapshot()
     with pytest.raises(hs.SimulationError, match="from a Snapshot use afresh=False"):

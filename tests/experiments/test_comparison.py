@@ -85,7 +85,7 @@ def test_what_compare_refuses() -> None:
         }
         hs.compare(walking.bravo7(), None, **arguments)  # type: ignore[arg-type]
 
-    with pytest.raises(hs.SimulationError, match="no method"):
+    with pytest.raises(hs.SimulationError, match="at least one method"):
         asked(methods=[])
     with pytest.raises(hs.SimulationError, match="the same"):
         asked(methods=[hs.TimeStepping(), hs.TimeStepping()])

@@ -96,7 +96,9 @@ def test_a_robot_whose_walk_is_not_known() -> None:
     builder = hs.RobotBuilder("hopper")
     trunk = builder.floating_base("trunk", (0, 1), mass=1, inertia=1)
     builder.contact(trunk, (0, -1))
-    with pytest.raises(hs.LimitCycleError, match="'hopper' has no motors, and where its walk"):
+    with pytest.raises(
+        hs.LimitCycleError, match="'hopper' has no motors, and no start of its walk"
+    ):
         passive_walk(builder.build(), slope(-3.0))
 
 

@@ -240,7 +240,9 @@ def test_stopping_when_fallen_can_be_given_up_with_a_snapshot() -> None:
 def test_a_push_that_is_over_is_refused() -> None:
     simulation = begun("time stepping")
     simulation.advance(0.02)
-    with pytest.raises(hs.SimulationError, match=r"over since t = 0.015 s: now is t = 0.02 s"):
+    with pytest.raises(
+        hs.SimulationError, match=r"ends at t = 0.015 s, before the present time, t = 0.02 s"
+    ):
         simulation.apply(hs.Push("trunk", force=(5.0, 0.0), start=0.005, duration=0.01))
     assert simulation.record.pushes == ()
 

@@ -121,7 +121,7 @@ def find_limit_cycle(
     controller : object with ``torque(t, state, contacts)``, or None
         What makes it walk.
     afresh : bool
-        Whether the controller begins afresh at every touchdown: at time 0, with the memory it
+        Whether the controller restarts at every touchdown: at time 0, with the memory it
         starts with but for the members that `memory` names. Otherwise it goes on from step to step
         with all that it remembers and on its own clock, as it does in simulations, and what repeats
         is the middle of the same foot's step.
@@ -133,7 +133,7 @@ def find_limit_cycle(
         ``swing_feet_pass=True``.
     control_period : float, optional
         Seconds between two calls of the controller, whose torques are held between them; counted
-        from every touchdown if it begins afresh there. By default that of the controller, or it
+        from every touchdown if it restarts there. By default that of the controller, or it
         acts continuously.
     memory : sequence of str, optional
         With `afresh`, members of the controller's memory that are carried from step to step: part
@@ -193,7 +193,7 @@ def find_limit_cycle(
         for name, told in given.items():
             if told:
                 raise SimulationError(
-                    f"{name} is of controllers that begin afresh at every touchdown; without "
+                    f"{name} is for controllers that restart at every touchdown; without "
                     "afresh all memory is carried and no leg relabelled"
                 )
         loop = ClosedLoop(

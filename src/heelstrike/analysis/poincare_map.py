@@ -175,7 +175,7 @@ class PoincareMap:
     control_period : float, optional
         Seconds between two calls of the controller, counted from the beginning of the step.
     carried : Carried
-        What the controller remembers from step to step; of the rest it begins afresh.
+        What the controller remembers from step to step; the rest starts again.
 
     Raises
     ------
@@ -313,7 +313,9 @@ def check_steps(robot: Robot, ground: Ground) -> None:
         If the ground is not one line, or the robot not free to move along it.
     """
     if len(ground.model().friction) > 1:
-        raise SimulationError("a step repeats only on flat or evenly sloping ground")
+        raise SimulationError(
+            "a step repeats only on flat or sloping ground that is the same at every step"
+        )
     if not np.array_equal(robot.model.axis[:2], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]):
         raise SimulationError(
             "a step repeats only for a robot that is free to move along the ground; the "

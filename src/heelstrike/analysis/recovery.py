@@ -1,4 +1,4 @@
-"""Whether a robot found back to its walk after a push, strictly.
+"""Judge, strictly, whether a robot recovered its walk after a push.
 
 A run that completes is no recovery by itself: a robot that kneels, or walks backwards, completes.
 """
@@ -24,7 +24,7 @@ SLOW = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Recovery:
-    """What became of a robot after a push."""
+    """Whether a robot recovered from a push."""
 
     recovered: bool
     """Whether it recovered, strictly."""

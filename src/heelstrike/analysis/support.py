@@ -131,7 +131,7 @@ def double_support_fraction(run: Run) -> float:
 
 @dataclass(frozen=True)
 class Stance:
-    """Stay of a foot on the ground, from its touchdown to its lift-off."""
+    """Stance of a foot on the ground, from its touchdown to its lift-off."""
 
     foot: int
     """Index of the foot."""
@@ -144,7 +144,7 @@ class Stance:
 
 
 def stances(run: Run) -> tuple[Stance, ...]:
-    """List the stays of all feet on the ground in the order of their touchdowns.
+    """List the stances of all feet in the order of their touchdowns.
 
     A foot that pushes in the first row touches down there, with no impulse.
 

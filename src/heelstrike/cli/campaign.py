@@ -32,7 +32,7 @@ def campaign(
     out: Annotated[
         Path | None,
         typer.Option(
-            file_okay=False, help="Folder of the outcomes; gone on with from there.",
+            file_okay=False, help="Folder of the outcomes; the campaign resumes from it.",
             show_default="the file's name without .toml",
         ),
     ] = None,
@@ -57,8 +57,8 @@ def campaign(
 ) -> None:  # fmt: skip
     """Simulate many trials of a walk, each with other numbers.
 
-    Outcomes are kept in campaign.sqlite, block by block: after Ctrl-C, or worse, the same command
-    goes on, and what it comes to is the same.
+    Outcomes are saved in campaign.sqlite, block by block. After Ctrl-C, or if the process is
+    killed, the same command resumes, with the same result.
     """
     match what:
         case ["replay", folder, number] if number.isdecimal():

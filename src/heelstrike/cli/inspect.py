@@ -57,7 +57,7 @@ def inspect(
     pushes = pushes_called(push)
     if picture is None and (surface is not None or pushes):
         raise typer.BadParameter(
-            "ground and pushes appear in the picture only: give its file", param_hint="--out"
+            "ground and pushes need a picture: give its file", param_hint="--out"
         )
     if dimension == SPACE:
         if surface is not None or pushes:

@@ -320,7 +320,7 @@ class Bundle:
         ------
         TypeError
             If an extent is missing, or something is given that is neither a member nor an extent
-            of an array, or no whole number.
+            of an array, or not a whole number.
         """
         kind: Any = cls
         members = {name: known[name] for name in _whole_numbers(kind) if name in known}

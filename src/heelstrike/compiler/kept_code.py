@@ -37,7 +37,7 @@ _said: set[str] = set()
 
 
 class CacheWarning(UserWarning):
-    """Machine code could not be read from disk, or not be kept there; all else is as ever."""
+    """Machine code could not be read from disk, or not be kept there; nothing else changes."""
 
 
 def directories(source: Path | None) -> list[Path]:

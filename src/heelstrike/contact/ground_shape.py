@@ -43,7 +43,7 @@ SURE = 1e-8
 
 
 class GroundShape(KernelObject):
-    """A smooth ground: how high it is at every place.
+    """The shape of a smooth ground: its height at every place.
 
     A subclass is a frozen dataclass of numbers with one kernel, ``height(self, x)``, which returns
     the height (m), its slope dz/dx and the rate of that, d²z/dx² (1/m), at a place x (m). They must

@@ -78,7 +78,7 @@ def solve_contact_kernel(
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """The solution of a contact problem, with the proof of what it is worth."""
+    """The solution of a contact problem, with its certificate."""
 
     impulse: Floats
     """(nc, 2) Normal and tangential impulse (or force) on the robot at each contact; where several

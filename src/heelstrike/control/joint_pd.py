@@ -31,7 +31,7 @@ from heelstrike.sim.controller.stance_clock import StanceClock, exchange_at_touc
 
 
 class Feedforward(StrEnum):
-    """What a law of springs and dampers knows of the robot's dynamics.
+    """How much of the robot's dynamics a law of springs and dampers feeds forward.
 
     Attributes
     ----------

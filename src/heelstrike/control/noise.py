@@ -25,7 +25,7 @@ def seeded(seed: int) -> list[int]:
     Raises
     ------
     ControllerError
-        If the seed is no whole number from 0 on.
+        If the seed is not a whole number from 0 on.
     """
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise ControllerError(f"a seed is a whole number from 0 on, got {seed!r}")

@@ -409,7 +409,7 @@ def periods(name: str, time: float, period: float) -> int:
     Raises
     ------
     ControllerError
-        If it is no whole number of them.
+        If it is not a whole number of them.
     """
     if not (math.isfinite(time) and time >= 0.0):
         raise ControllerError(f"the {name} must be a number ≥ 0 (s), got {time!r}")

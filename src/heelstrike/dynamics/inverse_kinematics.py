@@ -1,4 +1,4 @@
-"""Where the joints of a leg must be so that a point of its foot is where it shall be.
+"""Find joint positions of a leg that bring a point of its foot to a place.
 
 Damped least squares (Levenberg and Marquardt): a step δ = Jᵀ(J Jᵀ + λ)⁻¹ e brings the point nearer
 by all that the joints can do, λ grows when it does not and shrinks when it does, and joints at the

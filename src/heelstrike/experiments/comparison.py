@@ -164,7 +164,7 @@ def compare(
     pushes: Sequence[Push] = (),
     on_error: OnError | str = OnError.WARN,
 ) -> Comparison:
-    """Simulate the same thing by several methods and tell how far their answers differ.
+    """Simulate the same walk by several methods and report how far the results differ.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class Planned:
     walks: bool
     """Whether the robot walked all steps."""
     message: str
-    """What stands against it; nothing if it walks."""
+    """What is wrong with it; nothing if it walks."""
     torque_cost: float = UNKNOWN
     """∫ΓᵀΓ dt over the distance (N²m s)."""
     cost_of_transport: float = UNKNOWN

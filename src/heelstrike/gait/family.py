@@ -171,8 +171,8 @@ def gait_family(
     step_length, step_duration, speed, slope, rise : float or sequence of float, optional
         As of :func:`heelstrike.optimize_gait`; a sequence is an axis.
     file : path, optional
-        Where the family is kept after every gait. If it is there already it is gone on with: what
-        Ctrl-C interrupted is resumed by the same call.
+        Where the family is saved after every gait. If the file exists, the call resumes the family
+        in it, as after Ctrl-C.
     progress : callable, optional
         Called now and then with the fraction of the work that is done.
     **asked

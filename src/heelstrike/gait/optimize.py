@@ -106,7 +106,7 @@ def optimize_gait(
         By how much (m) every foothold is higher than the one before, on level stairs whose treads
         are `step_length` deep; negative downstairs.
     cost : str, mapping or function
-        What is to be least over the step, or per metre where length or duration are free:
+        What is minimised over the step, or per metre where length or duration are free:
         ``"torque"``, ``"mechanical_energy"``, ``"electrical_energy"`` (:class:`Cost`); several of
         them with their weights; or a function of an :class:`Instant` that returns the rate as an
         expression of CasADi.

@@ -227,7 +227,7 @@ class Program:
         return self._spent(self.transcription.effort, unknowns)
 
     def cost(self, unknowns: Floats) -> float:
-        """What was asked to be least, over the step, in its own unit."""
+        """What was minimised, over the step, in its own unit."""
         return self._spent(self.transcription.path, unknowns)
 
     def _spent(self, rate: Any, unknowns: Floats) -> float:

@@ -326,7 +326,7 @@ class RobotBuilder:
         try:
             factors = [_number("a coefficient of its polynomial", each) for each in polynomial]
         except RobotError as error:
-            raise self._error(f"joint {joint!r} follows: {error}") from None
+            raise self._error(f"coupling of joint {joint!r}: {error}") from None
         self._couplings.append((places, (*factors, *[0.0] * (POWERS - len(factors)))))
 
     def latch(self, joint: str, end: str, *, release: str | None = None) -> None:

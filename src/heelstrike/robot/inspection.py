@@ -47,7 +47,7 @@ LEG_ROUNDING = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """A look at a robot."""
+    """The result of an inspection of a robot."""
 
     source: str
     """What was looked at."""
@@ -83,7 +83,7 @@ class Inspection:
 def inspect_robot(
     robot: Robot | SpatialRobot | str | os.PathLike[str], **how: Unpack[LoadOptions]
 ) -> Inspection:
-    """Look at a robot for what has fooled others.
+    """Inspect a robot for common mistakes.
 
     Left and right that differ; inertias that violate the triangle inequality (the sum of two
     principal moments is never less than the third); links that move without mass; feet of different

@@ -40,7 +40,7 @@ class FindingKind(enum.Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that looks wrong."""
+    """A likely mistake in a robot."""
 
     kind: FindingKind
     """What it is about."""

@@ -30,7 +30,7 @@ class RunStatus(enum.Enum):
 
 
 class OnError(enum.StrEnum):
-    """What becomes of an error in a controller; the run ends in any case, with its data.
+    """How an error in a controller is reported; the run ends and keeps its data.
 
     ``WARN``, ``STOP``
         A warning tells of it, with its traceback; nothing but status and message does.

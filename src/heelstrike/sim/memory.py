@@ -91,7 +91,7 @@ class Equations(Bundle):
     """Addresses of straight-line code, zero for none."""
     force: Floats = array("nv")
     rate: Floats = array("nv")
-    """force, rate: Generalised force without contact, and what it comes to; scratch."""
+    """force, rate: Generalised force without contact, and the acceleration from it; scratch."""
 
 
 class Surface(Bundle):

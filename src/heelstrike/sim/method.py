@@ -348,9 +348,9 @@ _MOLDS: WeakKeyDictionary[Robot, dict[Method, Mold[Any]]] = WeakKeyDictionary()
 
 @dataclass(frozen=True)
 class UnknownMethod:
-    """What a file tells of a method whose class, or that of a law of it, is not known.
+    """The settings of a method in a file whose class, or whose law's class, is unknown.
 
-    Runs made with it can be looked at, compared and saved again, but not gone on with.
+    Runs made with it can be looked at, compared and saved again, but not continued.
     """
 
     name: str

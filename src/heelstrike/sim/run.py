@@ -68,7 +68,7 @@ def recorded(*shape: str | int, of: str, unit: str, label: str, later: bool = Fa
 
 @dataclass(frozen=True, eq=False)
 class Logged:
-    """What a controller told of itself, a value a row."""
+    """A quantity that a controller logged, one value a row."""
 
     values: NDArray[Any]
     """(nt, ...) Values: at every row what it wrote at its last call for good."""
@@ -169,7 +169,7 @@ class SolverCount:
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds spent."""
+    """Computing time in seconds."""
 
     compile_s: float
     """Compiling, or loading compiled code."""

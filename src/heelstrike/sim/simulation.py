@@ -480,7 +480,7 @@ class Simulation:
             instant = self._way.instant(self._clock, until)
         if instant < self.time:
             raise SimulationError(
-                f"until must not be before the present time, {self._now} s; got {until}"
+                f"until must not be before the present time, {self._now}; got {until}"
             )
         return self._advance(instant, NEVER, progress)
 
@@ -814,7 +814,9 @@ class Simulation:
         for what, mine in self._identity.items():
             its = snapshot.identity.get(what)
             if its != mine:
-                raise SimulationError(f"the snapshot is one of another {what}: {its}, not {mine}")
+                raise SimulationError(
+                    f"the snapshot has another {what}, {its}; the simulation has {mine}"
+                )
         self._put_back(snapshot)
         self._recorded_until = snapshot.time
         self._records.clear()

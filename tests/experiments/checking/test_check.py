@@ -77,7 +77,7 @@ def test_our_own_gait_has_nothing_against_it() -> None:
     zmp = next(each for each in own().findings if each.cause == "zero moment point")
     margin = zero_moment_point(run).foot_margin[inside]
     assert 0.1 * (1.0 - zmp.used) == pytest.approx(np.nanmin(margin), abs=0.02)
-    assert own().headline == "nothing stands against it: the robot walks it"
+    assert own().headline == "nothing is wrong with it: the robot walks it"
 
 
 def dragged(q: np.ndarray) -> np.ndarray:

@@ -217,5 +217,5 @@ def test_names() -> None:
         named_task("Walk", colour="red")
     with pytest.raises(hs.SimulationError, match=r"about\.task"):
         told_task({})
-    with pytest.raises(hs.SimulationError, match="does not tell"):
+    with pytest.raises(hs.SimulationError, match="does not say"):
         told_task({"task": "walk", "walk": "{}"})

@@ -18,6 +18,7 @@ from heelstrike.view.live.board import Board
 from heelstrike.view.live.frames import Layout
 from heelstrike.view.live.session import Session
 from heelstrike.view.live.stage import GivenStage, Stage
+from heelstrike.wording import counted
 
 TICK = 0.016
 TRUNK_LINK, _ = hs.Push("trunk", force=(1.0, 0.0), start=0.0, duration=0.0).place(walking.bravo7())
@@ -112,7 +113,8 @@ def test_the_simulation_goes_on_as_by_itself() -> None:
     for _ in range(2):  # what is halted is told as it is, and so is what starts again
         newest = session.history.newest
         assert newest is not None
-        assert shown.told["light"]["text"].startswith(f"{newest.solver.solves} contact problems")
+        problems = counted(newest.solver.solves, "contact problem", "contact problems")
+        assert shown.told["light"]["text"].startswith(problems)
         ask(session, "reset")
 
 

@@ -23,7 +23,7 @@ CLEARANCE_RESERVE = 0.02
 
 
 class Lever(enum.Enum):
-    """What can be changed.
+    """What a proposed change alters.
 
     ``CONTROLLER``
         The law; the value is the name of its class in :mod:`heelstrike`.
@@ -52,7 +52,7 @@ class Lever(enum.Enum):
 
 @dataclass(frozen=True)
 class Change:
-    """Something to change."""
+    """A change that may keep a robot from falling."""
 
     lever: Lever
     """What."""
@@ -66,7 +66,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Tried:
-    """What came of something that was tried."""
+    """The outcome of a change or disturbance that was tried."""
 
     what: str
     """What was tried, in words."""
@@ -79,7 +79,7 @@ class Tried:
 
 
 def changes(run: Run, fall: Fall, gait: Gait | None = None) -> tuple[Change, ...]:
-    """Say what would keep a robot from falling, what helps most first.
+    """Propose changes that would keep a robot from falling, the most effective first.
 
     A change follows from the first cause alone: what came after it needs none.
 

@@ -32,7 +32,7 @@ down."""
 
 @dataclass(frozen=True)
 class Fall:
-    """Why a run did not go well."""
+    """Why a run did not go well: the first cause and its consequences."""
 
     cause: Cause
     """What went wrong first."""
@@ -56,7 +56,7 @@ class Fall:
 
 
 def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
-    """Say why a robot fell.
+    """Find the first cause of a fall.
 
     Symptoms are found one by one (:class:`~heelstrike.analysis.diagnosis.symptoms.Cause` lists
     them). Those from which the robot recovered, as a step and a half without any shows, are left

@@ -24,7 +24,7 @@ REACHED = 1.0 - 1e-6
 
 @dataclass(frozen=True)
 class Limit:
-    """How close a run came to something that it cannot go beyond."""
+    """How close a run came to a limit."""
 
     name: str
     """What is limited: friction of a foot, its zero moment point, a torque, a joint."""

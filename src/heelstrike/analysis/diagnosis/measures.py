@@ -32,7 +32,7 @@ STEPPED = 0.1
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure of a walk."""
+    """A measured quantity of a walk."""
 
     name: str
     """What is measured."""
@@ -45,7 +45,7 @@ class Measure:
 
 @dataclass(frozen=True)
 class MotorLoad:
-    """What a motor does over a run."""
+    """Load of a motor over a run."""
 
     name: str
     """Name of the actuator."""
@@ -61,7 +61,7 @@ class MotorLoad:
 
 
 def motor_loads(run: Run) -> tuple[MotorLoad, ...]:
-    """Say what each motor does over a run.
+    """Compute the load of each motor over a run.
 
     Parameters
     ----------

@@ -125,7 +125,7 @@ class Cause(enum.Enum):
 
 @dataclass(frozen=True)
 class Symptom:
-    """Something that went wrong."""
+    """Something that went wrong, with its time and place."""
 
     cause: Cause
     """What."""

@@ -4,7 +4,7 @@ What goes on from an instant is in the snapshot of a simulation there: the robot
 its controller remembers, and where the clock is between two calls. A walk is followed until it has
 settled; in the middle of a step all of that is disturbed, one number at a time, and the difference
 is read when the same foot stands in the middle of its next step. Both walks run on the same clock,
-so that a period that is no whole number of samples does no harm, and no leg has to be relabelled.
+so the period need not be a whole number of samples, and no leg has to be relabelled.
 """
 
 from __future__ import annotations

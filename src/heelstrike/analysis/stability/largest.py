@@ -21,7 +21,7 @@ from heelstrike.sim.push import Push
 
 @dataclass(frozen=True, kw_only=True)
 class Largest:
-    """The largest disturbance of a kind."""
+    """The largest disturbance that a walk withstands."""
 
     recovered: float
     """Largest size from which the walk recovers, as it does from all smaller ones tried."""

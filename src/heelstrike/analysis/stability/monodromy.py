@@ -152,7 +152,7 @@ def monodromy(
     state : State
         Just after a touchdown of a walk that repeats, as ``find_limit_cycle(...).state``.
     controller : object with ``torque(t, state, contacts)``, or None
-        A compiled one that acts continuously. As in `find_limit_cycle` it begins afresh at every
+        A compiled one that acts continuously. As in `find_limit_cycle` it restarts at every
         touchdown.
     ground : Ground
         Flat or sloping ground; ``Ground()`` by default.

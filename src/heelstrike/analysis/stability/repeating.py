@@ -180,8 +180,8 @@ def _check_again(loop: ClosedLoop, section: Section, walk: Walk, tolerance: floa
     if far > tolerance:
         raise LimitCycleError(
             f"a walk of robot {loop.robot.name!r} comes back to itself after {walk.duration:.6g} "
-            f"s, but differs by {far:.3g} one return later: its controller goes by a clock of "
-            "another period. Give it a control_period of which that is a whole number"
+            f"s, but differs by {far:.3g} one return later: its controller has a clock of "
+            "another period. Choose a control_period that divides that period"
         )
 
 

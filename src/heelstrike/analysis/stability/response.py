@@ -187,8 +187,8 @@ class DisturbanceResponse:
         """
         if name not in self.disturbances or returns < 1:
             raise SimulationError(
-                f"of at least one return after {' or '.join(self.disturbances)}; got {name!r}, "
-                f"{returns!r}"
+                f"name must be one of {', '.join(self.disturbances)}, and returns at least 1; got "
+                f"{name!r}, {returns!r}"
             )
         place = self.disturbances.index(name)
         seen, error = [self.D[:, place]], self.B[:, place]

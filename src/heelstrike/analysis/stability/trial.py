@@ -41,7 +41,7 @@ GETS_ON = 0.7
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trial:
-    """A walk to be disturbed.
+    """A walk that is tested under disturbances.
 
     Raises
     ------

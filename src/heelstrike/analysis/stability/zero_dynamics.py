@@ -30,7 +30,7 @@ POINTS = 64
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ZeroDynamics:
-    """What a gait over its phase does by itself, once the joints obey it."""
+    """The motion that a gait over its phase leaves free when the joints obey it."""
 
     gait: PhasedGait
     """The gait."""

@@ -143,7 +143,9 @@ def plane(ground: Ground | None) -> tuple[tuple[float, float], float, float]:
     """
     terrain = (Ground() if ground is None else ground).model()
     if len(terrain.friction) > 1 or terrain.curved:
-        raise SimulationError("contact is linearised on level or evenly sloping ground only")
+        raise SimulationError(
+            "contact is linearised on level or sloping ground that is the same everywhere"
+        )
     nx, nz = terrain.normal[0].tolist()
     return (nx, nz), float(terrain.friction[0]), float(terrain.restitution[0])
 

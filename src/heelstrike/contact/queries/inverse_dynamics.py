@@ -27,7 +27,7 @@ RELATIVE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ContactInverseDynamics:
-    """Torques and contact forces for an acceleration, and what stands against it."""
+    """Torques and contact forces for an acceleration, and why it is impossible."""
 
     torque: Floats
     """(nu,) Torques of the actuators, in the order of ``robot.actuator_names`` (N m, N for a
@@ -55,7 +55,7 @@ class ContactInverseDynamics:
     """Whether the ground pushes, inside its friction cones, the torques are within their limits and
     nothing is missing."""
     message: str
-    """In words, what stands against it; empty if nothing."""
+    """Why the acceleration is impossible; empty if it is not."""
 
 
 @takes(ContactProblemError)

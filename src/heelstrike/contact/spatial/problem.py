@@ -45,7 +45,7 @@ _kept = threading.local()
 
 @dataclass(frozen=True)
 class SpatialContactSolution:
-    """The solution of a contact problem in space, with the proof of what it is worth."""
+    """The solution of a contact problem in space, with its certificate."""
 
     impulse: Floats
     """(nc, 3) Impulse (or force) on the robot at each contact: normal, t1, t2. Where all contacts

@@ -17,7 +17,7 @@ from heelstrike.robot.sole import sole
 
 @dataclass(frozen=True, eq=False)
 class LegPose:
-    """Positions in which a foot is where it shall be, or as near as the leg comes."""
+    """Joint positions that bring a foot to a place, or as near as the leg reaches."""
 
     q: Floats
     """(nq,) Positions (m, rad); other coordinates than those of the leg are as they were given."""

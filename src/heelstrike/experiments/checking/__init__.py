@@ -1,4 +1,4 @@
-"""An engineer's trajectory before it reaches hardware: what stands against it, and a walk of it."""
+"""An engineer's trajectory before it reaches hardware: what is wrong with it, and a walk of it."""
 
 from heelstrike.experiments.checking.check import Check, check_motion
 from heelstrike.experiments.checking.findings import Finding

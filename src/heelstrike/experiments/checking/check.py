@@ -1,4 +1,4 @@
-"""check_motion(): find what stands against a trajectory, walk it, and walk it with tolerances."""
+"""check_motion(): find what is wrong with a trajectory, walk it, and walk it with tolerances."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ KNOTS = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """What a check of a motion came to."""
+    """The result of a check of a motion."""
 
     motion: RecordedMotion
     """The motion."""
@@ -59,14 +59,14 @@ class Check:
 
     @property
     def good(self) -> bool:
-        """Whether nothing stands against it, and the robot walked it."""
+        """Whether nothing is wrong with it, and the robot walked it."""
         return not any(each.broken for each in self.findings)
 
     @property
     def headline(self) -> str:
         """The verdict in one line."""
         if self.good:
-            return "nothing stands against it: the robot walks it"
+            return "nothing is wrong with it: the robot walks it"
         first = self.findings[0]
         return f"no: {first.cause} at {first.time:.3g} s: {first.message}"
 
@@ -118,7 +118,7 @@ def check_motion(
     Returns
     -------
     Check
-        What stands against it, what is too much first.
+        What is wrong with it, violations first.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What stands against a motion: ranges, motors, soles, friction, clearance, landings."""
+"""What is wrong with a motion: ranges, motors, soles, friction, clearance, landings."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ORDER = (
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that stands against a motion, or comes near to it."""
+    """Something wrong with a motion, or close to a limit."""
 
     cause: str
     """What: one of `ORDER`."""
@@ -54,7 +54,7 @@ class Finding:
 
 
 def find(robot: Robot, placed: Placed, ground: Ground) -> Iterator[Finding]:
-    """Find what stands against a motion, without simulating it.
+    """Find what is wrong with a motion, without simulating it.
 
     Parameters
     ----------

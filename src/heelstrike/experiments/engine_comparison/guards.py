@@ -38,7 +38,7 @@ WEIGHT = 0.01
 
 @dataclass(frozen=True)
 class Guards:
-    """What the guards found of an engine."""
+    """The results of :func:`guard` for an engine."""
 
     flight: float
     """Largest difference of a coordinate from ours at the end of a flight of 0.1 s, at the shortest
@@ -62,7 +62,7 @@ class Guards:
 
 
 def guard(entry: Entry, robot: Robot, given: Mapping[str, Any]) -> Guards:
-    """Ask an engine for free flight and for the weight at rest.
+    """Test that an engine has the same robot, by free flight and the weight at rest.
 
     Parameters
     ----------

@@ -164,7 +164,7 @@ def _walks_at(found: Mapping[str, Any], name: str, which: str) -> str:
     rows = [r for r in found["rows"] if r["engine"] == name and r["settings"] == which]
     if not rows:
         return (
-            "as it comes"
+            "as defaults"
             if which == "best" and not best_settings().get(name, {}).get("settings")
             else "–"
         )

@@ -69,7 +69,7 @@ def walk_in(
     Raises
     ------
     SimulationError
-        If the control period is no whole number of steps.
+        If the control period is not a whole number of steps.
     InvalidRunError
         If the engine ends, hangs or refuses.
     """
@@ -78,7 +78,7 @@ def walk_in(
     each = max(1, round(control_period / step))
     if control_period > step and abs(control_period / step - each) > WHOLE:
         raise SimulationError(
-            f"the control period of {control_period:g} s is no whole number of steps of {step:g} s"
+            f"the control period, {control_period:g} s, is not a multiple of the step, {step:g} s"
         )
     asked = asked_of(robot, controller)
     model = robot.model

@@ -335,7 +335,9 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         else:
             seeds = list(seed)
         if len(seeds) != self.num_envs:
-            raise error.Error(f"there are {self.num_envs} lanes, and {len(seeds)} seeds")
+            raise error.Error(
+                f"give one number, or {self.num_envs} seeds, one a lane; got {len(seeds)}"
+            )
         for lane, each in enumerate(seeds):
             if each is not None:
                 self._lanes.seed(lane, seeding.np_random(each)[0])

@@ -27,7 +27,7 @@ there are; the last one goes on forever."""
 
 @dataclass(frozen=True)
 class Ranges:
-    """Lowest and greatest values that are drawn evenly in between; None of what stays as it is.
+    """Ranges from which values are drawn uniformly; None keeps a value.
 
     Raises
     ------

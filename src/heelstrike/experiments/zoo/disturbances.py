@@ -49,7 +49,7 @@ class Effort:
 
 @dataclass(frozen=True)
 class Chance:
-    """What chance decides in one trial."""
+    """The random choices of one trial."""
 
     phase: float
     """When in a step a push begins, from 0 to 1."""

@@ -30,7 +30,7 @@ Key = tuple[str, str, str]
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """All that the numbers depend on beside robots, controllers and disturbances."""
+    """Settings of the search: all that the numbers depend on besides its subjects."""
 
     seed: int = 0
     """Of all that chance decides."""

@@ -93,7 +93,7 @@ class MotionPhase:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion(ShownInNotebooks):
-    """A motion of a robot through several phases, and how it goes on."""
+    """A motion of a robot through several phases, and how it repeats."""
 
     robot: str
     """Name of the robot it was designed for."""

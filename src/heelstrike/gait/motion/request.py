@@ -20,7 +20,7 @@ from heelstrike.robot.state import State
 
 
 class Repeat(enum.Enum):
-    """How a motion goes on after its last phase.
+    """How a motion repeats after its last phase.
 
     ``MIRRORED``: with its mirror image, as a walk whose steps are alike; ``SAME``: with itself, as
     one that limps; ``NEVER``: not at all, as standing up.
@@ -52,7 +52,7 @@ class MotionRequest:
     landing_speed: float
     """Least speed towards the ground (m/s) of points that come down."""
     cost: Any
-    """What is to be least."""
+    """What is minimised."""
     speed: float | None
     """Mean speed (m/s)."""
     total: float | None

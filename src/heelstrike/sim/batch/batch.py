@@ -50,7 +50,7 @@ WENT_ON = int(Outcome.PAUSED)
 
 
 class Batch:
-    """Many simulations of one robot, method and kind of controller, that move on together.
+    """Many simulations of one robot, method and kind of controller that advance together.
 
     Each argument is either for all lanes or has one entry a lane; n is their number. Lane i is
     :class:`~heelstrike.Simulation` of the same arguments to the last bit, whatever n, the number of
@@ -310,7 +310,7 @@ class Batch:
         Raises
         ------
         SimulationError
-            If that is no whole number ≥ 1, or the mask none.
+            If that is not a whole number ≥ 1, or the mask is not a mask.
         """
         given: object = steps
         if not (isinstance(given, int | np.integer) and given >= 1):

@@ -59,7 +59,7 @@ SHOWN = 10
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AnyBatchResult:
-    """What many simulations came to, in the plane or in space."""
+    """How many simulations ended, with their records if they were kept."""
 
     position: Floats
     """(n, nq)"""

@@ -471,8 +471,8 @@ def _not_negative(name: str, value: float, unit: str) -> None:
 def _restitution(value: float) -> None:
     if not 0.0 < value <= 1.0:
         raise SimulationError(
-            f"a compliant contact has a restitution in (0, 1], got {value}; it leaves the ground "
-            f"at some speed however strong its damping"
+            f"the restitution of a compliant contact must be above 0, at most 1, got {value}: "
+            f"damping never stops a point entirely"
         )
 
 

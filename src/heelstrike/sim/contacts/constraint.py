@@ -30,7 +30,7 @@ COMPONENTS = 2
 
 
 class Constraint(KernelObject):
-    """A kind of row from outside: a cable, a slider, a pin, a wall for a hand.
+    """A constraint of your own: a cable, a slider, a pin, a wall for a hand.
 
     A subclass is a frozen dataclass of settings. It says what its `set` is, how many `components`
     it has, and has one kernel, ``rows(self, model, tree, q, v, gap, jacobian, bias)``, which writes
@@ -110,7 +110,7 @@ class Constraint(KernelObject):
 
 @takes(SimulationError)
 def constrained(robot: Robot, *constraints: Constraint) -> Robot:
-    """Return a robot that is held by constraints, besides those that it has.
+    """Return a robot with additional constraints.
 
     They act in its simulations, under every method that knows their sets. Queries of its dynamics
     and gaits that are designed for it know nothing of them.

@@ -173,7 +173,7 @@ def _events(
     known = {each.value for each in EventKind}
     for k, c in zip(kind.tolist(), contact.tolist(), strict=True):
         if k not in known:
-            raise DamageError(f"an event is of kind {k}, which is none")
+            raise DamageError(f"an event has the unknown kind {k}")
         where, first, count = layout.places(EventKind(k), robot)
         if not first <= c < first + count:
             raise DamageError(f"an event names a {where} that is not there")

@@ -111,7 +111,7 @@ class StepDerivatives:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Gradient:
-    """The gradient of a number that a run leads to."""
+    """The gradient of a number with respect to all that a run depends on."""
 
     state: Floats
     """(nq + nv,) By the state at the beginning."""
@@ -200,7 +200,7 @@ def step_derivatives(
     answers: bool = True,
     modes: Mapping[str, str] | None = None,
 ) -> StepDerivatives:
-    """Take a step, or go on until a time, and differentiate what that does.
+    """Take a step, or advance until a time, and differentiate the result.
 
     Contact modes are those that the certified solution has. While they last, equations hold that
     are differentiated implicitly: exact to rounding, but for the law's own derivative, which is a
@@ -260,7 +260,7 @@ def run_derivatives(
     gains: Sequence[str] = (),
     answers: bool = True,
 ) -> RunDerivatives:
-    """Go on until a time, and differentiate every step, for sums forward and back along the run.
+    """Advance until a time and differentiate every step, for gradients along the run.
 
     Parameters
     ----------

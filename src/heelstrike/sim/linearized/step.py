@@ -331,8 +331,9 @@ class _Instant:
             off = float(np.abs(v - run.velocity[last]).max())
             if off > FITS * max(1.0, float(np.abs(v).max())):
                 raise SimulationError(
-                    f"the impact at t = {self.time:.6g} s cannot be linearised: points that slide, "
-                    f"bounce or come off in it leave velocities {off:.3g} from those recomputed"
+                    f"the impact at t = {self.time:.6g} s cannot be linearised: points slide, "
+                    f"bounce or lift off in it (velocities differ by {off:.3g}); "
+                    "hs.find_limit_cycle takes differences instead"
                 )
         return found
 

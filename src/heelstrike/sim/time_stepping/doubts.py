@@ -36,7 +36,7 @@ TOLD_WRONG = 2.0
 
 
 class SimulationWarning(UserWarning):
-    """A simulation begins, but what comes out of it may mean little."""
+    """A simulation starts, but its results may be unreliable."""
 
 
 def stiffest(robot: Robot, q: Floats, step: float, *, dampers: bool = True) -> tuple[float, str]:
