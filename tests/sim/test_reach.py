@@ -29,15 +29,15 @@ ANY_METHOD = "the frame hands every method the same"
 
 EXCEPTIONS = {
     "sim.time_stepping.method.prepare": ANY_METHOD,
-    "sim.time_stepping.method.report": ANY_METHOD,
     "sim.time_stepping.method.move": ANY_METHOD,
     "sim.compliant.method.begin": ANY_METHOD,
     "sim.compliant.method.prepare": ANY_METHOD,
     "sim.compliant.method.decide": ANY_METHOD,
     "sim.compliant.method.report": ANY_METHOD,
     "sim.event_driven.method.prepare": ANY_METHOD,
+    "sim.spatial.method.prepare": ANY_METHOD,
+    "sim.spatial.method.move": ANY_METHOD,
     "sim.contacts.candidates.note_answer": "one call for whoever writes a method",
-    "sim.record.recording.note_row_when_due": "a row may have any quantity of the memory",
 }
 """Kernels that reach more than twice what they use, and why: at most ten."""
 

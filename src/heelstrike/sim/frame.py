@@ -43,7 +43,7 @@ from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.dimension import AnyRobot
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record, RowsAndEvents
-from heelstrike.sim.record.recording import center_height, note_log, sound
+from heelstrike.sim.record.recording import center_height, note_log, note_row_when_due, sound
 
 
 class Outcome(enum.IntEnum):
@@ -114,6 +114,9 @@ class Common:
     center_height: Callable[..., float]
     """Kernel ``center_height(model, ground, tree)``: height of the centre of mass over the
     ground."""
+    note_row_when_due: Callable[..., int]
+    """Kernel ``note_row_when_due(memory, clock, record)``: append a row if one is due; returns
+    which, or -1."""
     solver: SeparateKernel
     """What solves contact problems."""
     begin_closed: Callable[..., bool] | None = None
@@ -123,7 +126,7 @@ class Common:
 
 IN_THE_PLANE = Common(
     (Model, GroundModel, Control, Memory, Record), sound, ask, limit_torque, center_height,
-    try_solvers, begin_closed,
+    note_row_when_due, try_solvers, begin_closed,
 )  # fmt: skip
 
 
@@ -141,9 +144,9 @@ class Kernels:
     decide: Callable[..., int]
     """Kernel ``decide(scene, control, memory, work, record, clock)``: decide what acts from now on;
     returns ``DONE`` or what is in the way."""
-    report: Callable[..., None]
+    report: Callable[..., None] | None
     """Kernel ``report(scene, control, memory, work, record, clock)``: append to the record what is
-    due of this instant."""
+    due of this instant. None of a method that appends a row if one is due, and no more."""
     move: Callable[..., int]
     """Kernel ``move(scene, control, memory, work, record, clock)``: bring state and ``clock.time``
     to the next instant; returns ``DONE`` or what is in the way. After ``RECORD_FULL`` or ``FORK``
@@ -188,11 +191,22 @@ def closing(begin_closed: Callable[..., bool] | None) -> Callable[[Any, Any], bo
     return no_loops if begin_closed is None else loops
 
 
+def reporting(note_row_when_due: Callable[..., int]) -> Callable[..., None]:
+    """Make the kernel that reports an instant by a row, if one is due."""
+
+    @dissolved_kernel
+    def report(scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Clock) -> None:  # noqa: ARG001
+        note_row_when_due(memory, clock, record)
+
+    return report
+
+
 def frame(kernels: Kernels) -> Callable[..., int]:
     """Return the loop of a method."""
-    begin = kernels.begin or nothing
-    prepare, decide, report, move = kernels.prepare, kernels.decide, kernels.report, kernels.move
     common = kernels.common
+    begin = kernels.begin or nothing
+    prepare, decide, move = kernels.prepare, kernels.decide, kernels.move
+    report = kernels.report or reporting(common.note_row_when_due)
     is_sound, ask_law, limit = common.sound, common.ask, common.limit_torque
     close, height = closing(common.begin_closed), common.center_height
 

@@ -15,8 +15,8 @@ from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, Rows
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.memory import Memory, Reaction, Reported, Tally
-from heelstrike.sim.record.record import Record, RowsAndEvents, Told
+from heelstrike.sim.memory import Reaction, Reported, Tally
+from heelstrike.sim.record.record import RowsAndEvents, Told
 from heelstrike.sim.run import QUANTITIES, Quantity
 from heelstrike.tolerances import STANDING_SPEED
 
@@ -225,19 +225,21 @@ def note_log(kept: Integers, logged: Integers, record: RowsAndEvents) -> None:
     record.logged = record.rows
 
 
-@dissolved_kernel
-def is_row_due(clock: Clock) -> bool:
-    """Whether a row is due: every so many steps and at the end."""
-    return bool(clock.index % clock.record_every == 0 or clock.finishing == 1)
+def when_due(note_row: Callable[[float, Any, Any], None]) -> Callable[[Any, Clock, Any], int]:
+    """Make the kernel that appends a row, by `note_row`, if one is due."""
+
+    @kernel
+    def note_row_when_due(memory: Any, clock: Clock, record: Any) -> int:
+        """Append a row if one is due, every so many steps and at the end; return which, or -1."""
+        if clock.index % clock.record_every != 0 and clock.finishing == 0:
+            return -1
+        note_row(clock.time, memory, record)
+        return int(record.rows - 1)
+
+    return note_row_when_due
 
 
-@kernel
-def note_row_when_due(memory: Memory, clock: Clock, record: Record) -> int:
-    """Append a row if one is due, every so many steps and at the end; return which, or -1."""
-    if not is_row_due(clock):
-        return -1
-    note_row(clock.time, memory, record)
-    return int(record.rows - 1)
+note_row_when_due = when_due(note_row)
 
 
 @dissolved_kernel

@@ -17,7 +17,7 @@ from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind, Scheme
 from heelstrike.sim.frame import DONE, SOLVER_FAILED, Common, Kernels, Scene
 from heelstrike.sim.method import Method
-from heelstrike.sim.record.recording import FARTHEST, FASTEST, is_row_due
+from heelstrike.sim.record.recording import FARTHEST, FASTEST
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.spatial.controlled import (
     SpatialControl,
@@ -30,7 +30,7 @@ from heelstrike.sim.spatial.record import (
     SpatialRecord,
     log_spatial_event,
     note_deepest,
-    note_row,
+    note_row_when_due,
     note_spatial_events,
 )
 from heelstrike.sim.spatial.stepping import find_state, take_step
@@ -208,16 +208,6 @@ def decide(
 
 
 @dissolved_kernel
-def report(
-    scene: Scene, control: SpatialControl, memory: SpatialMemory, work: SpatialStepping,
-    record: SpatialRecord, clock: Clock,
-) -> None:  # fmt: skip
-    """Append a row if one is due."""
-    if is_row_due(clock):
-        note_row(clock.time, memory, record)
-
-
-@dissolved_kernel
 def move(
     scene: Scene, control: SpatialControl, memory: SpatialMemory, work: SpatialStepping,
     record: SpatialRecord, clock: Clock,
@@ -248,7 +238,8 @@ def move(
 
 COMMON = Common(
     (SpatialModel, SpatialGroundModel, SpatialControl, SpatialMemory, SpatialRecord),
-    sound_in_space, ask_in_space, limit_torque_in_space, height_of_mass, try_ways,
+    sound_in_space, ask_in_space, limit_torque_in_space, height_of_mass,
+    note_row_when_due, try_ways,
 )  # fmt: skip
 
-InSpace.kernels = Kernels(None, prepare, decide, report, move, COMMON)
+InSpace.kernels = Kernels(None, prepare, decide, None, move, COMMON)

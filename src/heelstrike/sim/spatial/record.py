@@ -17,6 +17,7 @@ from heelstrike.sim.record.recording import (
     STICK,
     TOUCHDOWN,
     row_writer,
+    when_due,
 )
 from heelstrike.sim.spatial.memory import SpatialReported, SpatialTally
 from heelstrike.sim.spatial.run import RECORDED
@@ -35,7 +36,7 @@ class SpatialRecord(RowsAndEvents):
     vars().update(rows_of_quantities(RECORDED))
 
 
-note_row = row_writer(RECORDED, __name__)
+note_row_when_due = when_due(row_writer(RECORDED, __name__))
 
 
 @kernel

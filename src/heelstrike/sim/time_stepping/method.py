@@ -114,7 +114,6 @@ from heelstrike.sim.record.recording import (
     note_event,
     note_events,
     note_extremes,
-    note_row_when_due,
 )
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.corners import join_forces, locate_corners
@@ -1034,14 +1033,6 @@ def decide(
 
 
 @dissolved_kernel
-def report(
-    scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
-) -> None:
-    """Append a row if one is due."""
-    note_row_when_due(memory, clock, record)
-
-
-@dissolved_kernel
 def move(
     scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
 ) -> int:
@@ -1070,4 +1061,4 @@ def move(
 
 TimeStepping.work = Stepping
 TimeStepping.usual_numbers = {"scheme": IMPACT_RESOLVED}
-TimeStepping.kernels = Kernels(None, prepare, decide, report, move)
+TimeStepping.kernels = Kernels(None, prepare, decide, None, move)
