@@ -46,7 +46,7 @@ class SpatialCertificates:
     """Kinetic energy that restitution with friction made (J)."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class SpatialRun(AnyRun):
     """Record of a simulation in space.
 
