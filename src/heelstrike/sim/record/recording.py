@@ -135,7 +135,7 @@ def note_events_of_contact(
             note_event(end, SLIP if slips else STICK, contact, step, force, told)
 
 
-@kernel
+@dissolved_kernel
 def note_stop(
     model: Model, end: float, step: float, steps: int, joint: int, torque: float, q: Floats,
     v: Floats, told: Told, stopped: Integers,
