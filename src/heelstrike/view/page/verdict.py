@@ -83,11 +83,11 @@ def judge(run: Run, gait: Gait | None = None, *, tried: Sequence[Tried] = ()) ->
         parts.append(f"First limit reached: {found[0].name} at {found[0].reached:.3g} s.")
     elif found:
         closest = f"{found[0].name}, {found[0].detail} ({_percent(found[0].used)} used)"
-        parts.append(f"No limit is reached; closest comes {closest}.")
+        parts.append(f"No limit is reached. Tightest margin: {closest}.")
     if advice:
         parts.append(f"To change: {advice[0]}")
     elif good:
-        parts.append("Nothing has to change for this walk.")
+        parts.append(f"{NOTHING_TO_CHANGE}.")
     if good:
         parts.append(f"{_what_was_tried(tried)}.")
     return Verdict(good, " ".join(parts), found, advice, fall, asked, tuple(tried))
@@ -126,6 +126,9 @@ def _after(push: Push, time: float) -> str:
     newtons = math.hypot(*push.force)
     return f"{1e3 * (time - push.start):.0f} ms after a push of {newtons:.3g} N began"
 
+
+NOTHING_TO_CHANGE = "Limits, falls and contact certificates were checked: nothing needs to change"
+"""What is said of a walk without advice."""
 
 FOLLOWS = {
     Cause.SLIPPED: "a foot slides",
