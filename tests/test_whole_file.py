@@ -379,7 +379,6 @@ def test_nobody_writes_past_it() -> None:
                 if isinstance(node, ast.Attribute) and writing.fullmatch(node.attr):
                     found.add((source.relative_to(package).as_posix(), node.attr))
     assert found == {
-        ("sim/spatial/dataset.py", "to_netcdf"),  # into memory
         ("view/animation.py", "write_bytes"),  # into the file beside
         ("view/live/viewer.py", "write_text"),  # into a folder of its own, for the browser
         ("view/report/writing.py", "savefig"),  # into memory

@@ -44,7 +44,6 @@ NOT_YET: dict[str, int] = {
     "sim.event_driven.smooth.corners": 1,
     "sim.event_driven.smooth.faces": 4,
     "sim.event_driven.smooth.watch": 2,
-    "sim.frame": 1,
     "sim.linearized.time_step": 2,
     "sim.record.recording": 7,
     "sim.spatial.candidates": 1,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 from numpy.typing import NDArray
 
+from heelstrike.arguments import refusal
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -245,9 +246,7 @@ def dimension_of(robot: Any) -> Dimension:
 
         return SPACE
     if not isinstance(robot, Robot):
-        raise SimulationError(
-            f"robot must be a Robot, got {robot!r}; load_robot gives one by its name or file"
-        )
+        raise SimulationError(refusal("robot", robot, ("Robot",)))
     from heelstrike.sim.plane import PLANE
 
     return PLANE

@@ -177,7 +177,7 @@ class Timing:
     """Simulating."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class AnyRun(ShownInNotebooks):
     """Record of a simulation, in the plane or in space: what both have.
 
@@ -318,7 +318,7 @@ class AnyRun(ShownInNotebooks):
         return save(self, path)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Run(AnyRun):
     """Record of a simulation.
 

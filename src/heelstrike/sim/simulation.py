@@ -159,7 +159,7 @@ class Simulation:
     @takes(SimulationError)
     def __init__(
         self,
-        robot: Robot | SpatialRobot,
+        robot: AnyRobot,
         controller: Controller | None = None,
         *,
         state: State | Snapshot,

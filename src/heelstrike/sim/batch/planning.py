@@ -265,8 +265,11 @@ def _check_robots(robots: Sequence[Any]) -> None:
 
 def way_of(robot: AnyRobot | Sequence[AnyRobot], method: Method | None) -> Method:
     """Return how the robots of a batch go through time as a method says, or refuse it."""
-    _check_robots(_listed(robot))
-    return dimension_of(_listed(robot)[0]).way(method)
+    robots = _listed(robot)
+    if not robots:
+        raise SimulationError("robot is empty: there is nothing to simulate")
+    _check_robots(robots)
+    return dimension_of(robots[0]).way(method)
 
 
 def _law(controller: Any) -> Law:

@@ -19,7 +19,7 @@ Extents = Mapping[str | int, str]
 """What datasets call the extents of arrays."""
 
 
-def dimensions(name: str, extents: tuple[str, ...], known: Extents) -> tuple[str, ...]:
+def dimensions(name: str, extents: tuple[str | int, ...], known: Extents) -> tuple[str, ...]:
     """Return what the dimensions of a logged array are called: the robot's, or its own."""
     own = (f"{PREFIX}{name}_{place}" for place in range(len(extents)))
     return tuple(known.get(each, mine) for each, mine in zip(extents, own, strict=True))

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 SpatialEvent = Event
 SpatialSolverCount = SolverCount
-"""Those of the plane: an event has three components of impulse in space."""
+"""SpatialEvent, SpatialSolverCount: Those of the plane. In space an event has three components of
+impulse."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class SpatialCertificates:
     """Kinetic energy that restitution with friction made (J)."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class SpatialRun(AnyRun):
     """Record of a simulation in space.
 

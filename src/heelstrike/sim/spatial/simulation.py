@@ -24,15 +24,6 @@ class SpatialSimulation(Simulation):
         a profile, which is taken for all y; pushes have forces (x, y, z). Latches, brakes and
         `checked` are for the plane.
 
-    Attributes
-    ----------
-    status : RunStatus
-        How it goes: ``COMPLETED`` and ``INTERRUPTED`` can go on, the others are its end.
-    message : str
-        The same in a person's words.
-    error : BaseException or None
-        What a controller or `progress` raised.
-
     Raises
     ------
     SimulationError, ControllerError, RobotError
