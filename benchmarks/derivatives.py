@@ -42,7 +42,11 @@ def differentiate_often(
 ) -> None:
     """Differentiate the same step again and again."""
     for _ in range(count):
-        differentiate_step(model, work, memory, slopes)
+        differentiate_step(
+            model, work.step, work.scheme, memory.stiffness, memory.next_v, memory.equations.added,
+            memory.contacts.normal, memory.rows, memory.surface, memory.assembly, work.impact,
+            memory.pushes, slopes,
+        )  # fmt: skip
 
 
 def best(calls: int, function: Callable[..., Any], *arguments: Any) -> float:

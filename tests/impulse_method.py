@@ -22,21 +22,12 @@ class Numbers(hs.Bundle):
 
 
 @sim.kernel
-def begin(model: Any, ground: Any, memory: Any, work: Any, record: Any) -> int:
-    if sim.rows_of(memory.loops) > 0:
-        if not sim.close_loops(model, memory.equations, memory.loops, memory.q):
-            return sim.DIVERGED
-        sim.steady_loops(model, memory.q, memory.equations, memory.loops, memory.v)
-    return sim.DONE
-
-
-@sim.kernel
 def prepare(model: Any, ground: Any, memory: Any, work: Any) -> None:
     tree = memory.equations.tree
     sim.evaluate_equations(model, memory.q, memory.v, memory.equations)
     sim.locate_contacts(model, ground, tree, memory.contacts, memory.surface)
     sim.locate_stops(memory.q, memory.rows)
-    sim.find_loops_of_step(model, memory)
+    sim.find_loops_of_step(model, memory.q, memory.v, tree, memory.loops)
 
 
 @sim.kernel
@@ -56,30 +47,34 @@ def move_freely(model: Any, time: float, work: Any, memory: Any) -> None:
 
 
 @sim.kernel
-def list_closed(kind: int, count: int, memory: Any) -> int:
-    first = count
-    for entry in range(memory.rows.first[kind], memory.rows.end[kind]):
-        if memory.rows.gap[entry] <= 0.0:
-            sim.list_candidate(entry, count, memory.rows.components[entry], memory)
+def list_closed(kind: int, count: int, rows: Any, listing: Any) -> int:
+    for entry in range(rows.first[kind], rows.end[kind]):
+        if rows.gap[entry] <= 0.0:
+            sim.list_candidate(entry, count, rows.components[entry], listing)
             count += 1
-    sim.note_group(kind, first, count, memory.assembly)
     return count
 
 
 @sim.kernel
 def pose(model: Any, step: float, memory: Any) -> int:
-    assembly, loops, v = memory.assembly, memory.loops, memory.next_v
-    near = list_closed(sim.POINT, 0, memory)
-    count = sim.hold_latched(model, list_closed(sim.STOP, near, memory), v, memory)
+    assembly, loops, v, rows = memory.assembly, memory.loops, memory.next_v, memory.rows
+    listing = sim.Listing(
+        rows.set, memory.surface.friction, memory.reaction.mode, assembly.candidate,
+        assembly.answer.mode, assembly.problem,
+    )  # fmt: skip
+    near = sim.note_group(sim.POINT, 0, list_closed(sim.POINT, 0, rows, listing), assembly)
+    count = list_closed(sim.STOP, near, rows, listing)
+    count = sim.hold_latched(model, count, v, rows.latch_stop, loops.held, listing)
     stopped = sim.note_group(sim.STOP, near, count, assembly)
-    count = sim.list_dry_joints(count, step, v, memory)
+    count = sim.list_dry_joints(count, step, v, memory.breakaway, rows, listing)
     sim.note_group(
         sim.SECOND_FACE, sim.note_group(sim.DRY_JOINT, stopped, count, assembly), count, assembly
     )
-    tree, seconds = memory.equations.tree, memory.seconds
-    sim.write_rows(model, tree, memory.contacts, seconds, memory.rows, assembly)
+    tree = memory.equations.tree
+    sim.write_contact_rows(sim.POINT, model, tree, memory.contacts, rows.owner, assembly)
+    sim.write_joint_rows(rows, assembly)
     for row in range(assembly.problem.first[count]):
-        assembly.problem.free[row] = sim.row_product(assembly.jacobian, row, v)
+        assembly.problem.free[row] = sim.row_product(assembly.directions.jacobian, row, v)
     total = sim.append_loops(count, 1, loops, assembly)
     sim.free_loops(total, loops, v, 0.5 * step, assembly)
     return sim.note_group(sim.LOOP, count, total, assembly)
@@ -88,21 +83,27 @@ def pose(model: Any, step: float, memory: Any) -> int:
 @sim.kernel
 def decide(scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Any) -> int:
     model, assembly, status = scene.model, memory.assembly, sim.SOLVED
+    directions, problem, answer = assembly.directions, assembly.problem, assembly.answer
+    equations, loops, told = memory.equations, memory.loops, record.told
     move_freely(model, clock.time, work, memory)
-    assembly.problem.count = pose(model, work.step, memory)
-    if assembly.problem.count > 0:
-        sim.assemble_delassus(model, assembly.problem.count, memory.equations, assembly)
-        solver, answer = memory.solver, assembly.answer
-        status = sim.solve_contact_kernel(work.order, assembly.problem, solver, answer)
-        sim.add_impulse(model, assembly, assembly.problem.count, memory.equations, memory.next_v)
-    sim.note_answer(model, work.step, memory)
-    sim.note_extremes(model, memory)
-    first, end = record.events, clock.start + (clock.index + 1) * work.step
-    sim.note_events(model, clock.time, end, work.step, memory, record)
-    sim.react(model, first, memory.q, record, memory.loops)
-    rubbed, braked = memory.reaction.friction_torque, memory.loops.brake_force
+    problem.count = pose(model, work.step, memory)
+    if problem.count > 0:
+        sim.assemble_delassus(model, problem.count, equations, directions, problem)
+        status = sim.solve_contact_kernel(work.order, problem, memory.solver, answer)
+        rows = problem.first[problem.count]
+        sim.add_impulse(model, rows, answer.impulse, directions, equations, memory.next_v)
+    sim.note_answer(work.step, memory)
+    sim.note_extremes(memory.contacts.gap, answer.residual, memory.tally)
+    first, end = told.events, clock.start + (clock.index + 1) * work.step
+    sim.note_events(
+        model, clock.time, end, work.step, memory.tally.steps, memory.q, memory.v, memory.next_v,
+        memory.breakaway, equations.tree, memory.contacts, memory.reaction, loops.constraint_force,
+        memory.rows, told, memory.reported,
+    )  # fmt: skip
+    sim.react(model, first, memory.q, told, loops.held)
+    rubbed, braked = memory.reaction.friction_torque, loops.brake_force
     sim.share_friction(model, memory.breakaway, rubbed, braked)
-    sim.note_brakes(model, clock.time, work.step, record, memory.loops)
+    sim.note_brakes(model, clock.time, work.step, braked, told, loops.braked)
     return sim.DONE if status == sim.SOLVED else sim.SOLVER_FAILED
 
 
@@ -130,7 +131,7 @@ def move(scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: A
 class Impulses(sim.Method):
     """The paper's ordering on ground without corners."""
 
-    kernels = sim.Kernels(begin, prepare, decide, report, move)
+    kernels = sim.Kernels(None, prepare, decide, report, move)
     work = Numbers
 
     step: float = 1e-3

@@ -96,6 +96,28 @@ def pushes(robot: hs.Robot, feet: Sequence[Sequence[int]], newtons: float = 100.
     return force
 
 
+SUMMARY_KEYS = {
+    "status",
+    "steps",
+    "distance_m",
+    "duration_s",
+    "gait",
+    "tracking_rms_rad",
+    "zmp_min_m",
+    "zmp_max_m",
+    "zmp_limits_m",
+    "friction_use_max",
+    "slip_max_m",
+    "penetration_max_m",
+    "complementarity_max",
+    "solver",
+    "cost_of_transport",
+    "compile_s",
+    "wall_s",
+    "real_time_factor",
+}
+"""What the summary of a run has at the least."""
+
 BOX = """
 <mujoco model="box">
   <worldbody>

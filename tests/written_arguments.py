@@ -69,7 +69,7 @@ class _Reading(ast.NodeVisitor):
 
     def __init__(self, kernel: Kernel) -> None:
         self.kernel = kernel
-        self.scope = kernel.py_func.__globals__
+        self.scope = scope_of(kernel)
         self.kinds = kinds_of(kernel)
         self.stands_for = {name: frozenset({(name,)}) for name in arguments_of(kernel)}
         self.given: dict[str, ast.expr] = {}
@@ -257,6 +257,11 @@ def holds_others(kind: Any) -> bool:
     """Whether something is a class of bundles, or of tuples with names."""
     is_class = isinstance(kind, type)
     return is_class and (issubclass(kind, Bundle) or hasattr(kind, "_fields"))
+
+
+def scope_of(kernel: Kernel) -> dict[str, Any]:
+    """Return what the names in a kernel stand for that are not its own."""
+    return kernel.py_func.__globals__ | inspect.getclosurevars(kernel.py_func).nonlocals
 
 
 @cache

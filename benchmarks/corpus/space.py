@@ -11,12 +11,9 @@ quaternion ends with its real part.
 
 from __future__ import annotations
 
-import argparse
-import os
 import sys
 import time
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -24,7 +21,8 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus.clones import Published, extracted, published, row
+from corpus.clones import Published, extracted
+from corpus.judging import HEAD, Outcome, counts, judge_all, refused, share, shortened, text_of
 from corpus.peers import Refused, mechanics
 from heelstrike import dynamics
 from heelstrike.errors import HeelstrikeError
@@ -35,37 +33,6 @@ Floats = NDArray[np.float64]
 LOOKS = ("mesh", "texture", "material", "keyframe", "sensor", "skin")
 TOLERANCE = 1e-11
 STATES = 5
-
-
-@dataclass
-class Outcome:
-    """What became of one file.
-
-    Attributes
-    ----------
-    robot : Published
-        The file.
-    summary : str
-        The robot in words, or the reason of its refusal.
-    loaded : bool
-        Whether it loads.
-    engine : str
-        Who judged it.
-    difference : float
-        Largest difference from that engine, as a share of the largest entry; NaN if nobody judged.
-    said : str
-        Why nobody did.
-    seconds : float
-        Processor time to load it.
-    """
-
-    robot: Published
-    summary: str
-    loaded: bool
-    engine: str = ""
-    difference: float = np.nan
-    said: str = ""
-    seconds: float = 0.0
 
 
 Answers = dict[str, Any]
@@ -232,8 +199,7 @@ def difference(robot: SpatialRobot, peer: MuJoCo | Pinocchio) -> float:
             "centre of mass": dynamics.center_of_mass(robot, q),
         }
         for name, mine in ours.items():
-            size = max(float(np.abs(theirs[name]).max()), 1e-12)
-            worst = max(worst, float(np.abs(mine - theirs[name]).max()) / size)
+            worst = max(worst, share(mine, theirs[name]))
     return worst
 
 
@@ -247,35 +213,24 @@ def outcome(robot: Published, clones: Path, scratch: Path) -> Outcome:
         try:
             loaded = load_robot(path, dimension=3, **options)
         except HeelstrikeError as error:
-            words = str(error).replace(str(path), path.name)
-            for folder in (path.resolve().parent, scratch.resolve(), scratch):
-                words = words.replace(f"{folder}{os.sep}", "")
-            return Outcome(robot, words, loaded=False)
+            return refused(robot, error, path, scratch)
     seconds = time.process_time() - start
     words = (
         f"{loaded.nv} velocities, {loaded.nu} motors, {loaded.nc} contact points, "
         f"{len(loaded.feet)} feet, {loaded.total_mass:.5g} kg"
     )
     result = Outcome(robot, words, loaded=True, seconds=seconds)
-    text = path.read_text(encoding="utf-8", errors="replace")
-    if "xacro" in options:
-        from heelstrike.robot.files.ros.xacro import expanded
-
-        given = options["xacro"]
-        text = expanded(path, given if isinstance(given, dict) else {}, (), str(path))
     try:
-        peer = peer_of(path, text, loaded)
+        peer = peer_of(path, text_of(path, options), loaded)
         result.engine, result.difference = peer.name, difference(loaded, peer)
-    except (Refused, ElementTree.ParseError) as refused:
-        result.said = " ".join(str(refused).split())[:160]
+    except (Refused, ElementTree.ParseError) as reason:
+        result.said = shortened(reason)
     return result
 
 
 def page(outcomes: list[Outcome]) -> str:
     """Return a page with all outcomes."""
-    good = [each for each in outcomes if each.loaded]
-    judged = [each for each in good if not np.isnan(each.difference)]
-    equal = [each for each in judged if each.difference <= TOLERANCE]
+    loaded, judged, equal = counts(outcomes, TOLERANCE)
     lines = [
         "# Published robots, whole",
         "",
@@ -283,44 +238,13 @@ def page(outcomes: list[Outcome]) -> str:
         "bias force and centre of mass at random states from another engine's reading of the same",
         "file, as a share of the largest entry.",
         "",
-        f"{len(good)} of {len(outcomes)} load; {len(equal)} of {len(judged)} judged are equal to "
-        f"{TOLERANCE:g}.",
+        f"{loaded} of {len(outcomes)} load; {equal} of {judged} judged are equal to {TOLERANCE:g}.",
         "",
-        "| file | robot, or why it is refused | judge | difference |",
-        "|---|---|---|---|",
+        *HEAD,
     ]
-    for each in outcomes:
-        words = each.summary if each.loaded else f"**refused**: {each.summary}"
-        number = "" if np.isnan(each.difference) else f"{each.difference:.1g}"
-        lines.append(row(each.robot.link, words, each.engine or each.said, number))
+    lines += [each.line(each.engine or each.said) for each in outcomes]
     return "\n".join([*lines, ""])
 
 
-def main() -> int:
-    """Judge the corpus; return 1 if a robot is not the one of its file."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("clones", type=Path)
-    parser.add_argument("--scratch", type=Path, required=True)
-    parser.add_argument("--only", default="")
-    parser.add_argument("--kind", default="spatial", choices=("spatial", "planar"))
-    parser.add_argument("--page", type=Path)
-    given = parser.parse_args()
-    given.scratch.mkdir(parents=True, exist_ok=True)
-    outcomes = []
-    for robot in published():
-        if given.only in f"{robot.repository}/{robot.path}" and robot.kind == given.kind:
-            one = outcome(robot, given.clones, given.scratch)
-            outcomes.append(one)
-            print(
-                f"{'ok     ' if one.loaded else 'REFUSED'} {one.difference:8.1g} {one.engine:10} "
-                f"{one.seconds:4.1f}s {robot.repository} {robot.path}: {one.summary[:150]} "
-                f"{one.said}",
-                flush=True,
-            )
-    if given.page:
-        given.page.write_text(page(outcomes), encoding="utf-8")
-    return int(any(one.difference > TOLERANCE for one in outcomes))
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(judge_all(__doc__, outcome, page, TOLERANCE, kinds=("spatial", "planar")))

@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,14 +26,7 @@ from heelstrike.cli.terminal import Stage
 from heelstrike.experiments import comparison as comparison_module
 from heelstrike.sim import RunStatus
 
-
-@pytest.fixture(autouse=True)
-def handler() -> Iterator[None]:
-    """Python's own way with Ctrl-C, whatever runs the tests."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    signal.signal(signal.SIGINT, before)
+pytestmark = pytest.mark.usefixtures("python_handles_ctrl_c")
 
 
 @pytest.fixture

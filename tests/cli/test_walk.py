@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import walking
+from synthetic_runs import SUMMARY_KEYS
 from typer.testing import CliRunner
 
 import heelstrike as hs
@@ -20,27 +21,6 @@ from heelstrike.experiments.results import OF_MOTORS
 from heelstrike.view.figures import FIGURES
 
 STEPS = 3  # of the walk in conftest.py
-
-KEYS = {
-    "status",
-    "steps",
-    "distance_m",
-    "duration_s",
-    "gait",
-    "tracking_rms_rad",
-    "zmp_min_m",
-    "zmp_max_m",
-    "zmp_limits_m",
-    "friction_use_max",
-    "slip_max_m",
-    "penetration_max_m",
-    "complementarity_max",
-    "solver",
-    "cost_of_transport",
-    "compile_s",
-    "wall_s",
-    "real_time_factor",
-}
 
 
 def test_walks_and_writes_everything(walked: tuple[Path, Any]) -> None:
@@ -62,7 +42,7 @@ def test_walks_and_writes_everything(walked: tuple[Path, Any]) -> None:
 
 def test_summary_has_its_keys_and_a_physical_walk(walked: tuple[Path, Any]) -> None:
     summary = json.loads((walked[0] / "summary.json").read_text(encoding="utf-8"))
-    assert summary.keys() >= KEYS
+    assert summary.keys() >= SUMMARY_KEYS
     assert summary["gait"].keys() >= {"step_length_m", "step_duration_s", "cost_N2m2s"}
     assert summary["solver"].keys() >= {"name", "solves", "fallbacks", "failures"}
     assert summary["status"] == "completed"

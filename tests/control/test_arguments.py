@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -14,14 +13,7 @@ import walking
 import heelstrike as hs
 from heelstrike.control.arguments import numbers_of
 
-
-@cache
-def phased() -> hs.PhasedGait:
-    robot = hs.load_robot("rabbit")
-    gait = hs.optimize_gait(
-        robot, step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1
-    )
-    return hs.PhasedGait.from_gait(robot, gait)
+phased = walking.rabbit_phased
 
 
 GAINS: dict[str, Any] = {"kp": 1.0, "kd": 1.0}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from functools import cache
 
 import numpy as np
 import pytest
+import walking
 
 import heelstrike as hs
 from heelstrike import dynamics
@@ -17,16 +17,7 @@ from heelstrike.sim import Contacts
 FRICTION = 0.75
 
 
-@cache
-def rabbit() -> hs.Robot:
-    return hs.load_robot("rabbit")
-
-
-@cache
-def gait() -> hs.Gait:
-    return hs.optimize_gait(
-        rabbit(), step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1
-    )
+rabbit, gait = walking.rabbit, walking.rabbit_gait
 
 
 def one_step(method: hs.TimeStepping | hs.EventDriven) -> hs.Run:

@@ -72,7 +72,7 @@ def memory_with(draw: np.random.Generator) -> Memory:
     parts.middle[:] = np.tensordot(powers, f.middle, 1)
     parts.half[:] = np.tensordot(powers, f.half, 1)
     parts.missing[:], parts.bend[:] = 0.1 * draw.normal(size=(2, 4))
-    parts.start = f.gait.phase_range[0]
+    parts.first_phase = f.gait.phase_range[0]
     return parts
 
 
@@ -98,7 +98,7 @@ def test_derivatives_of_the_gait_that_changes(seed: int) -> None:
 
 def test_what_is_missing_at_first_is_taken_up_and_fades() -> None:
     memory = memory_with(np.random.default_rng(5))
-    start, width = memory.start, 2.0 * law_module.FADES * memory.half[0]
+    start, width = memory.first_phase, 2.0 * law_module.FADES * memory.half[0]
     found = {}
     for u in (0.0, 0.999999, 1.0):
         follow(memory, start + u * width, 0.0, 0.0, 0.0)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 
 import numpy as np
 import published_walkers as published
 import pytest
+import walking
 from numpy.typing import NDArray
 
 import heelstrike as hs
@@ -18,14 +18,7 @@ from heelstrike.sim import Contacts
 Floats = NDArray[np.float64]
 
 
-@cache
-def gait() -> hs.PhasedGait:
-    """Rabbit's walk of 0.21 m in 0.58 s."""
-    robot = hs.load_robot("rabbit")
-    in_time = hs.optimize_gait(
-        robot, step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1
-    )
-    return hs.PhasedGait.from_gait(robot, in_time)
+gait = walking.rabbit_phased
 
 
 def state_near(gait: hs.PhasedGait, draw: np.random.Generator) -> hs.State:

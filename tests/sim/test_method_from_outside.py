@@ -47,11 +47,6 @@ class Numbers(hs.Bundle):
 
 
 @kernel
-def begin(model: Any, ground: Any, memory: Any, work: Any, record: Any) -> int:
-    return DONE
-
-
-@kernel
 def prepare(model: Any, ground: Any, memory: Any, work: Any) -> None:
     evaluate_equations(model, memory.q, memory.v, memory.equations)
     locate_contacts(model, ground, memory.equations.tree, memory.contacts, memory.surface)
@@ -68,7 +63,8 @@ def decide(
         force[model.actuator_joint[i]] += memory.torque[i]
     if share_over_step(clock.time, work.step, memory.pushes):
         add_pushes(model, equations.tree, memory.pushes, force)
-    contacts = memory.contacts
+    contacts, assembly = memory.contacts, memory.assembly
+    directions = assembly.directions
     for point in range(model.contact_link.shape[0]):
         speed, slip = contact_velocity(model, equations.tree, contacts, point)
         push = -work.stiffness * contacts.gap[point] - work.damping * speed
@@ -76,17 +72,21 @@ def decide(
         contacts.force[point, 0] = push
         contacts.force[point, 1] = -memory.surface.friction[point] * push * np.tanh(slip / 1e-2)
         memory.reaction.slip[point] = slip
-        contact_rows(model, equations.tree, contacts, point, 0, memory.assembly)
+        contact_rows(model, equations.tree, contacts, point, 0, assembly.problem.first, directions)
         for j in range(memory.v.shape[0]):
             for k in range(2):
-                force[j] += memory.assembly.jacobian[k, j] * contacts.force[point, k]
+                force[j] += directions.jacobian[k, j] * contacts.force[point, k]
     for j in range(memory.v.shape[0]):
         rate[j] = force[j] - equations.bias[j]
     solve_mass_matrix(model, equations, rate)
     for j in range(memory.v.shape[0]):
         memory.next_v[j] = memory.v[j] + work.step * rate[j]
-    note_extremes(model, memory)
-    note_events(model, clock.time, clock.time + work.step, work.step, memory, record)
+    note_extremes(contacts.gap, assembly.answer.residual, memory.tally)
+    note_events(
+        model, clock.time, clock.time + work.step, work.step, memory.tally.steps, memory.q,
+        memory.v, memory.next_v, memory.breakaway, equations.tree, contacts, memory.reaction,
+        memory.loops.constraint_force, memory.rows, record.told, memory.reported,
+    )  # fmt: skip
     return DONE
 
 
@@ -127,7 +127,7 @@ class Spring:
 class SpringDamper(Method):
     """Euler's method on springs and dampers."""
 
-    kernels = Kernels(begin, prepare, decide, report, move)
+    kernels = Kernels(None, prepare, decide, report, move)
     work = Numbers
 
     step: float = 1e-4

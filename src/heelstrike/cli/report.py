@@ -163,7 +163,7 @@ def _tell(
     as_json: bool,
 ) -> None:
     from heelstrike.analysis.diagnosis.falls import walked_on
-    from heelstrike.analysis.summary import plain
+    from heelstrike.analysis.told_summary import plain
     from heelstrike.view.page import judge
 
     verdicts = {name: judge(run, gait, tried=tried.get(name, ())) for name, run in runs.items()}

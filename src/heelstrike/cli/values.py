@@ -94,23 +94,11 @@ def pushes_called(several: Sequence[str] | None) -> tuple[Push, ...]:
     SimulationError
         If one is written otherwise, or a number is none.
     """
-    from heelstrike.sim.push import Push
-
-    found = []
-    for words in several or ():
-        link, *rest = words.rsplit(":", 3)
-        force = rest[0].split(",") if len(rest) == 3 else []
-        if not link or len(force) not in (1, 2):
-            raise SimulationError(
-                f"--push {words}: write {PUSH}, as trunk:60:1:0.1 for 60 N along x on the trunk, "
-                "from 1 s on for 0.1 s; trunk:60,-20:1:0.1 also has a force along z."
-            )
-        *along, start, duration = (
-            _number(word, f"--push {words}", SimulationError) for word in (*force, *rest[1:])
-        )
-        x, z = (*along, 0.0)[:2]
-        found.append(Push(link, force=(x, z), start=start, duration=duration))
-    return tuple(found)
+    said = (
+        f"{PUSH}, as trunk:60:1:0.1 for 60 N along x on the trunk, from 1 s on for 0.1 s; "
+        "trunk:60,-20:1:0.1 also has a force along z"
+    )
+    return tuple(_push_called(words, 2, said) for words in several or ())
 
 
 def spatial_pushes_called(several: Sequence[str] | None) -> tuple[Push, ...]:
@@ -121,22 +109,26 @@ def spatial_pushes_called(several: Sequence[str] | None) -> tuple[Push, ...]:
     SimulationError
         If one is written otherwise, or a number is none.
     """
+    said = (
+        "LINK:X,Y,Z:START:DURATION, as trunk:0,60,0:1:0.1 for 60 N to the left on the trunk, from "
+        "1 s on for 0.1 s"
+    )
+    return tuple(_push_called(words, 3, said) for words in several or ())
+
+
+def _push_called(words: str, dimension: int, said: str) -> Push:
+    """Make a push of what is written; in the plane the force along z may be left out."""
     from heelstrike.sim.push import Push
 
-    found = []
-    for words in several or ():
-        link, *rest = words.rsplit(":", 3)
-        force = rest[0].split(",") if len(rest) == 3 else []
-        if not link or len(force) != 3:
-            raise SimulationError(
-                f"--push {words}: write LINK:X,Y,Z:START:DURATION, as trunk:0,60,0:1:0.1 for 60 N "
-                "to the left on the trunk, from 1 s on for 0.1 s."
-            )
-        x, y, z, start, duration = (
-            _number(word, f"--push {words}", SimulationError) for word in (*force, *rest[1:])
-        )
-        found.append(Push(link, force=(x, y, z), start=start, duration=duration))
-    return tuple(found)
+    link, *rest = words.rsplit(":", 3)
+    force = rest[0].split(",") if len(rest) == 3 else []
+    if not link or len(force) not in ((1, 2) if dimension == 2 else (dimension,)):
+        raise SimulationError(f"--push {words}: write {said}.")
+    *along, start, duration = (
+        _number(word, f"--push {words}", SimulationError) for word in (*force, *rest[1:])
+    )
+    missing = [0.0] * (dimension - len(along))
+    return Push(link, force=(*along, *missing), start=start, duration=duration)
 
 
 def range_called(words: str, where: str) -> tuple[float, float]:

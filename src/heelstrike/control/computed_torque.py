@@ -166,7 +166,9 @@ def computed_torque(
     parameters: Parameters, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques that make the joints follow the gait (eq. 39)."""
-    if exchange_at_touchdown(t, t - memory.start, parameters.earliest, contacts, robot, memory):
+    if exchange_at_touchdown(
+        t, t - memory.start, parameters.earliest, contacts, robot.contact_foot, memory
+    ):
         memory.samples = 0
     landed = has_landed(t, parameters.landing, state, contacts, robot, memory)
     foot = memory.stance

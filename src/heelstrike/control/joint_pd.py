@@ -75,7 +75,9 @@ def joint_pd(
     parameters: Parameters, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques of the law above."""
-    exchange_at_touchdown(t, t - memory.start, parameters.earliest, contacts, robot, memory)
+    exchange_at_touchdown(
+        t, t - memory.start, parameters.earliest, contacts, robot.contact_foot, memory
+    )
     landed = has_landed(t, parameters.landing, state, contacts, robot, memory)
     piece, inside, moves = place_in_step(
         t - memory.start, parameters.latest, parameters.breakpoints

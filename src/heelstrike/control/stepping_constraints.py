@@ -89,7 +89,7 @@ class Memory(StanceClock):
     before: float = cell(float)
     shift: float = cell(float)
     """before, shift: Shift as the step began, and now, in largest ones."""
-    start: float = cell(float)
+    first_phase: float = cell(float)
     """Phase at which the step began (rad)."""
     missing: Floats = array("nu")
     bend: Floats = array("nu")
@@ -259,7 +259,7 @@ def note_missing(
     """
     theta, rate = phase_and_rate(state, parameters.phase, memory.stance)
     rate = max(rate, LEAST_RATE * parameters.rate)
-    memory.start = theta
+    memory.first_phase = theta
     follow(memory, theta, memory.before, 0.0, 0.0)
     for i in range(robot.nu):
         memory.missing[i] = state.joint_position[i] - memory.value[i]
@@ -272,7 +272,7 @@ def note_missing(
 def take_up(memory: Memory, theta: float) -> None:
     """Add what the joints were off the gait as the step began, faded, and its derivatives."""
     width = 2.0 * FADES * memory.half[0]
-    u = (theta - memory.start) / width
+    u = (theta - memory.first_phase) / width
     if u >= 1.0:
         return
     left = 1.0 - u
@@ -300,7 +300,7 @@ def stepping_constraints(
     if memory.begun == 0:
         prepare(memory.bearable.program)
         begin_step(state, contacts, robot, parameters, memory)
-    elif exchange_at_touchdown(t, ahead, 0.0, contacts, robot, memory):
+    elif exchange_at_touchdown(t, ahead, 0.0, contacts, robot.contact_foot, memory):
         begin_step(state, contacts, robot, parameters, memory)
     if memory.landed == 0:
         note_missing(t, state, contacts, robot, parameters, memory)

@@ -201,7 +201,7 @@ def virtual_constraints(
 ) -> None:  # fmt: skip
     """Joint torques that make the outputs obey ÿ = u(y, ẏ) on a point foot."""
     gone = phase_of_foot(state, parameters, memory.stance)
-    exchange_at_touchdown(t, gone, LANDS_AFTER, contacts, robot, memory)
+    exchange_at_touchdown(t, gone, LANDS_AFTER, contacts, robot.contact_foot, memory)
     want(state, robot, parameters, memory)
     hold_foot(state, contacts, robot, parameters.phase, memory.stance)
     demand(state, robot, memory.wanted, memory.slope)

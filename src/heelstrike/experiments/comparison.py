@@ -19,7 +19,7 @@ from heelstrike.analysis import (
     zero_moment_point,
 )
 from heelstrike.analysis.intervals import IMPULSIVE, impulses_in_events
-from heelstrike.analysis.summary import plain
+from heelstrike.analysis.told_summary import plain
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError

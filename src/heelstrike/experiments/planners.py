@@ -17,7 +17,7 @@ from rich.table import Table
 
 from heelstrike.analysis import zero_moment_point
 from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
-from heelstrike.analysis.summary import plain
+from heelstrike.analysis.told_summary import plain
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque, MotionTracking

@@ -15,6 +15,7 @@ from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.coordinates import Spread, checked, finite, index_of, spread_of
+from heelstrike.robot.counted import Counted
 from heelstrike.robot.model import Model
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
@@ -54,7 +55,7 @@ class LockedJoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Robot(ShownInNotebooks):
+class Robot(Counted, ShownInNotebooks):
     """A planar robot."""
 
     name: str
@@ -93,36 +94,6 @@ class Robot(ShownInNotebooks):
             object.__setattr__(self, "mirror", mirror)
 
     @property
-    def nl(self) -> int:
-        """Number of links."""
-        return self.model.nl
-
-    @property
-    def nj(self) -> int:
-        """Number of joints, one a link."""
-        return self.model.nj
-
-    @property
-    def nq(self) -> int:
-        """Number of positions."""
-        return self.model.nq
-
-    @property
-    def nv(self) -> int:
-        """Number of velocities."""
-        return self.model.nv
-
-    @property
-    def nu(self) -> int:
-        """Number of joint torques."""
-        return self.model.nu
-
-    @property
-    def nc(self) -> int:
-        """Number of contact points."""
-        return self.model.nc
-
-    @property
     def loop_names(self) -> tuple[str, ...]:
         """Names of the closed loops: those of the two links that each joins."""
         names = [*self.link_names, "world"]  # which is link -1
@@ -144,18 +115,9 @@ class Robot(ShownInNotebooks):
         return tuple(self.joint_names[joint] for joint in self.model.brake_joint)
 
     @property
-    def total_mass(self) -> float:
-        """Mass of the whole robot in kg."""
-        return float(np.sum(self.model.mass))
-
-    @property
     def weight(self) -> float:
         """Total mass times gravity, in N."""
         return self.total_mass * float(np.hypot(*self.model.gravity))
-
-    def reference_state(self) -> State:
-        """State at rest in the reference configuration of the robot's file."""
-        return State(self.model.reference.copy(), np.zeros(self.nv))
 
     def joint_index(self, joint: str | int) -> int:
         """Index of a coordinate, given by the name of its joint (or by an index, which is checked).
@@ -176,21 +138,6 @@ class Robot(ShownInNotebooks):
             If there is no such joint; the message lists those there are.
         """
         return index_of(self, "joint", self.joint_names, joint)
-
-    def actuator_index(self, actuator: str | int) -> int:
-        """Index of an actuator, given by its name or index; see `joint_index`.
-
-        Parameters
-        ----------
-        actuator : str or int
-            Name of the actuator, or an index.
-
-        Returns
-        -------
-        int
-            Its place among the torques.
-        """
-        return index_of(self, "actuator", self.actuator_names, actuator)
 
     @takes(RobotError)
     def state(

@@ -31,6 +31,7 @@ from heelstrike.sim.compliant.law import NormalLaw as NormalLaw
 from heelstrike.sim.contacts.brakes import find_loops_of_step as find_loops_of_step
 from heelstrike.sim.contacts.brakes import note_brakes as note_brakes
 from heelstrike.sim.contacts.brakes import share_friction as share_friction
+from heelstrike.sim.contacts.candidates import Listing as Listing
 from heelstrike.sim.contacts.candidates import find_constraints as find_constraints
 from heelstrike.sim.contacts.candidates import hold_latched as hold_latched
 from heelstrike.sim.contacts.candidates import list_candidate as list_candidate
@@ -38,7 +39,8 @@ from heelstrike.sim.contacts.candidates import list_dry_joints as list_dry_joint
 from heelstrike.sim.contacts.candidates import locate_stops as locate_stops
 from heelstrike.sim.contacts.candidates import note_answer as note_answer
 from heelstrike.sim.contacts.candidates import note_group as note_group
-from heelstrike.sim.contacts.candidates import write_rows as write_rows
+from heelstrike.sim.contacts.candidates import write_contact_rows as write_contact_rows
+from heelstrike.sim.contacts.candidates import write_joint_rows as write_joint_rows
 from heelstrike.sim.contacts.constraint import Constraint, constrained
 from heelstrike.sim.contacts.geometry import add_impulse as add_impulse
 from heelstrike.sim.contacts.geometry import assemble_delassus as assemble_delassus

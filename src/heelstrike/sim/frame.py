@@ -26,7 +26,7 @@ import numpy as np
 from numba import types
 
 from heelstrike.compiler.bundle_type import Fixed
-from heelstrike.compiler.compilation import AddressedLoop, dissolved_kernel
+from heelstrike.compiler.compilation import AddressedLoop, dissolved_kernel, kernel
 from heelstrike.compiler.separate_kernel import SeparateKernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.solvers.certified_solve import try_solvers
@@ -35,6 +35,7 @@ from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.clock import Clock
+from heelstrike.sim.contacts.loops import begin_closed
 from heelstrike.sim.controller.asking import ask
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.law import controller_in
@@ -42,7 +43,7 @@ from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.dimension import AnyRobot
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record, RowsAndEvents
-from heelstrike.sim.record.recording import center_height, note_log, sound
+from heelstrike.sim.record.recording import center_height, note_log, note_row_when_due, sound
 
 
 class Outcome(enum.IntEnum):
@@ -103,23 +104,29 @@ class Common:
     kinds: tuple[Any, ...]
     """Classes of model, ground, control, memory and record."""
     sound: Callable[..., bool]
-    """Kernel ``sound(memory)``: whether the state is finite and not absurd."""
+    """Kernel ``sound(q, v)``: whether the state is finite and not absurd."""
     ask: Callable[..., None]
-    """Kernel ``ask(controller, time, q, v, model, memory, control, command)``: ask the
+    """Kernel ``ask(controller, time, q, v, model, tree, contacts, control, command)``: ask the
     controller."""
     limit_torque: Callable[..., bool]
-    """Kernel ``limit_torque(model, control, memory)``: find the torques of the commands; returns
-    whether all of these are finite."""
+    """Kernel ``limit_torque(model, voltage, v, tally, command, torque)``: find the torques of the
+    commands; returns whether all of these are finite."""
     center_height: Callable[..., float]
     """Kernel ``center_height(model, ground, tree)``: height of the centre of mass over the
     ground."""
+    note_row_when_due: Callable[..., int]
+    """Kernel ``note_row_when_due(memory, clock, record)``: append a row if one is due; returns
+    which, or -1."""
     solver: SeparateKernel
     """What solves contact problems."""
+    begin_closed: Callable[..., bool] | None = None
+    """Kernel ``begin_closed(model, q, equations, loops, v)``: close the loops of the first state;
+    returns whether they can be closed. None where there are no loops."""
 
 
 IN_THE_PLANE = Common(
     (Model, GroundModel, Control, Memory, Record), sound, ask, limit_torque, center_height,
-    try_solvers,
+    note_row_when_due, try_solvers, begin_closed,
 )  # fmt: skip
 
 
@@ -127,18 +134,19 @@ IN_THE_PLANE = Common(
 class Kernels:
     """What a method supplies to the frame; ``work`` is the bundle of the method."""
 
-    begin: Callable[..., int]
-    """Kernel ``begin(model, ground, memory, work, record)``: prepare the first instant; returns
-    ``DONE`` or what is in the way."""
+    begin: Callable[..., int] | None
+    """Kernel ``begin(model, ground, memory, work, record)``: prepare the first instant, at which
+    the loops have been closed; returns ``DONE`` or what is in the way. None of a method that has
+    nothing to prepare."""
     prepare: Callable[..., None]
     """Kernel ``prepare(model, ground, memory, work)``: find kinematics, velocities and contacts of
     the state in ``memory.q`` and ``memory.v``."""
     decide: Callable[..., int]
     """Kernel ``decide(scene, control, memory, work, record, clock)``: decide what acts from now on;
     returns ``DONE`` or what is in the way."""
-    report: Callable[..., None]
+    report: Callable[..., None] | None
     """Kernel ``report(scene, control, memory, work, record, clock)``: append to the record what is
-    due of this instant."""
+    due of this instant. None of a method that appends a row if one is due, and no more."""
     move: Callable[..., int]
     """Kernel ``move(scene, control, memory, work, record, clock)``: bring state and ``clock.time``
     to the next instant; returns ``DONE`` or what is in the way. After ``RECORD_FULL`` or ``FORK``
@@ -148,10 +156,11 @@ class Kernels:
 
 
 @dissolved_kernel
-def is_full(record: RowsAndEvents, clock: Clock) -> bool:
-    """Whether there may be no room for what an instant adds to the record."""
-    rows = record.rows + clock.row_margin > record.time.shape[0]
-    return bool(rows or record.events + clock.event_margin > record.event_time.shape[0])
+def is_full(rows: int, events: int, record: RowsAndEvents) -> bool:
+    """Whether there may be no room in the record for so many rows and events more."""
+    told = record.told
+    full = record.rows + rows > record.time.shape[0]
+    return bool(full or told.events + events > told.event_time.shape[0])
 
 
 @dissolved_kernel
@@ -162,12 +171,44 @@ def is_due(clock: Clock) -> bool:
     return bool(clock.time >= clock.calls * clock.control_period)
 
 
+@kernel
+def nothing(model: Any, ground: Any, memory: Any, work: Any, record: Any) -> int:  # noqa: ARG001
+    """Begin with nothing to prepare."""
+    return DONE
+
+
+def closing(begin_closed: Callable[..., bool] | None) -> Callable[[Any, Any], bool]:
+    """Make the kernel that closes the loops of a memory; it returns whether they can be closed."""
+
+    @kernel
+    def no_loops(model: Any, memory: Any) -> bool:  # noqa: ARG001
+        return True
+
+    @kernel
+    def loops(model: Any, memory: Any) -> bool:
+        return begin_closed(model, memory.q, memory.equations, memory.loops, memory.v)  # type: ignore[misc]
+
+    return no_loops if begin_closed is None else loops
+
+
+def reporting(note_row_when_due: Callable[..., int]) -> Callable[..., None]:
+    """Make the kernel that reports an instant by a row, if one is due."""
+
+    @dissolved_kernel
+    def report(scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Clock) -> None:  # noqa: ARG001
+        note_row_when_due(memory, clock, record)
+
+    return report
+
+
 def frame(kernels: Kernels) -> Callable[..., int]:
     """Return the loop of a method."""
-    begin, prepare, decide = kernels.begin, kernels.prepare, kernels.decide
-    report, move, common = kernels.report, kernels.move, kernels.common
+    common = kernels.common
+    begin = kernels.begin or nothing
+    prepare, decide, move = kernels.prepare, kernels.decide, kernels.move
+    report = kernels.report or reporting(common.note_row_when_due)
     is_sound, ask_law, limit = common.sound, common.ask, common.limit_torque
-    height = common.center_height
+    close, height = closing(common.begin_closed), common.center_height
 
     def advance(
         model: Any, ground: Any, control: Any, memory: Any, work: Any, record: Any, clock: Clock
@@ -175,14 +216,17 @@ def frame(kernels: Kernels) -> Callable[..., int]:
         """Advance a simulation until its time is up or something stops it; return what."""
         controller = controller_in(control.function)
         scene = Scene(controller, model, ground)
+        q, v, equations = memory.q, memory.v, memory.equations
         if clock.moving == TOLD:  # taken up again, to be left or looked at
             if clock.finishing == 0 and clock.time >= clock.until:
                 return DONE
             clock.moving = 1 - clock.finishing
         while True:
-            if is_full(record, clock):
+            if is_full(clock.row_margin, clock.event_margin, record):
                 return RECORD_FULL
             if clock.begun == 0:
+                if not close(model, memory):
+                    return DIVERGED
                 code = begin(model, ground, memory, work, record)
                 if code != DONE:
                     return code
@@ -193,18 +237,21 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                         return DONE
                     if clock.index >= clock.pause:
                         return PAUSED
-                if not is_sound(memory):
+                if not is_sound(q, v):
                     return DIVERGED
                 prepare(model, ground, memory, work)
                 if is_due(clock):
                     if control.in_python == 0:
-                        q, v, command = memory.q, memory.v, memory.command
-                        ask_law(controller, clock.time, q, v, model, memory, control, command)
+                        ask_law(
+                            controller, clock.time, q, v, model, equations.tree, memory.contacts,
+                            control, memory.command,
+                        )  # fmt: skip
                     elif clock.answered == 0:
                         return ASKING
                     clock.answered = 0
                     clock.calls += 1
-                if not limit(model, control, memory):
+                command, torque = memory.command, memory.torque
+                if not limit(model, control.voltage, v, memory.tally, command, torque):
                     return BAD_CONTROLLER
                 if control.robot.ending >= 0:
                     clock.finishing = 1
@@ -214,7 +261,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                 note_log(control.kept, control.logged, record)
                 if code != DONE:
                     return code
-                if height(model, ground, memory.equations.tree) < clock.fallen_height:
+                if height(model, ground, equations.tree) < clock.fallen_height:
                     clock.moving = TOLD
                     return FELL
                 if control.robot.ending >= 0:

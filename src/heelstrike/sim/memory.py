@@ -107,14 +107,9 @@ class Surface(Bundle):
     positive over a hill: zero but on smooth ground."""
 
 
-class Assembly(Bundle):
-    """The contact problem of an instant, how it is put together, and its answer."""
+class Directions(Bundle):
+    """The directions along which candidates act."""
 
-    candidate: Integers = array("capacity", of=int)
-    """Entries of the table of rows that take part, kind by kind. The capacity has room for all."""
-    begin: Integers = array("kinds", of=int)
-    until: Integers = array("kinds", of=int)
-    """begin, until: Places of the first candidate of each kind, and of the one after its last."""
     jacobian: Floats = array("2 capacity", "nv")
     """Contact Jacobian of the candidates."""
     leaf: Integers = array("capacity", of=int)
@@ -123,6 +118,18 @@ class Assembly(Bundle):
     root: Floats = array("nv")
     half: Floats = array("nv", "2 capacity")
     """D^(-1/2) and D^(-1/2) L⁻ᵀ Jᵀ, with A = Lᵀ D L."""
+
+
+class Assembly(Bundle):
+    """The contact problem of an instant, how it is put together, and its answer."""
+
+    candidate: Integers = array("capacity", of=int)
+    """Entries of the table of rows that take part, kind by kind. The capacity has room for all."""
+    begin: Integers = array("kinds", of=int)
+    until: Integers = array("kinds", of=int)
+    """begin, until: Places of the first candidate of each kind, and of the one after its last."""
+    directions: Directions = part(Directions, flat=True)
+    """Along what they act."""
     problem: ContactProblem = part(ContactProblem)
     """The contact problem of the candidates."""
     answer: ContactAnswer = part(ContactAnswer)

@@ -46,15 +46,16 @@ class Method(ABC):
     - :attr:`step_length`, if all its steps are of one length;
     - whatever else below is not so with it.
 
-    The frame sees to the controller, the limits of torques, the record and when to stop. The
-    kernels of the method see to
+    The frame sees to the controller, the limits of torques, closed loops as a run begins, the record
+    and when to stop. The kernels of the method see to
 
+    - ``begin``: what else has to be ready for the first instant; None if nothing has;
     - ``prepare``: ``memory.equations.tree`` and ``memory.contacts`` of the state in ``memory.q``,
       ``memory.v``;
     - ``decide``: what follows from these and from ``memory.torque``: forces in
       ``memory.contacts.force`` (N), torques of stops and dry friction and slip in
       ``memory.reaction``, residuals; pushes in ``memory.pushes``; worst values and events;
-    - ``report``: a row when one is due;
+    - ``report``: what goes into the record; None if that is a row when one is due;
     - ``move``: ``memory.q``, ``memory.v`` and ``clock.time`` of the next instant, not beyond
       ``clock.until`` if steps have no length of their own, and one more in ``memory.tally.steps``.
 

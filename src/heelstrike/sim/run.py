@@ -498,19 +498,25 @@ def joined(
     `log` is the bundle whose numbers the words of the records are.
     """
 
-    def join(member: str, used: str) -> Any:
-        parts = [getattr(record, member)[: getattr(record, used)] for record in records]
+    def join(parts: Sequence[Any]) -> Any:
         return np.concatenate(parts) if len(parts) > 1 else parts[0].copy()
 
-    first = int(np.searchsorted(join("time", "rows"), since))
-    rows = {name: join(name, "rows")[first:] for name in ("time", *quantities)}
+    def rows_of(member: str) -> Any:
+        return join([getattr(record, member)[: record.rows] for record in records])
+
+    def events_by(member: str) -> Any:
+        return join([getattr(told, f"event_{member}")[: told.events] for told in tellings])
+
+    tellings = [record.told for record in records]
+    first = int(np.searchsorted(rows_of("time"), since))
+    rows = {name: rows_of(name)[first:] for name in ("time", *quantities)}
     events: tuple[Event, ...] = ()
-    if any(record.events for record in records):
-        arrays = {name: join(f"event_{name}", "events") for name in EVENT_MEMBERS}
+    if any(told.events for told in tellings):
+        arrays = {name: events_by(name) for name in EVENT_MEMBERS}
         order = np.argsort(arrays["time"], kind="stable")
         order = order[arrays["time"][order] >= since]
         events = events_of(*(values[order] for values in arrays.values()))
-    return rows | {"events": events, "log": _logged(join("log", "rows")[first:], log)}
+    return rows | {"events": events, "log": _logged(rows_of("log")[first:], log)}
 
 
 def _logged(words: NDArray[np.int64], log: Bundle) -> dict[str, Logged]:

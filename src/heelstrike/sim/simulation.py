@@ -715,9 +715,9 @@ class Simulation:
 
     def _count_events(self, record: RowsAndEvents) -> None:
         """Count the events of a record and forget it."""
-        kinds = record.event_kind[: record.events]
+        kinds = record.told.event_kind[: record.told.events]
         self._event_counts += np.bincount(kinds, minlength=len(EventKind))
-        record.rows = record.events = record.logged = 0
+        record.rows = record.told.events = record.logged = 0
 
     def _control_with(self, controller: Controller | None) -> None:
         """Begin with a controller, or stay with the one before if this one cannot be used."""
@@ -910,7 +910,7 @@ class Simulation:
         if self.status is not RunStatus.COMPLETED or not self._can_be_kept:
             return self._run(self.status, self.message)
         now = self.snapshot()
-        counts = [(record.rows, record.events) for record in self._records]
+        counts = [(record.rows, record.told.events) for record in self._records]
         own = self._pushes, self._ground, self.error
         try:
             return self._run(*self._decide_last(), final=now)
@@ -919,7 +919,7 @@ class Simulation:
             self._pushes, self._ground, self.error = own
             del self._records[len(counts) :]
             for record, (rows, events) in zip(self._records, counts, strict=True):
-                record.rows, record.events, record.logged = rows, events, rows
+                record.rows, record.told.events, record.logged = rows, events, rows
 
     @property
     def _can_be_kept(self) -> bool:

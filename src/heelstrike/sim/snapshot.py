@@ -20,7 +20,7 @@ from heelstrike.robot.state import State
 from heelstrike.sim.image import Image
 
 _IDENTITY = "identity"
-_FORMAT = 6
+_FORMAT = 7
 
 
 @dataclass(frozen=True, eq=False)

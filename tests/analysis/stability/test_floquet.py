@@ -7,6 +7,7 @@ from functools import cache
 import mechanisms
 import numpy as np
 import pytest
+import walking
 
 import heelstrike as hs
 from heelstrike.analysis.stability import returns
@@ -59,11 +60,7 @@ def test_returns_without_memory_are_those_that_differences_show(
 
 @cache
 def rabbit() -> tuple[hs.Robot, hs.VirtualConstraints, hs.ZeroDynamics]:
-    robot = hs.load_robot("rabbit")
-    gait = hs.optimize_gait(
-        robot, step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1
-    )
-    phased = hs.PhasedGait.from_gait(robot, gait)
+    robot, phased = walking.rabbit(), walking.rabbit_phased()
     return robot, hs.VirtualConstraints(phased), hs.zero_dynamics(phased)
 
 

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import walking
 
 import heelstrike as hs
 from heelstrike.analysis.stability.largest import largest
@@ -15,11 +16,7 @@ from heelstrike.analysis.stability.largest import largest
 @cache
 def trial() -> hs.Trial:
     """Rabbit under virtual constraints, 0.21 m in 0.58 s."""
-    robot = hs.load_robot("rabbit")
-    gait = hs.optimize_gait(
-        robot, step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1
-    )
-    phased = hs.PhasedGait.from_gait(robot, gait)
+    robot, phased = walking.rabbit(), walking.rabbit_phased()
     zero = hs.zero_dynamics(phased)
     return hs.Trial(
         robot=robot,

@@ -104,11 +104,7 @@ def test_round_feet_roll() -> None:
 
 @cache
 def rabbit() -> tuple[hs.Robot, hs.VirtualConstraints, hs.ZeroDynamics]:
-    robot = hs.load_robot("rabbit")
-    gait = hs.optimize_gait(
-        robot, step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1
-    )
-    phased = hs.PhasedGait.from_gait(robot, gait)
+    robot, phased = walking.rabbit(), walking.rabbit_phased()
     return robot, hs.VirtualConstraints(phased), hs.zero_dynamics(phased)
 
 

@@ -195,10 +195,7 @@ def test_small_errors_leave_the_foot_flat() -> None:
 
 
 def test_what_it_refuses() -> None:
-    robot = hs.load_robot("rabbit")
-    gait = hs.optimize_gait(
-        robot, step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1
-    )
+    robot, gait = walking.rabbit(), walking.rabbit_gait()
     with pytest.raises(hs.ControllerError, match=r"one flat foot .* hs\.GaitLQR"):
         hs.FlatGaitLQR(robot, gait)
     with pytest.raises(hs.ControllerError, match="torque_weight must be positive"):

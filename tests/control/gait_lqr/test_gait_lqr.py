@@ -16,15 +16,7 @@ from heelstrike.control.gait_lqr.orbit import Orbit, orbit_of
 from heelstrike.control.gait_lqr.transverse import Transverse
 from heelstrike.errors import ControllerError
 
-
-@cache
-def gait() -> hs.PhasedGait:
-    """Rabbit's walk of 0.21 m in 0.58 s."""
-    robot = hs.load_robot("rabbit")
-    in_time = hs.optimize_gait(
-        robot, step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1
-    )
-    return hs.PhasedGait.from_gait(robot, in_time)
+gait = walking.rabbit_phased
 
 
 @cache

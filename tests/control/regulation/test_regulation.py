@@ -211,9 +211,6 @@ def test_wrong_numbers_are_named(options: dict[str, Any], said: str) -> None:
 
 
 def test_a_gait_on_point_feet_is_refused() -> None:
-    robot = hs.load_robot("rabbit")
-    gait = hs.optimize_gait(
-        robot, step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1
-    )
+    robot, gait = walking.rabbit(), walking.rabbit_gait()
     with pytest.raises(ControllerError, match="one flat foot at a time"):
         hs.ZeroMomentPointRegulation(robot, gait)

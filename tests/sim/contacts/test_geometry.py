@@ -46,27 +46,26 @@ def test_delassus_matrix_and_what_impulses_do(
     draw = np.random.default_rng(5)
     memory = allocate_memory(robot)
     equations, assembly = memory.equations, memory.assembly
-    tree = equations.tree
+    tree, directions, first = equations.tree, assembly.directions, assembly.problem.first
     assert straight == bool(equations.programs[programs.EQUATIONS])
     for _ in range(5):
         memory.q[:] = draw.normal(size=robot.nv)
         evaluate_equations(robot.model, memory.q, memory.v, equations)
         locate_contacts(robot.model, Ground().model(), tree, memory.contacts, memory.surface)
         for contact in range(robot.nc):
-            contact_rows(robot.model, tree, memory.contacts, contact, contact, assembly)
-        first = assembly.problem.first
+            contact_rows(robot.model, tree, memory.contacts, contact, contact, first, directions)
         for component in range(2):  # a stop, which has one row, and a dry joint
             place = robot.nc + component
             first[place + 1] = first[place] + 1 + component
             write_unit_row(
-                int(draw.integers(robot.nv)), place, component, -1.0, first, assembly.leaf,
-                assembly.jacobian,
+                int(draw.integers(robot.nv)), place, component, -1.0, first, directions.leaf,
+                directions.jacobian,
             )  # fmt: skip
         count = robot.nc + 2
         rows = first[count]
         assert rows == 2 * robot.nc + 3
-        assemble_delassus(robot.model, count, equations, assembly)
-        jacobian = assembly.jacobian[:rows]
+        assemble_delassus(robot.model, count, equations, directions, assembly.problem)
+        jacobian = directions.jacobian[:rows]
         inverse = np.linalg.inv(dynamics.mass_matrix(robot, memory.q))
         expected = jacobian @ inverse @ jacobian.T
         found = assembly.problem.delassus[:rows, :rows]
@@ -75,7 +74,8 @@ def test_delassus_matrix_and_what_impulses_do(
         change = inverse @ jacobian.T @ assembly.answer.impulse[:rows]
         v = draw.normal(size=robot.nv)
         after = v.copy()
-        add_impulse(robot.model, assembly, count, equations, after)
+        impulse = assembly.answer.impulse
+        add_impulse(robot.model, int(rows), impulse, directions, equations, after)
         np.testing.assert_allclose(after - v, change, atol=ROUNDING * np.abs(change).max())
 
 

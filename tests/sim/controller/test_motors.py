@@ -8,7 +8,6 @@ is asked for, at every velocity at which a torque acts.
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -298,9 +297,9 @@ def test_a_motor_that_never_turns_is_refused() -> None:
 def test_a_command_that_is_no_number_is_named_by_its_place() -> None:
     robot = hs.load_robot("bravo7")
     memory = allocate_memory(robot)
-    control = SimpleNamespace(voltage=0)
     limit = uncompiled(limit_torque)
-    assert limit(robot.model, control, memory)
+    told = memory.v, memory.tally, memory.command, memory.torque
+    assert limit(robot.model, 0, *told)
     memory.command[4] = np.inf
-    assert not limit(robot.model, control, memory)
+    assert not limit(robot.model, 0, *told)
     assert memory.tally.bad_torque == 4

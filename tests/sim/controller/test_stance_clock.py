@@ -39,7 +39,7 @@ def clocked(*instants: tuple[float, tuple[int, ...]]) -> list[tuple[int, float]]
     for t, pressed in instants:
         clock.landed = 1
         seen = contacts(*pressed)
-        begun = exchange_at_touchdown(t, t - clock.start, EARLIEST, seen, robot, clock)
+        begun = exchange_at_touchdown(t, t - clock.start, EARLIEST, seen, robot.contact_foot, clock)
         assert clock.landed == int(not begun)  # its impact is not over yet
         told.append((clock.stance, clock.start))
     return told
@@ -81,7 +81,7 @@ def test_a_wall_is_not_stood_upon() -> None:
     for height, stands in ((STEEP - 0.01, False), (STEEP + 0.01, True)):
         normal = (-float(np.sqrt(1.0 - height**2)), height)
         seen = contacts(OTHER_TOE, normal=normal)
-        assert exchange_at_touchdown(1.0, 1.0, 0.5, seen, robot, clock) is stands
+        assert exchange_at_touchdown(1.0, 1.0, 0.5, seen, robot.contact_foot, clock) is stands
 
 
 def turning_about(point: int, rate: float) -> tuple[Any, Any, Contacts]:

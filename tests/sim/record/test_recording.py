@@ -38,7 +38,7 @@ def test_worst_values_are_the_worst_of_all_steps_each_for_itself() -> None:
     for gap, residual in steps:
         memory.contacts.gap[:] = gap
         memory.assembly.answer.residual[:] = residual
-        note(robot.model, memory)
+        note(memory.contacts.gap, memory.assembly.answer.residual, memory.tally)
     assert worst(memory) == (8e-4, 5e-12, 9e-12, 3e-12)
 
 
@@ -46,7 +46,8 @@ def test_points_that_stay_above_the_ground_penetrate_by_nothing() -> None:
     robot = box()
     memory = allocate_memory(robot)
     memory.contacts.gap[:] = [0.1, 0.2]
-    uncompiled(note_extremes)(robot.model, memory)
+    residual, note = memory.assembly.answer.residual, uncompiled(note_extremes)
+    note(memory.contacts.gap, residual, memory.tally)
     assert worst(memory) == (0.0, 0.0, 0.0, 0.0)
 
 

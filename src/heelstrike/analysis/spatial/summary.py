@@ -7,7 +7,8 @@ import numpy as np
 from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.support import pushing_in_space
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
-from heelstrike.analysis.summary import UNKNOWN, Figures, in_lines
+from heelstrike.analysis.summary import OF_A_GAIN, UNKNOWN
+from heelstrike.analysis.told_summary import ToldSummary, in_lines
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.sim.closed_sets import EventKind
@@ -22,7 +23,7 @@ MOST_LOOKED_AT = 2000
 
 
 @dataclass(frozen=True)
-class SpatialSummary(Figures):
+class SpatialSummary(ToldSummary):
     """Figures of a run in space. Those that do not exist for it are NaN (null in JSON)."""
 
     robot: str
@@ -81,7 +82,7 @@ class SpatialSummary(Figures):
     def lines(self) -> list[tuple[str, str]]:
         """Label and value of every line of the table a person reads."""
         needless = {
-            "energy made by impacts": not self.energy_gain_J > 0.0,
+            OF_A_GAIN: not self.energy_gain_J > 0.0,
             "turn": not np.isfinite(self.turn_rad),
         }
         return in_lines(self, LINES, needless)
@@ -196,7 +197,7 @@ LINES = {
     "{s.solver.fallbacks} needed another way; residual {s.residual_max:.2}",
     "steps not certified": "{s.uncertified} to 1e-9; {s.halved} halved; {s.relaxed} with a wedged "
     "point left in place",
-    "energy created by impacts": "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
+    OF_A_GAIN: "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
     "torque cost": "{s.torque_cost_N2m2s:.4} N²m²s",
     "cost of transport": "{s.cost_of_transport:.3} "
     "({s.cost_of_transport_positive:.3} by positive work alone)",

@@ -99,7 +99,9 @@ def begin_at_touchdown(
     soon = t - memory.start < TOO_EARLY * parameters.planning.earliest
     if soon or memory.lifting == 1:
         return
-    if exchange_at_touchdown(t, memory.phase, parameters.touchdown, contacts, robot, memory):
+    if exchange_at_touchdown(
+        t, memory.phase, parameters.touchdown, contacts, robot.contact_foot, memory
+    ):
         # Where it stood: by now the impact may have lifted it.
         memory.rear[0], memory.rear[1] = memory.sole[0], memory.sole[1]
         memory.steps += 1

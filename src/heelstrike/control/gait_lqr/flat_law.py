@@ -79,7 +79,9 @@ def flat_gait_lqr(
     parameters: Parameters, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques of the law above."""
-    exchange_at_touchdown(t, t - memory.start, parameters.earliest, contacts, robot, memory)
+    exchange_at_touchdown(
+        t, t - memory.start, parameters.earliest, contacts, robot.contact_foot, memory
+    )
     landed = has_landed(t, parameters.landing, state, contacts, robot, memory)
     phase = t - memory.start
     find_errors(state, parameters, memory, phase)

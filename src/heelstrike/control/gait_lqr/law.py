@@ -115,7 +115,7 @@ def gait_lqr(
 ) -> None:  # fmt: skip
     """Joint torques of the law above."""
     part = seen_as_in_the_walk(state, parameters, memory)
-    if exchange_at_touchdown(t, part, LANDS_AFTER, contacts, robot, memory):
+    if exchange_at_touchdown(t, part, LANDS_AFTER, contacts, robot.contact_foot, memory):
         part = seen_as_in_the_walk(state, parameters, memory)
     log.phase = part
     x = min(max(2.0 * part - 1.0, -1.0 - BEYOND), 1.0 + BEYOND)

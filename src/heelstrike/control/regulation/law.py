@@ -155,7 +155,9 @@ def regulate_zero_moment_point(
     choice, disturbance = memory.choice, memory.disturbance
     elapsed = advance(t, memory)
     # The next step begins at the pace of this one.
-    if exchange_at_touchdown(t, memory.clock, parameters.earliest, contacts, robot, memory):
+    if exchange_at_touchdown(
+        t, memory.clock, parameters.earliest, contacts, robot.contact_foot, memory
+    ):
         memory.clock = 0.0
         disturbance.known = 0
     landed = has_landed(t, parameters.landing, state, contacts, robot, memory)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Group
 
-from heelstrike.analysis.summary import plain
+from heelstrike.analysis.told_summary import plain
 from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.entries import ABSENT, entries_called

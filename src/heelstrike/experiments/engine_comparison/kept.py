@@ -14,7 +14,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from heelstrike.analysis.summary import plain
+from heelstrike.analysis.told_summary import plain
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.figures import WalkFigures
 from heelstrike.experiments.engine_comparison.rows import EngineRow

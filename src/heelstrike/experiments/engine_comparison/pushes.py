@@ -20,7 +20,7 @@ from rich.table import Table
 
 from heelstrike.analysis import recovery
 from heelstrike.analysis.stability.largest import Largest, largest
-from heelstrike.analysis.summary import plain
+from heelstrike.analysis.told_summary import plain
 from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.entries import Entry, entries_called

@@ -10,7 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Group
 from rich.table import Table
 
-from heelstrike.analysis.summary import plain
+from heelstrike.analysis.told_summary import plain
 from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.entries import entries_called

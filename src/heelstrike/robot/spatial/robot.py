@@ -10,11 +10,12 @@ import numpy as np
 from heelstrike.arguments import refusal, takes
 from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.coordinates import index_of
+from heelstrike.robot.counted import Counted
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import BALL, FREE, JointKind, SpatialModel
 from heelstrike.robot.spatial.solids import Solid
 from heelstrike.robot.state import State
-from heelstrike.wording import meant
 
 UNIT = 1e-6
 """How far the length of a quaternion that a user gives may be from one: files give six digits."""
@@ -36,7 +37,7 @@ class SpatialFoot:
 
 
 @dataclass(frozen=True, eq=False)
-class SpatialRobot:
+class SpatialRobot(Counted):
     """A robot in three dimensions.
 
     Positions and velocities are those of MuJoCo for the same file: of a free joint the place of its
@@ -67,36 +68,6 @@ class SpatialRobot:
     """What its links look like, by the shapes of its file."""
 
     @property
-    def nl(self) -> int:
-        """Number of links."""
-        return self.model.nl
-
-    @property
-    def nj(self) -> int:
-        """Number of joints, one a link."""
-        return self.model.nj
-
-    @property
-    def nq(self) -> int:
-        """Number of positions."""
-        return self.model.nq
-
-    @property
-    def nv(self) -> int:
-        """Number of velocities."""
-        return self.model.nv
-
-    @property
-    def nu(self) -> int:
-        """Number of joint torques."""
-        return self.model.nu
-
-    @property
-    def nc(self) -> int:
-        """Number of contact points."""
-        return self.model.nc
-
-    @property
     def floating(self) -> bool:
         """Whether the first joint is free."""
         return int(self.model.joint_kind[0]) == FREE
@@ -120,18 +91,9 @@ class SpatialRobot:
         )
 
     @property
-    def total_mass(self) -> float:
-        """Mass of the whole robot in kg."""
-        return float(np.sum(self.model.mass))
-
-    @property
     def weight(self) -> float:
         """Total mass times gravity, in N."""
         return self.total_mass * float(np.linalg.norm(self.model.gravity))
-
-    def reference_state(self) -> State:
-        """State at rest in the reference configuration of the robot's file."""
-        return State(self.model.reference.copy(), np.zeros(self.nv))
 
     def joint_index(self, joint: str | int) -> int:
         """Index of a joint, given by its name (or by an index, which is checked).
@@ -152,22 +114,7 @@ class SpatialRobot:
         RobotError
             If there is no such joint; the message lists those there are.
         """
-        return index_in(self, "joint", self.joint_names, joint)
-
-    def actuator_index(self, actuator: str | int) -> int:
-        """Index of an actuator, given by its name or index; see `joint_index`.
-
-        Parameters
-        ----------
-        actuator : str or int
-            Name of the actuator, or an index.
-
-        Returns
-        -------
-        int
-            Its place among the torques.
-        """
-        return index_in(self, "actuator", self.actuator_names, actuator)
+        return index_of(self, "joint", self.joint_names, joint)
 
     @takes(RobotError)
     def state(
@@ -206,7 +153,7 @@ class SpatialRobot:
             (v, self.velocity_names, velocity or {}, "velocity"),
         ):
             for name, value in values.items():
-                vector[index_in(self, what, names, name)] = float(value)
+                vector[index_of(self, what, names, name)] = float(value)
         for first in quaternion_places(self.model):
             q[first : first + 4] /= np.linalg.norm(q[first : first + 4])
         return checked_state(self, State(q, v))
@@ -249,30 +196,6 @@ class SpatialRobot:
             f"SpatialRobot({self.name!r}: {self.nv} velocities ({joints}), {self.nu} actuators, "
             f"{self.nc} contact points, {self.total_mass:g} kg)"
         )
-
-
-def index_in(robot: SpatialRobot, what: str, names: tuple[str, ...], given: str | int) -> int:
-    """Return the index of something of a robot, given by its name or index.
-
-    Raises
-    ------
-    RobotError
-        If the robot has nothing of that name or index; the message lists what it has.
-    """
-    if isinstance(given, str):
-        if given in names:
-            return names.index(given)
-    elif (
-        isinstance(given, int | np.integer)
-        and not isinstance(given, bool)
-        and -len(names) <= given < len(names)
-    ):
-        return int(given) % len(names)
-    known = ", ".join(dict.fromkeys(names)) or "none"
-    raise RobotError(
-        f"robot {robot.name!r} has no {what} {given!r}.{meant(str(given), names)} It has {known}"
-        + (f" (0 to {len(names) - 1})." if names else ".")
-    )
 
 
 def quaternion_places(model: SpatialModel) -> list[int]:

@@ -150,7 +150,7 @@ class Lane(Simulation):
     def begin_anew(self) -> None:
         """Forget in Python, too, what was before its memory was put back."""
         for record in self._records:
-            record.rows = record.events = record.logged = 0
+            record.rows = record.told.events = record.logged = 0
         self._memory.pushes.share[:] = 0.0
         self._recorded_until = 0.0
         self._fork = None

@@ -59,9 +59,9 @@ def move_lanes() -> Any:
                     ),
                 )  # fmt: skip
                 if code != FORK:
-                    for event in range(record.events):
-                        events[lane, record.event_kind[event]] += 1
-                    record.rows = record.events = record.logged = 0
+                    for event in range(record.told.events):
+                        events[lane, record.told.event_kind[event]] += 1
+                    record.rows = record.told.events = record.logged = 0
             outcome[lane] = code
             ended += code > PAUSED
         return ended

@@ -19,6 +19,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.frames import into_frame, out_of_frame
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import (
@@ -32,7 +33,7 @@ from heelstrike.sim.contacts.faces import (
 )
 from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Surface
 
 # A point is in a corner when it is nearer to both faces than this (m), and no more when it is
 # further than that from either.
@@ -82,18 +83,19 @@ def allocate_corners(robot: Robot) -> Corners:
 
 @kernel
 def observe_sides(
-    model: Model, ground: GroundModel, q: Floats, v: Floats, memory: Memory, corners: Corners
-) -> None:
+    model: Model, ground: GroundModel, q: Floats, v: Floats, tree: Workspace, contacts: Contacts,
+    surface: Surface, corners: Corners,
+) -> None:  # fmt: skip
     """Kinematics, velocities and contact points of a state, on both faces of corners."""
-    observe(model, ground, q, v, memory)
-    tree, seconds = memory.equations.tree, corners.contacts
+    observe(model, ground, q, v, tree, contacts, surface)
+    seconds = corners.contacts
     for point in range(corners.doubled):
         seconds.gap[point] = np.inf
         face, other = corners.first[point], corners.second[point]
         if other == NO_FACE:
             continue
-        locate_on_face(model, ground, tree, point, face, point, memory.contacts)
-        take_surface(model, ground, point, point, face, memory.surface)
+        locate_on_face(model, ground, tree, point, face, point, contacts)
+        take_surface(model, ground, point, point, face, surface)
         locate_on_face(model, ground, tree, point, other, point, seconds)
         friction = ground.friction[other // 2 - other % 2]
         corners.friction[point] = model.friction_scale[point] * friction

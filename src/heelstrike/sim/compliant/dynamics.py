@@ -21,7 +21,7 @@ inertia of the whole robot.
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,6 +41,7 @@ from heelstrike.dynamics.kernels import (
     passive_force,
     solve_factorized,
 )
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.compliant.corners import (
@@ -60,8 +61,9 @@ from heelstrike.sim.contacts.writers import rate_of
 from heelstrike.sim.controller.asking import ask, consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.guard import guarded
+from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.motors import motor_damping, try_torque
-from heelstrike.sim.memory import Loops, Memory
+from heelstrike.sim.memory import Directions, Equations, Loops, Memory, Tally
 from heelstrike.sim.push import add_pushes
 
 # Perturbation of a position (m, rad) or velocity (m/s, rad/s) that finds a controller's gains.
@@ -124,6 +126,109 @@ class Rates(Bundle):
     """Of the constraints from outside that may let go."""
 
 
+class Start(Bundle):
+    """Where a step of the integration begins, and its equations there."""
+
+    force: Floats = array("2 nc", "components")
+    """Contact forces, in newtons: of the points, then of their second faces."""
+    q: Floats = array("nv")
+    v: Floats = array("nv")
+    rows: Floats = array("4 nc", "nv")
+    matrix: Floats = array("nv", "nv")
+    """q, v, rows, matrix: State, contact Jacobian and A."""
+    own_rows: Floats = array("own", "nv")
+    loop_rows: Floats = array("loop_rows", "nv")
+    """own_rows, loop_rows: Jacobian of the constraints from outside that may let go, and that of
+    the loops."""
+
+
+class Evaluated(NamedTuple):
+    """The same of the state evaluated last, where its kernels wrote it, and the words of its rates.
+
+    Attributes
+    ----------
+    force, q, v, rows, matrix, own_rows, loop_rows
+        As of :class:`Start`.
+    words : (words,) int64
+        The memory of its :class:`Rates`.
+    """
+
+    force: Floats
+    q: Floats
+    v: Floats
+    rows: Floats
+    matrix: Floats
+    own_rows: Floats
+    loop_rows: Floats
+    words: Integers
+
+
+class Gains(Bundle):
+    """Derivatives of the controller's torques, and how they are found."""
+
+    by_q: Floats = array("nu", "nv")
+    by_v: Floats = array("nu", "nv")
+    command: Floats = array("nu")
+    torque: Floats = array("nu")
+    """command, torque: Commands and torques of a perturbed state."""
+    age: int = cell(int)
+    """Steps since these were found."""
+
+
+class Stages(Bundle):
+    """The linear system of the stages of a step, and the stages u_i."""
+
+    force_by_q: Floats = array("nv", "nv")
+    """∂f/∂q of a step, bristles eliminated."""
+    system: Floats = array("nv", "nv")
+    """A − g ∂f/∂v − g² ∂f/∂q, then its triangular factors."""
+    order: Integers = array("nv", of=int)
+    """Row exchanges of the factors."""
+    loop_response: Floats = array("loop_rows", "nv")
+    loop_matrix: Floats = array("loop_rows", "loop_rows")
+    """loop_response, loop_matrix: What the system makes of the rows of the loops, and the products
+    of both."""
+    q: Floats = array("stages", "nv")
+    v: Floats = array("stages", "nv")
+    bristle: Floats = array("stages", "2 nc")
+    """q, v, bristle: The stages."""
+    right_q: Floats = array("nv")
+    right_v: Floats = array("nv")
+    right_bristle: Floats = array("2 nc")
+    """right_q, right_v, right_bristle: Right-hand side of a stage."""
+
+
+class Sums(Bundle):
+    """What has come together since the last sample."""
+
+    contact: Floats = array("2 nc", "components")
+    stop: Floats = array("nv")
+    dry: Floats = array("nv")
+    loop: Floats = array("loop_rows")
+    own: Floats = array("own")
+    """contact, stop, dry, loop, own: Impulses of contacts, joint stops, dry friction, loops and
+    constraints from outside, in N s (N m s)."""
+    place: Floats = array("nc", "axes")
+    """Where the resultants of both faces acted."""
+    touched: Floats = array("nc")
+    left: Floats = array("nc")
+    """touched, left: When a contact point last came to the ground and left it; negative if it did
+    not."""
+
+
+class Holding(Bundle):
+    """When torques of a law that switches are held."""
+
+    patience: int = cell(int)
+    """Tries of the steps of a sample after which they are."""
+    since: float = cell(float)
+    span: float = cell(float)
+    wrong: float = cell(float)
+    """since, span, wrong: When that began within the sample (s), for how long in all (s), and the
+    most that the torques' next jump would have changed an acceleration by, times how long they were
+    held (m/s, rad/s)."""
+
+
 class CompliantWorkspace(Bundle):
     """State of the bristles and the scratch of a step."""
 
@@ -133,62 +238,18 @@ class CompliantWorkspace(Bundle):
     force: Floats = array("2 nc", "components")
     """Contact forces at the state evaluated last, in newtons: of the points, then of their second
     faces."""
-    base_force: Floats = array("2 nc", "components")
-    """The same at the start of the step."""
-    corners: Corners = part(Corners)
-    """Which points are in concave corners."""
-    place: Floats = array("nc", "axes")
-    """Where the resultants of both faces acted since the last sample."""
+    now_rows: Floats = array("own", "nv")
+    """Jacobian of the constraints from outside that may let go, there."""
     now_words: Integers = array("words", of=int, address=True)
     base_words: Integers = array("words", of=int, address=True)
     """now_words, base_words: The memory of both."""
-    torque_by_q: Floats = array("nu", "nv")
-    torque_by_v: Floats = array("nu", "nv")
-    """torque_by_q, torque_by_v: Derivatives of the controller's torques."""
-    trial_command: Floats = array("nu")
-    trial_torque: Floats = array("nu")
-    """trial_command, trial_torque: Commands and torques of a perturbed state."""
-    age: int = cell(int)
-    """Steps since these were found."""
-    base_q: Floats = array("nv")
-    base_v: Floats = array("nv")
-    base_rows: Floats = array("4 nc", "nv")
-    base_matrix: Floats = array("nv", "nv")
-    """State, contact Jacobian and A at the start of the step."""
-    force_by_q: Floats = array("nv", "nv")
-    """∂f/∂q of a step, bristles eliminated."""
-    system: Floats = array("nv", "nv")
-    """A − g ∂f/∂v − g² ∂f/∂q, then its triangular factors."""
-    order: Integers = array("nv", of=int)
-    """Row exchanges of the factors."""
-    now_rows: Floats = array("own", "nv")
-    own_rows: Floats = array("own", "nv")
-    """now_rows, own_rows: Jacobian of the constraints from outside that may let go, at the state
-    evaluated last and at the start of the step."""
-    loop_rows: Floats = array("loop_rows", "nv")
-    loop_response: Floats = array("loop_rows", "nv")
-    loop_matrix: Floats = array("loop_rows", "loop_rows")
-    """Jacobian of the loops at the start of the step, what the system makes of its rows, and the
-    products of both."""
-    stage_q: Floats = array("stages", "nv")
-    stage_v: Floats = array("stages", "nv")
-    stage_bristle: Floats = array("stages", "2 nc")
-    """The stages u_i."""
-    right_q: Floats = array("nv")
-    right_v: Floats = array("nv")
-    right_bristle: Floats = array("2 nc")
-    """Right-hand side of a stage."""
-    impulse: Floats = array("2 nc", "components")
-    stop_impulse: Floats = array("nv")
-    dry_impulse: Floats = array("nv")
-    loop_impulse: Floats = array("loop_rows")
-    own_impulse: Floats = array("own")
-    """Impulses of contacts, joint stops, dry friction, loops and constraints from outside since the
-    last sample, in N s (N m s)."""
-    touched: Floats = array("nc")
-    left: Floats = array("nc")
-    """touched, left: When a contact point last came to the ground and left it since the last
-    sample; negative if it did not."""
+    corners: Corners = part(Corners)
+    """Which points are in concave corners."""
+    start: Start = part(Start)
+    stages: Stages = part(Stages)
+    gains: Gains = part(Gains)
+    sums: Sums = part(Sums)
+    holding: Holding = part(Holding)
     laws: Laws = part(Laws)
     step: float = number(float)
     rtol: float = number(float)
@@ -197,14 +258,6 @@ class CompliantWorkspace(Bundle):
     absolute."""
     proposed: float = cell(float)
     """Length of the next step as far as accuracy allows (s)."""
-    patience: int = cell(int)
-    """Tries of the steps of a sample after which torques of a law that switches are held."""
-    held_since: float = cell(float)
-    held_for: float = cell(float)
-    held_wrong: float = cell(float)
-    """held_since, held_for, held_wrong: When that began within the sample (s), for how long in all
-    (s), and the most that the torques' next jump would have changed an acceleration by, times how
-    long they were held (m/s, rad/s)."""
     row: int = cell(int)
     """Row of the record for this sample, -1 for none."""
 
@@ -213,12 +266,11 @@ def compliant_workspace(
     robot: Robot, laws: Laws, step: float, rtol: float, atol: float
 ) -> CompliantWorkspace:
     """Allocate the scratch for a robot."""
+    let_go = sum(not is_line(each) for each in robot.constraints)
     extents = {
         "nv": robot.nv, "nu": robot.nu, "nc": robot.nc, "components": 2, "axes": 2,
-        "stages": STAGES, "loop_rows": most_rows(robot),
+        "stages": STAGES, "loop_rows": most_rows(robot), "own": let_go,
     }  # fmt: skip
-    let_go = sum(not is_line(each) for each in robot.constraints)
-    extents["own"] = let_go
     rates = Rates.allocate(
         extents,
         normal=NormalForces.allocate(n=2 * robot.nc),
@@ -228,10 +280,10 @@ def compliant_workspace(
     )
     now, now_words = in_one_block(rates)
     base, base_words = in_one_block(rates)
+    gains = Gains.allocate(extents, command=guarded(np.zeros(robot.nu)), age=GAINS_LAST)
     return CompliantWorkspace.allocate(
-        extents, now=now, base=base, now_words=now_words, base_words=base_words,
-        trial_command=guarded(np.zeros(robot.nu)), age=GAINS_LAST, laws=laws, step=step, rtol=rtol,
-        atol=atol, proposed=step, corners=allocate_corners(robot),
+        extents, now=now, base=base, now_words=now_words, base_words=base_words, gains=gains,
+        laws=laws, step=step, rtol=rtol, atol=atol, proposed=step, corners=allocate_corners(robot),
     )  # fmt: skip
 
 
@@ -246,12 +298,17 @@ def in_one_block(rates: Rates) -> tuple[Rates, Integers]:
 
 @kernel
 def try_command(
-    controller: Any, control: Control, time: float, model: Model, memory: Memory, command: Floats,
-    torque: Floats,
+    controller: Any, control: Control, time: float, model: Model, q: Floats, v: Floats,
+    tree: Workspace, contacts: Contacts, tally: Tally, command: Floats, torque: Floats,
 ) -> None:  # fmt: skip
-    """Torques that a controller would ask for, were this its next call; it remembers nothing."""
-    consult(controller, time, memory.q, memory.v, model, memory, control, command)
-    try_torque(model, control, memory.q, memory.v, memory.tally, command, torque)
+    """Torques that a controller would ask for, were this its next call; it remembers nothing.
+
+    Kinematics of the state are found on the way.
+    """
+    forward_kinematics(model, q, tree)
+    link_velocities(model, v, tree)
+    consult(controller, time, q, v, model, tree, contacts, control, command)
+    try_torque(model, control.voltage, q, v, tally, command, torque)
 
 
 @kernel
@@ -265,8 +322,9 @@ def is_steep(gains: Floats, j: int, torque: Floats) -> bool:
 
 @kernel
 def find_gains(
-    controller: Any, control: Control, time: float, model: Model, memory: Memory,
-    work: CompliantWorkspace,
+    controller: Any, control: Control, time: float, model: Model, start: Start, tree: Workspace,
+    contacts: Contacts, tally: Tally, q: Floats, v: Floats, command: Floats, torque: Floats,
+    gains: Gains,
 ) -> None:  # fmt: skip
     """Derivatives of the controller's torques at the start of the step, by differences.
 
@@ -274,39 +332,36 @@ def find_gains(
     changes its mind, the other would be the jump over the perturbation. Where it jumps to both
     sides, as ``sign`` at zero, it has no gain.
     """
+    tried, answer = gains.command, gains.torque
     for j in range(model.parent.shape[0]):
-        memory.q[j] = work.base_q[j]
-        memory.v[j] = work.base_v[j]
-    forward_kinematics(model, memory.q, memory.equations.tree)
-    link_velocities(model, memory.v, memory.equations.tree)
-    try_command(controller, control, time, model, memory, memory.command, memory.torque)
+        q[j] = start.q[j]
+        v[j] = start.v[j]
+    try_command(controller, control, time, model, q, v, tree, contacts, tally, command, torque)
     for kind in range(2):
-        varied = memory.q if kind == 0 else memory.v
-        gains = work.torque_by_q if kind == 0 else work.torque_by_v
+        varied = q if kind == 0 else v
+        found = gains.by_q if kind == 0 else gains.by_v
         for j in range(model.parent.shape[0]):
             kept = varied[j]
             for side in range(2):
                 change = PERTURBATION if side == 0 else -PERTURBATION
                 varied[j] = kept + change
-                forward_kinematics(model, memory.q, memory.equations.tree)
-                link_velocities(model, memory.v, memory.equations.tree)
-                command, torque = work.trial_command, work.trial_torque
-                try_command(controller, control, time, model, memory, command, torque)
-                for i in range(gains.shape[0]):
-                    slope = (torque[i] - memory.torque[i]) / change
-                    if side == 0 or abs(slope) < abs(gains[i, j]):
-                        gains[i, j] = slope
-            if is_steep(gains, j, memory.torque):
+                try_command(
+                    controller, control, time, model, q, v, tree, contacts, tally, tried, answer
+                )
+                for i in range(found.shape[0]):
+                    slope = (answer[i] - torque[i]) / change
+                    if side == 0 or abs(slope) < abs(found[i, j]):
+                        found[i, j] = slope
+            if is_steep(found, j, torque):
                 varied[j] = kept + NEARER * PERTURBATION
-                forward_kinematics(model, memory.q, memory.equations.tree)
-                link_velocities(model, memory.v, memory.equations.tree)
-                command, torque = work.trial_command, work.trial_torque
-                try_command(controller, control, time, model, memory, command, torque)
-                for i in range(gains.shape[0]):
-                    if abs(torque[i] - memory.torque[i]) > 0.5 * PERTURBATION * abs(gains[i, j]):
-                        gains[i, j] = 0.0
+                try_command(
+                    controller, control, time, model, q, v, tree, contacts, tally, tried, answer
+                )
+                for i in range(found.shape[0]):
+                    if abs(answer[i] - torque[i]) > 0.5 * PERTURBATION * abs(found[i, j]):
+                        found[i, j] = 0.0
             varied[j] = kept
-    work.age = 0
+    gains.age = 0
 
 
 @kernel
@@ -318,152 +373,165 @@ def evaluate(
     how: int,
     time: float,
     memory: Memory,
-    work: CompliantWorkspace,
+    laws: Laws,
+    corners: Corners,
+    now: Rates,
+    own_rows: Floats,
+    force: Floats,
 ) -> None:
-    """Forces and rates of the state in ``memory.q``, ``memory.v`` and ``work.now.friction.bend``.
+    """Forces and rates of the state in ``memory.q``, ``memory.v`` and ``now.friction.bend``.
 
     A controller that acts continuously is called, unless its torques are ``HELD``: to see what it
     would do (``TRIED``), for good (``DECIDED``), or for good with the contact forces of this very
     state, which is ``ACCEPTED``.
     """
-    observe_sides(model, ground, memory.q, memory.v, memory, work.corners)
-    now = work.now
-    push_contacts(model, memory, work)
-    push_stops(model, work.laws, memory, now)
-    rub_joints(work.laws.joint_speed, memory, now)
+    equations, contacts, rows, loops = (
+        memory.equations, memory.contacts, memory.rows, memory.loops,
+    )  # fmt: skip
+    q, v, tree, acting = memory.q, memory.v, equations.tree, equations.force
+    directions, first = memory.assembly.directions, memory.assembly.problem.first
+    observe_sides(model, ground, q, v, tree, contacts, memory.surface, corners)
+    push_contacts(
+        model, laws, v, tree, contacts, memory.surface.friction, first, directions, corners,
+        now.normal, now.friction, memory.reaction.slip, force,
+    )  # fmt: skip
+    push_stops(model, laws, q, v, loops.held, now.stop, now.stop_force)
+    rub_joints(laws.joint_speed, v, memory.breakaway, rows, now.dry_force, now.dry_by_speed)
     if now.own.gap.shape[0] > 0:
-        push_constraints(model, work.laws, memory, now)
-        write_constraint_rows(memory.rows, work.now_rows)
+        push_constraints(model, laws, q, v, tree, rows, now.own)
+        write_constraint_rows(rows, own_rows)
+    command, torque = memory.command, memory.torque
     if control.continuous == 1 and how != HELD:
         if how == ACCEPTED:
-            show_forces(work.force, work.corners, memory.contacts)
-        q, v, command = memory.q, memory.v, memory.command
+            show_forces(force, corners, contacts)
         if how == TRIED:
-            consult(controller, time, q, v, model, memory, control, command)
+            consult(controller, time, q, v, model, tree, contacts, control, command)
         else:
-            ask(controller, time, q, v, model, memory, control, command)
-    try_torque(model, control, memory.q, memory.v, memory.tally, memory.command, memory.torque)
-    mass_matrix(model, memory.equations.tree, memory.equations.mass_matrix)
-    factorize(model, memory.equations.mass_matrix, memory.equations.factor)
-    bias_force(model, memory.equations.tree, memory.equations.rate)
-    passive_force(model, memory.q, memory.v, memory.equations.force)
-    add_pushes(model, memory.equations.tree, memory.pushes, memory.equations.force)
+            ask(controller, time, q, v, model, tree, contacts, control, command)
+    try_torque(model, control.voltage, q, v, memory.tally, command, torque)
+    mass_matrix(model, tree, equations.mass_matrix)
+    factorize(model, equations.mass_matrix, equations.factor)
+    bias_force(model, tree, equations.rate)
+    passive_force(model, q, v, acting)
+    add_pushes(model, tree, memory.pushes, acting)
     for i in range(model.actuator_joint.shape[0]):
-        memory.equations.force[model.actuator_joint[i]] += memory.torque[i]
-    rate = now.acceleration
+        acting[model.actuator_joint[i]] += torque[i]
+    rate, jacobian = now.acceleration, directions.jacobian
     nv = model.parent.shape[0]
     for j in range(nv):
-        rate[j] = (
-            memory.equations.force[j]
-            - memory.equations.rate[j]
-            + now.stop_force[j]
-            + now.dry_force[j]
-        )
-    for contact in range(work.corners.sides):
-        normal = work.force[contact, 0]
-        tangent = work.force[contact, 1]
+        rate[j] = acting[j] - equations.rate[j] + now.stop_force[j] + now.dry_force[j]
+    for contact in range(corners.sides):
+        normal = force[contact, 0]
+        tangent = force[contact, 1]
         if normal > 0.0:
             for j in range(nv):
                 rate[j] += (
-                    memory.assembly.jacobian[2 * contact, j] * normal
-                    + memory.assembly.jacobian[2 * contact + 1, j] * tangent
+                    jacobian[2 * contact, j] * normal + jacobian[2 * contact + 1, j] * tangent
                 )
     for own in range(now.own.gap.shape[0]):
         for j in range(nv):
-            rate[j] += work.now_rows[own, j] * now.own.force[own]
-    solve_factorized(model, memory.equations.factor, rate)
+            rate[j] += own_rows[own, j] * now.own.force[own]
+    solve_factorized(model, equations.factor, rate)
     if now.loop.shape[0] > 0:
-        hold_loops(model, memory, now)
+        hold_loops(model, q, v, equations, loops, rate)
+        copy_words(loops.unknown, now.loop)
 
 
 @kernel
-def hold_loops(model: Model, memory: Memory, now: Rates) -> None:
+def hold_loops(
+    model: Model, q: Floats, v: Floats, equations: Equations, loops: Loops, rate: Floats
+) -> None:
     """Find the forces of the loops, and the accelerations under them."""
-    loops, rate = memory.loops, now.acceleration
     rows = rows_of(loops)
-    find_loops(model, memory.q, memory.v, memory.equations.tree, loops)
-    weigh(model, memory.equations)
-    respond(rows, model, loops.rows.jacobian, memory.equations, loops.response, loops.system)
+    find_loops(model, q, v, equations.tree, loops)
+    weigh(model, equations)
+    respond(rows, model, loops.rows.jacobian, equations, loops.response, loops.system)
     for row in range(rows):
         loops.system[row, rows] = -speed_along(row, loops, rate) - loops.rows.bias[row]
     push_loops(loops, rate)
-    copy_words(loops.unknown, now.loop)
 
 
 @kernel
-def push_contacts(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
+def push_contacts(
+    model: Model, laws: Laws, v: Floats, tree: Workspace, contacts: Contacts, frictions: Floats,
+    first: Integers, directions: Directions, corners: Corners, normal: NormalForces,
+    friction: FrictionForces, slip: Floats, force: Floats,
+) -> None:  # fmt: skip
     """Forces of the contacts and rates of the bristles at the state now."""
-    laws, normal, friction = work.laws, work.now.normal, work.now.friction
+    jacobian = directions.jacobian
     for contact in range(model.contact_link.shape[0]):
-        memory.reaction.slip[contact] = 0.0
-        normal.gap[contact] = memory.contacts.gap[contact]
+        slip[contact] = 0.0
+        normal.gap[contact] = contacts.gap[contact]
         if normal.gap[contact] < 0.0:
-            tree = memory.equations.tree
-            contact_rows(model, tree, memory.contacts, contact, contact, memory.assembly)
-            memory.reaction.slip[contact] = row_product(
-                memory.assembly.jacobian, 2 * contact + 1, memory.v
-            )
-            normal.speed[contact] = row_product(memory.assembly.jacobian, 2 * contact, memory.v)
-    copy_words(memory.surface.friction[: model.nc], friction.friction)
-    copy_words(memory.reaction.slip, friction.speed)
-    if work.corners.doubled > 0:
-        meet_second_faces(model, memory, work)
+            contact_rows(model, tree, contacts, contact, contact, first, directions)
+            slip[contact] = row_product(jacobian, 2 * contact + 1, v)
+            normal.speed[contact] = row_product(jacobian, 2 * contact, v)
+    copy_words(frictions[: model.nc], friction.friction)
+    copy_words(slip, friction.speed)
+    if corners.doubled > 0:
+        meet_second_faces(
+            model, v, tree, first, directions, corners, normal.gap, normal.speed,
+            friction.friction, friction.speed,
+        )  # fmt: skip
     call_at(laws.normal_code, (address_of(laws.normal), normal))
     copy_words(normal.force, friction.normal)
     call_at(laws.friction_code, (address_of(laws.friction), friction))
-    for contact in range(work.corners.sides):
-        work.force[contact, 0] = normal.force[contact]
-        work.force[contact, 1] = friction.force[contact]
+    for contact in range(corners.sides):
+        force[contact, 0] = normal.force[contact]
+        force[contact, 1] = friction.force[contact]
 
 
 @kernel
-def meet_second_faces(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
+def meet_second_faces(
+    model: Model, v: Floats, tree: Workspace, first: Integers, directions: Directions,
+    corners: Corners, gap: Floats, speed: Floats, friction: Floats, slip: Floats,
+) -> None:  # fmt: skip
     """Gaps and speeds of the points on their second faces, with their Jacobian rows."""
-    seconds, jacobian = work.corners.contacts, memory.assembly.jacobian
-    normal, friction = work.now.normal, work.now.friction
-    for point in range(work.corners.doubled):
-        contact = work.corners.other[point]
-        normal.gap[contact] = seconds.gap[point]
-        friction.friction[contact] = work.corners.friction[point]
-        friction.speed[contact] = 0.0
-        if normal.gap[contact] < 0.0:
-            tree = memory.equations.tree
-            contact_rows(model, tree, seconds, point, contact, memory.assembly)
-            normal.speed[contact] = row_product(jacobian, 2 * contact, memory.v)
-            friction.speed[contact] = row_product(jacobian, 2 * contact + 1, memory.v)
+    seconds, jacobian = corners.contacts, directions.jacobian
+    for point in range(corners.doubled):
+        contact = corners.other[point]
+        gap[contact] = seconds.gap[point]
+        friction[contact] = corners.friction[point]
+        slip[contact] = 0.0
+        if gap[contact] < 0.0:
+            contact_rows(model, tree, seconds, point, contact, first, directions)
+            speed[contact] = row_product(jacobian, 2 * contact, v)
+            slip[contact] = row_product(jacobian, 2 * contact + 1, v)
 
 
 @kernel
-def push_stops(model: Model, laws: Laws, memory: Memory, now: Rates) -> None:
-    """Forces of the joint stops at the state now."""
-    stop = now.stop
+def push_stops(
+    model: Model, laws: Laws, q: Floats, v: Floats, held: Integers, stop: NormalForces,
+    force: Floats,
+) -> None:  # fmt: skip
+    """Forces of the joint stops at the state now; `held` tells which latches are engaged."""
     for j in range(model.parent.shape[0]):
-        below = memory.q[j] - model.lower[j]
-        above = model.upper[j] - memory.q[j]
+        below = q[j] - model.lower[j]
+        above = model.upper[j] - q[j]
         stop.gap[j] = below if below < 0.0 else above
-        stop.speed[j] = memory.v[j] if below < 0.0 else -memory.v[j]
-    held = memory.loops.held
+        stop.speed[j] = v[j] if below < 0.0 else -v[j]
     for latch in range(held.shape[0]):
         if held[latch] == 1:
-            pull_back(model, latch, memory, stop)
+            pull_back(model, latch, q, v, stop)
     call_at(laws.stop_code, (address_of(laws.stop), stop))
     for j in range(model.parent.shape[0]):
-        now.stop_force[j] = stop.force[j] if memory.q[j] < model.lower[j] else -stop.force[j]
+        force[j] = stop.force[j] if q[j] < model.lower[j] else -stop.force[j]
     for latch in range(held.shape[0]):
         j = model.latch_joint[latch]
-        if held[latch] == 1 and model.lower[j] <= memory.q[j] <= model.upper[j]:
-            now.stop_force[j] = model.latch_side[latch] * stop.force[j]
+        if held[latch] == 1 and model.lower[j] <= q[j] <= model.upper[j]:
+            force[j] = model.latch_side[latch] * stop.force[j]
 
 
 @kernel
-def push_constraints(model: Model, laws: Laws, memory: Memory, now: Rates) -> None:
+def push_constraints(
+    model: Model, laws: Laws, q: Floats, v: Floats, tree: Workspace, rows: Rows, own: NormalForces
+) -> None:
     """Forces of the constraints from outside that may let go: those of stops, from their gaps."""
-    rows, own = memory.rows, now.own
-    find_constraints(model, memory.q, memory.v, memory.equations.tree, rows)
+    find_constraints(model, q, v, tree, rows)
     for i in range(own.gap.shape[0]):
         entry = rows.first[CONSTRAINT] + i
         own.gap[i] = rows.gap[entry]
-        own.speed[i] = rate_of(rows.owner[entry], 0, memory.v, rows.outside)
+        own.speed[i] = rate_of(rows.owner[entry], 0, v, rows.outside)
     call_at(laws.stop_code, (address_of(laws.stop), own))
 
 
@@ -477,43 +545,44 @@ def write_constraint_rows(rows: Rows, target: Floats) -> None:
 
 
 @kernel
-def pull_back(model: Model, latch: int, memory: Memory, stop: NormalForces) -> None:
+def pull_back(model: Model, latch: int, q: Floats, v: Floats, stop: NormalForces) -> None:
     """Ask the law of a stop that holds for its pull: what it would press with, mirrored."""
     j = model.latch_joint[latch]
-    if model.lower[j] <= memory.q[j] <= model.upper[j]:
+    if model.lower[j] <= q[j] <= model.upper[j]:
         side = model.latch_side[latch]
         end = model.upper[j] if side > 0 else model.lower[j]
-        stop.gap[j] = -abs(end - memory.q[j])
-        stop.speed[j] = side * memory.v[j]
+        stop.gap[j] = -abs(end - q[j])
+        stop.speed[j] = side * v[j]
 
 
 @kernel
-def rub_joints(scale: float, memory: Memory, now: Rates) -> None:
-    """Dry friction of the joints, smoothed around zero speed."""
-    rows = memory.rows
+def rub_joints(
+    scale: float, v: Floats, breakaway: Floats, rows: Rows, force: Floats, by_speed: Floats
+) -> None:
+    """Dry friction of the joints, smoothed around zero speed, and its derivative."""
     for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
         j = rows.owner[dry]
-        limit = memory.breakaway[j]
-        size = sqrt(memory.v[j] * memory.v[j] + scale * scale)
-        now.dry_force[j] = -limit * memory.v[j] / size
-        now.dry_by_speed[j] = -limit * (scale / size) ** 2 / size
+        limit = breakaway[j]
+        size = sqrt(v[j] * v[j] + scale * scale)
+        force[j] = -limit * v[j] / size
+        by_speed[j] = -limit * (scale / size) ** 2 / size
 
 
 @kernel
-def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
-    """Make the state evaluated last the start of the next step."""
-    copy_words(work.now_words, work.base_words)
-    copy_words(work.force, work.base_force)
-    copy_words(memory.q, work.base_q)
-    copy_words(memory.v, work.base_v)
-    copy_words(memory.equations.mass_matrix, work.base_matrix)
-    for row in range(2 * work.corners.sides):
-        for j in range(model.parent.shape[0]):
-            work.base_rows[row, j] = memory.assembly.jacobian[row, j]
-    for row in range(work.loop_rows.shape[0]):
-        for j in range(model.parent.shape[0]):
-            work.loop_rows[row, j] = memory.loops.rows.jacobian[row, j]
-    copy_words(work.now_rows, work.own_rows)
+def begin_step(sides: int, last: Evaluated, words: Integers, start: Start) -> None:
+    """Make the state evaluated last the start of the next step; its rates go to `words`."""
+    copy_words(last.words, words)
+    copy_words(last.force, start.force)
+    copy_words(last.q, start.q)
+    copy_words(last.v, start.v)
+    copy_words(last.matrix, start.matrix)
+    for row in range(2 * sides):
+        for j in range(start.rows.shape[1]):
+            start.rows[row, j] = last.rows[row, j]
+    for row in range(start.loop_rows.shape[0]):
+        for j in range(start.loop_rows.shape[1]):
+            start.loop_rows[row, j] = last.loop_rows[row, j]
+    copy_words(last.own_rows, start.own_rows)
 
 
 @kernel
@@ -530,34 +599,35 @@ def tangent_gains(friction: FrictionForces, contact: int, g: float) -> tuple[flo
 
 @kernel
 def factorize_step(
-    model: Model, control: Control, g: float, held: bool, command: Floats, work: CompliantWorkspace
-) -> None:
-    """Factorise the linear system of all stages of a step of length g / γ."""
+    model: Model, g: float, answers: bool, voltage: int, command: Floats, sides: int, base: Rates,
+    start: Start, gains: Gains, stages: Stages,
+) -> None:  # fmt: skip
+    """Factorise the linear system of all stages of a step of length g / γ.
+
+    `answers` tells whether a controller acts within the step.
+    """
     nv = model.parent.shape[0]
-    system, by_q, base = work.system, work.force_by_q, work.base
+    system, by_q = stages.system, stages.force_by_q
     for i in range(nv):
         for j in range(nv):
-            system[i, j] = work.base_matrix[i, j]
+            system[i, j] = start.matrix[i, j]
             by_q[i, j] = 0.0
         system[i, i] += g * (model.damping[i] - (base.stop.by_speed[i] + base.dry_by_speed[i]))
         by_q[i, i] = base.stop.by_gap[i] - model.stiffness[i]
-    if control.continuous == 1 and not held:
-        for i in range(model.actuator_joint.shape[0]):
-            joint = model.actuator_joint[i]
+    for i in range(model.actuator_joint.shape[0]):
+        joint = model.actuator_joint[i]
+        if answers:
             for j in range(nv):
-                system[joint, j] -= g * work.torque_by_v[i, j]
-                by_q[joint, j] += work.torque_by_q[i, j]
-    else:
-        for i in range(model.actuator_joint.shape[0]):
-            joint = model.actuator_joint[i]
-            damping = motor_damping(model, i, control.voltage, command[i], work.base_v)
-            system[joint, joint] += g * damping
-    for contact in range(work.corners.sides):
+                system[joint, j] -= g * gains.by_v[i, j]
+                by_q[joint, j] += gains.by_q[i, j]
+        else:
+            system[joint, joint] += g * motor_damping(model, i, voltage, command[i], start.v)
+    for contact in range(sides):
         if base.normal.force[contact] <= 0.0:
             continue
         by_normal, by_speed, _ = tangent_gains(base.friction, contact, g)
-        normal_row = work.base_rows[2 * contact]
-        tangent_row = work.base_rows[2 * contact + 1]
+        normal_row = start.rows[2 * contact]
+        tangent_row = start.rows[2 * contact + 1]
         for i in range(nv):
             # What normal force and sliding speed do to coordinate i.
             pressing = normal_row[i] + by_normal * tangent_row[i]
@@ -568,8 +638,8 @@ def factorize_step(
                     + rubbing * tangent_row[j]
                 )
                 by_q[i, j] += pressing * base.normal.by_gap[contact] * normal_row[j]
-    for own in range(work.own_rows.shape[0]):
-        row = work.own_rows[own]
+    for own in range(start.own_rows.shape[0]):
+        row = start.own_rows[own]
         for i in range(nv):
             for j in range(nv):
                 system[i, j] -= g * row[i] * base.own.by_speed[own] * row[j]
@@ -577,12 +647,12 @@ def factorize_step(
     for i in range(nv):
         for j in range(nv):
             system[i, j] -= g * g * by_q[i, j]
-    triangulate(nv, nv, False, system, work.order)
-    for row in range(work.loop_rows.shape[0]):
-        copy_words(work.loop_rows[row], work.loop_response[row])
-        substitute(nv, system, work.order, work.loop_response[row])
-        for other in range(work.loop_rows.shape[0]):
-            work.loop_matrix[other, row] = dot(work.loop_rows[other], work.loop_response[row])
+    triangulate(nv, nv, False, system, stages.order)
+    for row in range(start.loop_rows.shape[0]):
+        copy_words(start.loop_rows[row], stages.loop_response[row])
+        substitute(nv, system, stages.order, stages.loop_response[row])
+        for other in range(start.loop_rows.shape[0]):
+            stages.loop_matrix[other, row] = dot(start.loop_rows[other], stages.loop_response[row])
 
 
 @kernel
@@ -595,53 +665,56 @@ def dot(a: Floats, b: Floats) -> float:
 
 
 @kernel
-def solve_stage(model: Model, g: float, stage: int, loops: Loops, work: CompliantWorkspace) -> None:
+def solve_stage(
+    model: Model, g: float, stage: int, sides: int, base: Rates, start: Start, loop_system: Floats,
+    loop_order: Integers, loop_force: Floats, stages: Stages,
+) -> None:  # fmt: skip
     """Solve for a stage from its right-hand side."""
     nv = model.parent.shape[0]
-    u_q = work.stage_q[stage]
-    u_v = work.stage_v[stage]
-    u_s = work.stage_bristle[stage]
-    base = work.base
+    u_q, u_v, u_s = stages.q[stage], stages.v[stage], stages.bristle[stage]
     for i in range(nv):
         u_v[i] = g * (
-            dot(work.base_matrix[i], work.right_v) + g * dot(work.force_by_q[i], work.right_q)
+            dot(start.matrix[i], stages.right_v) + g * dot(stages.force_by_q[i], stages.right_q)
         )
-    for contact in range(work.corners.sides):
+    for contact in range(sides):
         if base.normal.force[contact] <= 0.0:
             continue
         _, _, bend = tangent_gains(base.friction, contact, g)
-        push = g * bend * work.right_bristle[contact]
+        push = g * bend * stages.right_bristle[contact]
         for j in range(nv):
-            u_v[j] += push * work.base_rows[2 * contact + 1, j]
-    substitute(nv, work.system, work.order, u_v)
-    keep_loops(g, u_v, loops, work)
+            u_v[j] += push * start.rows[2 * contact + 1, j]
+    substitute(nv, stages.system, stages.order, u_v)
+    keep_loops(g, start.loop_rows, stages, loop_system, loop_order, loop_force, u_v)
     for j in range(nv):
-        u_q[j] = g * (work.right_q[j] + u_v[j])
-    for contact in range(work.corners.sides):
-        change = work.right_bristle[contact]
+        u_q[j] = g * (stages.right_q[j] + u_v[j])
+    for contact in range(sides):
+        change = stages.right_bristle[contact]
         if base.normal.force[contact] > 0.0:
-            normal_row = work.base_rows[2 * contact]
+            normal_row = start.rows[2 * contact]
             pressing = base.normal.by_speed[contact] * dot(normal_row, u_v)
             pressing += base.normal.by_gap[contact] * dot(normal_row, u_q)
-            sliding = dot(work.base_rows[2 * contact + 1], u_v)
+            sliding = dot(start.rows[2 * contact + 1], u_v)
             change += base.friction.rate_by_normal[contact] * pressing
             change += base.friction.rate_by_speed[contact] * sliding
         u_s[contact] = change / (1.0 / g - base.friction.rate_by_bend[contact])
 
 
 @kernel
-def keep_loops(g: float, u_v: Floats, loops: Loops, work: CompliantWorkspace) -> None:
-    """Add to a stage what the loops make of it."""
-    rows = work.loop_rows.shape[0]
+def keep_loops(
+    g: float, loop_rows: Floats, stages: Stages, system: Floats, order: Integers, force: Floats,
+    u_v: Floats,
+) -> None:  # fmt: skip
+    """Add to a stage what the loops make of it; their equations, and forces, are scratch."""
+    rows = loop_rows.shape[0]
     for row in range(rows):
         for other in range(rows):
-            loops.system[row, other] = work.loop_matrix[row, other]
-        along = work.loop_rows[row]
-        loops.system[row, rows] = g * dot(along, work.right_v) - dot(along, u_v)
-    solve_to_rank(rows, loops.system, loops.order, loops.unknown)
+            system[row, other] = stages.loop_matrix[row, other]
+        along = loop_rows[row]
+        system[row, rows] = g * dot(along, stages.right_v) - dot(along, u_v)
+    solve_to_rank(rows, system, order, force)
     for row in range(rows):
         for j in range(u_v.shape[0]):
-            u_v[j] += loops.unknown[row] * work.loop_response[row, j]
+            u_v[j] += force[row] * stages.loop_response[row, j]
 
 
 @kernel
@@ -661,48 +734,56 @@ def attempt_step(
     A controller that acts continuously is asked within it, unless its torques are `held`.
     """
     rtol, atol, now, base = work.rtol, work.atol, work.now, work.base
+    start, stages, loops = work.start, work.stages, memory.loops
+    q, v, bend = memory.q, memory.v, now.friction.bend
     how = DECIDED if h <= DECISIVE else TRIED
     if held:
         how = HELD
     nv = model.parent.shape[0]
     nc = work.corners.sides
     g = GAMMA * h
-    factorize_step(model, control, g, held, memory.command, work)
+    answers = control.continuous == 1 and not held
+    factorize_step(
+        model, g, answers, control.voltage, memory.command, nc, base, start, work.gains, stages
+    )
     for stage in range(STAGES):
         if stage > 0:
             for i in range(nv):
-                memory.q[i] = work.base_q[i]
-                memory.v[i] = work.base_v[i]
+                q[i] = start.q[i]
+                v[i] = start.v[i]
                 for k in range(stage):
-                    memory.q[i] += A[stage, k] * work.stage_q[k, i]
-                    memory.v[i] += A[stage, k] * work.stage_v[k, i]
+                    q[i] += A[stage, k] * stages.q[k, i]
+                    v[i] += A[stage, k] * stages.v[k, i]
             for i in range(nc):
-                now.friction.bend[i] = base.friction.bend[i]
+                bend[i] = base.friction.bend[i]
                 for k in range(stage):
-                    now.friction.bend[i] += A[stage, k] * work.stage_bristle[k, i]
-            evaluate(controller, control, model, ground, how, time + TIMES[stage] * h, memory, work)
+                    bend[i] += A[stage, k] * stages.bristle[k, i]
+            evaluate(
+                controller, control, model, ground, how, time + TIMES[stage] * h, memory, work.laws,
+                work.corners, now, work.now_rows, work.force,
+            )  # fmt: skip
         for i in range(nv):
-            work.right_q[i] = work.base_v[i] if stage == 0 else memory.v[i]
-            work.right_v[i] = base.acceleration[i] if stage == 0 else now.acceleration[i]
+            stages.right_q[i] = start.v[i] if stage == 0 else v[i]
+            stages.right_v[i] = base.acceleration[i] if stage == 0 else now.acceleration[i]
             for k in range(stage):
-                work.right_q[i] += C[stage, k] / h * work.stage_q[k, i]
-                work.right_v[i] += C[stage, k] / h * work.stage_v[k, i]
+                stages.right_q[i] += C[stage, k] / h * stages.q[k, i]
+                stages.right_v[i] += C[stage, k] / h * stages.v[k, i]
         for i in range(nc):
-            work.right_bristle[i] = base.friction.rate[i] if stage == 0 else now.friction.rate[i]
+            stages.right_bristle[i] = base.friction.rate[i] if stage == 0 else now.friction.rate[i]
             for k in range(stage):
-                work.right_bristle[i] += C[stage, k] / h * work.stage_bristle[k, i]
-        solve_stage(model, g, stage, memory.loops, work)
+                stages.right_bristle[i] += C[stage, k] / h * stages.bristle[k, i]
+        solve_stage(
+            model, g, stage, nc, base, start, loops.system, loops.order, loops.unknown, stages
+        )
     worst = 0.0
     for i in range(nv):
-        worst = larger(worst, finish(work.base_q, work.stage_q, rtol, atol, memory.q, i))
-        worst = larger(worst, finish(work.base_v, work.stage_v, rtol, atol, memory.v, i))
+        worst = larger(worst, finish(start.q, stages.q, rtol, atol, q, i))
+        worst = larger(worst, finish(start.v, stages.v, rtol, atol, v, i))
     for i in range(nc):
-        worst = larger(
-            worst, finish(base.friction.bend, work.stage_bristle, rtol, atol, now.friction.bend, i)
-        )
+        worst = larger(worst, finish(base.friction.bend, stages.bristle, rtol, atol, bend, i))
         # A bristle in the air goes to zero; spare the processor the numbers next to it.
-        if abs(now.friction.bend[i]) < NO_BEND:
-            now.friction.bend[i] = 0.0
+        if abs(bend[i]) < NO_BEND:
+            bend[i] = 0.0
     return worst
 
 

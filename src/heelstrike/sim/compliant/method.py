@@ -23,12 +23,13 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.sets import ImpulseSet
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.compliant.contact_law import BristleFriction, HuntCrossley, KelvinVoigt
 from heelstrike.sim.compliant.corners import (
+    Corners,
     begin_joining,
     choose_sides,
     join,
@@ -44,7 +45,10 @@ from heelstrike.sim.compliant.dynamics import (
     HELD,
     TRIED,
     CompliantWorkspace,
+    Evaluated,
+    Holding,
     Laws,
+    Sums,
     attempt_step,
     begin_step,
     compliant_workspace,
@@ -58,14 +62,15 @@ from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import close_loops, note_loop, rows_of, steady_loops
-from heelstrike.sim.contacts.rows import CONSTRAINT
+from heelstrike.sim.contacts.rows import CONSTRAINT, Rows
 from heelstrike.sim.controller.control import Control
+from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels, Scene
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Equations, Loops, Memory, Tally
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import share_over_step
-from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.record import Record, Told
 from heelstrike.sim.record.recording import (
     CONSTRAINT_HOLDS,
     CONSTRAINT_LETS_GO,
@@ -195,7 +200,7 @@ class Compliant(Method):
             stop=numbers["stop"], stop_code=code["stop"], joint_speed=self.friction.joint_speed,
         )  # fmt: skip
         work = compliant_workspace(robot, laws, self.step, self.rtol, self.atol)
-        work.patience = PATIENCE
+        work.holding.patience = PATIENCE
         return work
 
     def room(self, robot: Robot) -> tuple[int, int]:
@@ -227,63 +232,99 @@ class Compliant(Method):
 
 
 @kernel
-def account(model: Model, since: float, h: float, memory: Memory, work: CompliantWorkspace) -> None:
-    """Add a step of length h, begun at time `since`, to impulses, extremes, crossings and counts.
-
-    The impulse is the trapezium of the forces of the law. As a sum of forces inside the friction
-    cone with positive weights it lies in the cone itself.
-    """
-    now, base = work.now, work.base
-    for joint in range(model.parent.shape[0]):
-        work.stop_impulse[joint] += 0.5 * h * (base.stop_force[joint] + now.stop_force[joint])
-        work.dry_impulse[joint] += 0.5 * h * (base.dry_force[joint] + now.dry_force[joint])
-    for row in range(work.loop_impulse.shape[0]):
-        work.loop_impulse[row] += 0.5 * h * (base.loop[row] + now.loop[row])
-    for own in range(work.own_impulse.shape[0]):
-        work.own_impulse[own] += 0.5 * h * (base.own.force[own] + now.own.force[own])
-    for contact in range(work.corners.sides):
-        normal = base.normal.force[contact] + now.normal.force[contact]
-        tangent = base.friction.force[contact] + now.friction.force[contact]
-        work.impulse[contact, 0] += 0.5 * h * normal
-        work.impulse[contact, 1] += 0.5 * h * tangent
-    if work.corners.doubled > 0:
-        join(model, h, work.base_force, memory.contacts, work.corners)
-        join(model, h, work.force, memory.contacts, work.corners)
-    for contact in range(model.contact_link.shape[0]):
-        gap = now.normal.gap[contact]
-        before = base.normal.gap[contact]
-        if work.corners.doubled > 0:
-            gap = min(gap, now.normal.gap[work.corners.other[contact]])
-            before = min(before, base.normal.gap[work.corners.other[contact]])
-        memory.tally.penetration = max(memory.tally.penetration, -gap)
-        if memory.reported.closed[contact] == 0 and gap < 0.0:
-            memory.reported.closed[contact] = 1
-            share = before / (before - gap) if before > 0.0 else 0.0
-            work.touched[contact] = since + share * h
-        elif memory.reported.closed[contact] == 1 and gap > LIFTOFF_GAP:
-            memory.reported.closed[contact] = 0
-            share = before / (before - gap) if before < 0.0 else 0.0
-            work.left[contact] = since + share * h
-    residual = memory.assembly.answer.residual
-    residual[1] = max(residual[1], cone_residual(work))
-    memory.tally.steps += 1
-    work.age += 1
+def add_impulse(h: float, before: Floats, after: Floats, total: Floats) -> None:
+    """Add the impulse of a step of length h: the trapezium of the forces before and after it."""
+    for i in range(total.shape[0]):
+        total[i] += 0.5 * h * (before[i] + after[i])
 
 
 @kernel
-def landing(model: Model, depth: float, gap_now: Floats, work: CompliantWorkspace) -> float:
+def add_contact_impulse(
+    h: float, sides: int, press_before: Floats, press: Floats, rub_before: Floats, rub: Floats,
+    total: Floats,
+) -> None:  # fmt: skip
+    """The same of contacts, normal and tangential.
+
+    As a sum of forces inside the friction cone with positive weights it lies in the cone itself.
+    """
+    for contact in range(sides):
+        total[contact, 0] += 0.5 * h * (press_before[contact] + press[contact])
+        total[contact, 1] += 0.5 * h * (rub_before[contact] + rub[contact])
+
+
+@kernel
+def note_crossings(
+    model: Model, since: float, h: float, gap_before: Floats, gap_now: Floats, corners: Corners,
+    touched: Floats, left: Floats, closed: Integers, tally: Tally,
+) -> None:  # fmt: skip
+    """Note which points came to the ground and left it in a step, begun at time `since`."""
+    for contact in range(model.contact_link.shape[0]):
+        gap = gap_now[contact]
+        before = gap_before[contact]
+        if corners.doubled > 0:
+            gap = min(gap, gap_now[corners.other[contact]])
+            before = min(before, gap_before[corners.other[contact]])
+        tally.penetration = max(tally.penetration, -gap)
+        if closed[contact] == 0 and gap < 0.0:
+            closed[contact] = 1
+            share = before / (before - gap) if before > 0.0 else 0.0
+            touched[contact] = since + share * h
+        elif closed[contact] == 1 and gap > LIFTOFF_GAP:
+            closed[contact] = 0
+            share = before / (before - gap) if before < 0.0 else 0.0
+            left[contact] = since + share * h
+
+
+@kernel
+def accept_step(
+    controller: Any, control: Control, model: Model, ground: GroundModel, how: int, since: float,
+    h: float, evaluated: Evaluated, memory: Memory, work: CompliantWorkspace,
+) -> None:  # fmt: skip
+    """Evaluate the end of a step of length h, begun at time `since`, and begin the next there.
+
+    The step is added to impulses, extremes, crossings and counts.
+    """
+    now, base, sums, corners = work.now, work.base, work.sums, work.corners
+    evaluate(
+        controller, control, model, ground, how, since + h, memory, work.laws, corners, now,
+        work.now_rows, work.force,
+    )  # fmt: skip
+    add_impulse(h, base.stop_force, now.stop_force, sums.stop)
+    add_impulse(h, base.dry_force, now.dry_force, sums.dry)
+    add_impulse(h, base.loop, now.loop, sums.loop)
+    add_impulse(h, base.own.force, now.own.force, sums.own)
+    add_contact_impulse(
+        h, corners.sides, base.normal.force, now.normal.force, base.friction.force,
+        now.friction.force, sums.contact,
+    )  # fmt: skip
+    if corners.doubled > 0:
+        join(model, h, work.start.force, memory.contacts, corners)
+        join(model, h, work.force, memory.contacts, corners)
+    note_crossings(
+        model, since, h, base.normal.gap, now.normal.gap, corners, sums.touched, sums.left,
+        memory.reported.closed, memory.tally,
+    )  # fmt: skip
+    residual = memory.assembly.answer.residual
+    worst = cone_residual(corners.sides, now.friction.friction, work.force)
+    residual[1] = max(residual[1], worst)
+    memory.tally.steps += 1
+    work.gains.age += 1
+    begin_step(corners.sides, evaluated, work.base_words, work.start)
+
+
+@kernel
+def landing(model: Model, depth: float, before: Floats, gap_now: Floats, corners: Corners) -> float:
     """Part of the step after which the first contact point that fell into the ground met it.
 
     One, if none began the step above the ground and ended it deeper than `depth`. The stages of a
     long step through the air may all lie above the ground that its end lies in.
     """
     first = 1.0
-    before = work.base.normal.gap
     for point in range(model.nc):
         first = min(first, meets(depth, before[point], gap_now[point]))
-    for point in range(work.corners.doubled):
-        gap = work.corners.contacts.gap[point]
-        first = min(first, meets(depth, before[work.corners.other[point]], gap))
+    for point in range(corners.doubled):
+        gap = corners.contacts.gap[point]
+        first = min(first, meets(depth, before[corners.other[point]], gap))
     return first
 
 
@@ -294,13 +335,12 @@ def meets(depth: float, before: float, after: float) -> float:
 
 
 @kernel
-def cone_residual(work: CompliantWorkspace) -> float:
+def cone_residual(sides: int, friction: Floats, force: Floats) -> float:
     """Largest excess of a contact force over the friction cone, relative to the force."""
     worst = 0.0
-    friction = work.now.friction.friction
-    for contact in range(work.corners.sides):
-        normal = work.force[contact, 0]
-        tangent = abs(work.force[contact, 1])
+    for contact in range(sides):
+        normal = force[contact, 0]
+        tangent = abs(force[contact, 1])
         excess = max(-normal, tangent - friction[contact] * normal)
         if excess > 0.0:
             worst = max(worst, excess / (abs(normal) + tangent))
@@ -313,12 +353,22 @@ def sample(
     memory: Memory, work: CompliantWorkspace,
 ) -> int:  # fmt: skip
     """Integrate from one sample to the next; return DONE or what was in the way."""
-    span, corners = work.step, work.corners
+    span, corners, holding, gains = work.step, work.corners, work.holding, work.gains
+    q, v, tree, contacts = memory.q, memory.v, memory.equations.tree, memory.contacts
+    start_of_step, gap_before = work.start, work.base.normal.gap
+    command, torque, tally = memory.command, memory.torque, memory.tally
     elapsed = 0.0
     h = work.proposed
-    begin_step(model, memory, work)
-    if control.continuous == 1 and work.age >= GAINS_LAST:
-        find_gains(controller, control, start, model, memory, work)
+    evaluated = Evaluated(
+        work.force, q, v, memory.assembly.directions.jacobian, memory.equations.mass_matrix,
+        work.now_rows, memory.loops.rows.jacobian, work.now_words,
+    )  # fmt: skip
+    begin_step(corners.sides, evaluated, work.base_words, start_of_step)
+    if control.continuous == 1 and gains.age >= GAINS_LAST:
+        find_gains(
+            controller, control, start, model, start_of_step, tree, contacts, tally, q, v, command,
+            torque, gains,
+        )  # fmt: skip
     rejected = False
     tries = 0
     held_from, held_until = 0.0, 0.0
@@ -334,36 +384,41 @@ def sample(
         shortest = taken <= SHORTEST
         if not (error <= 1.0 or (shortest and error < np.inf)):
             brief = not held and taken <= HELD_PART * span
-            if brief and control.continuous == 1 and tries > work.patience:
+            if brief and control.continuous == 1 and tries > holding.patience:
                 held_from = elapsed
                 held_until = min(elapsed + HELD_PART * span, span)
                 h = held_until - elapsed
-                make_up_mind(controller, control, model, ground, start + elapsed, memory, work)
+                make_up_mind(
+                    controller, control, model, ground, start + elapsed, evaluated, memory, work
+                )
                 continue
-            if control.continuous == 1 and (work.age > 0 or shortest):
-                find_gains(controller, control, start + elapsed, model, memory, work)
+            if control.continuous == 1 and (gains.age > 0 or shortest):
+                find_gains(
+                    controller, control, start + elapsed, model, start_of_step, tree, contacts,
+                    tally, q, v, command, torque, gains,
+                )  # fmt: skip
             if shortest:
-                for i in range(model.parent.shape[0]):
-                    memory.q[i] = work.base_q[i]
-                    memory.v[i] = work.base_v[i]
-                return DIVERGED if limit_torque(model, control, memory) else BAD_CONTROLLER
+                copy_words(start_of_step.q, q)
+                copy_words(start_of_step.v, v)
+                good = limit_torque(model, control.voltage, v, tally, command, torque)
+                return DIVERGED if good else BAD_CONTROLLER
             h = max(taken * rescaled(error, SHRINK), SHORTEST)
             rejected = True
             continue
-        if work.loop_rows.shape[0] > 0:
-            equations, loops, q = memory.equations, memory.loops, memory.q
+        if start_of_step.loop_rows.shape[0] > 0:
+            equations, loops = memory.equations, memory.loops
             if not close_loops(model, equations, loops, q):
                 return DIVERGED
-            steady_loops(model, q, equations, loops, memory.v)
-        observe_sides(model, ground, memory.q, memory.v, memory, corners)
-        met = landing(model, work.atol, memory.contacts.gap, work)
-        if misses_corner(model, ground, work.atol, memory.contacts, corners):
+            steady_loops(model, q, equations, loops, v)
+        observe_sides(model, ground, q, v, tree, contacts, memory.surface, corners)
+        met = landing(model, work.atol, gap_before, contacts.gap, corners)
+        if misses_corner(model, ground, work.atol, contacts, corners):
             met = min(met, 0.5)
         if met < 1.0 and not shortest:
             h = max(taken * met, SHORTEST)
             continue
-        bend, forces = work.now.friction.bend, work.base_force
-        choose_sides(model, ground, memory.contacts, corners, bend, forces)
+        bend, forces = work.now.friction.bend, start_of_step.force
+        choose_sides(model, ground, contacts, corners, bend, forces)
         reached = elapsed + taken
         if final:
             reached = held_until if held else span
@@ -371,12 +426,12 @@ def sample(
         how = TRIED if reached == span else ACCEPTED
         if held and not final:
             how = HELD
-        copy_words(work.now.acceleration, work.right_v)
-        evaluate(controller, control, model, ground, how, start + elapsed + taken, memory, work)
+        before = work.stages.right_v
+        copy_words(work.now.acceleration, before)
+        since = start + elapsed
+        accept_step(controller, control, model, ground, how, since, taken, evaluated, memory, work)
         if held and final:
-            note_held(held_from, held_until, work)
-        account(model, start + elapsed, taken, memory, work)
-        begin_step(model, memory, work)
+            note_held(held_from, held_until, before, work.now.acceleration, holding)
         elapsed = reached
         factor = GROW if shortest else min(GROW, rescaled(error, GROW))
         if rejected and not shortest:
@@ -385,36 +440,41 @@ def sample(
         # A step cut short by the sample says little about how long the next may be.
         h = max(h, taken * factor) if final else taken * factor
     work.proposed = min(h, span)
-    work.patience = IMPATIENCE if work.held_for > 0.0 else min(2 * work.patience, PATIENCE)
-    finish_sample(model, memory, work)
+    patience = min(2 * holding.patience, PATIENCE)
+    holding.patience = IMPATIENCE if holding.span > 0.0 else patience
     return DONE
 
 
 @kernel
 def make_up_mind(
     controller: Any, control: Control, model: Model, ground: GroundModel, time: float,
-    memory: Memory, work: CompliantWorkspace,
+    evaluated: Evaluated, memory: Memory, work: CompliantWorkspace,
 ) -> None:  # fmt: skip
     """Ask the controller for good at the start of the step, for torques that will be held."""
-    copy_words(work.base_q, memory.q)
-    copy_words(work.base_v, memory.v)
+    copy_words(work.start.q, memory.q)
+    copy_words(work.start.v, memory.v)
     copy_words(work.base.friction.bend, work.now.friction.bend)
-    evaluate(controller, control, model, ground, DECIDED, time, memory, work)
-    begin_step(model, memory, work)
+    evaluate(
+        controller, control, model, ground, DECIDED, time, memory, work.laws, work.corners,
+        work.now, work.now_rows, work.force,
+    )  # fmt: skip
+    begin_step(work.corners.sides, evaluated, work.base_words, work.start)
 
 
 @kernel
-def note_held(begin: float, end: float, work: CompliantWorkspace) -> None:
+def note_held(
+    begin: float, end: float, held: Floats, acceleration: Floats, holding: Holding
+) -> None:
     """Account for torques that were held within a sample.
 
-    The accelerations under them, at the end, are in ``work.right_v``.
+    At the end the acceleration under them is `held`, and under what follows `acceleration`.
     """
-    if work.held_for == 0.0:
-        work.held_since = begin
-    work.held_for += end - begin
-    for j in range(work.right_v.shape[0]):
-        change = abs(work.now.acceleration[j] - work.right_v[j])
-        work.held_wrong = max(work.held_wrong, (end - begin) * change)
+    if holding.span == 0.0:
+        holding.since = begin
+    holding.span += end - begin
+    for j in range(held.shape[0]):
+        change = abs(acceleration[j] - held[j])
+        holding.wrong = max(holding.wrong, (end - begin) * change)
 
 
 @kernel
@@ -426,110 +486,121 @@ def rescaled(error: float, limit: float) -> float:
 
 
 @kernel
-def begin_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
+def begin_sample(
+    model: Model, contacts: Contacts, corners: Corners, holding: Holding, sums: Sums
+) -> None:
     """Forget the impulses and crossings of the sample before."""
-    begin_joining(model, memory.contacts, work.corners)
-    work.held_for, work.held_wrong = 0.0, 0.0
-    for contact in range(work.corners.sides):
-        work.impulse[contact, 0] = 0.0
-        work.impulse[contact, 1] = 0.0
-    for contact in range(work.touched.shape[0]):
-        work.touched[contact] = -1.0
-        work.left[contact] = -1.0
-    for joint in range(work.stop_impulse.shape[0]):
-        work.stop_impulse[joint] = 0.0
-        work.dry_impulse[joint] = 0.0
-    for row in range(work.loop_impulse.shape[0]):
-        work.loop_impulse[row] = 0.0
-    for own in range(work.own_impulse.shape[0]):
-        work.own_impulse[own] = 0.0
-    memory.assembly.answer.residual[1] = cone_residual(work)
+    begin_joining(model, contacts, corners)
+    holding.span, holding.wrong = 0.0, 0.0
+    for contact in range(corners.sides):
+        sums.contact[contact, 0] = 0.0
+        sums.contact[contact, 1] = 0.0
+    for contact in range(sums.touched.shape[0]):
+        sums.touched[contact] = -1.0
+        sums.left[contact] = -1.0
+    for joint in range(sums.stop.shape[0]):
+        sums.stop[joint] = 0.0
+        sums.dry[joint] = 0.0
+    for row in range(sums.loop.shape[0]):
+        sums.loop[row] = 0.0
+    for own in range(sums.own.shape[0]):
+        sums.own[own] = 0.0
 
 
 @kernel
 def brake(
-    model: Model, time: float, memory: Memory, work: CompliantWorkspace, record: Record
-) -> None:
-    """Let the brakes that have been put on stop their joints, by impulses."""
-    loops = memory.loops
-    if take_hold(model, loops):
-        steady_loops(model, memory.q, memory.equations, loops, memory.v)
+    model: Model, time: float, q: Floats, v: Floats, rows: Rows, equations: Equations,
+    loops: Loops, impulse: Floats, told: Told,
+) -> None:  # fmt: skip
+    """Let the brakes that have been put on stop their joints, by impulses, one a row of loops."""
+    if take_hold(model, loops.braked):
+        steady_loops(model, q, equations, loops, v)
         for row in range(rows_of(loops)):
-            work.loop_impulse[row] = loops.unknown[row]
-            note_loop(memory.rows, row, loops.unknown[row], loops)
-    note_brakes(model, time, 1.0, record, loops)
+            impulse[row] = loops.unknown[row]
+            note_loop(rows, row, loops.unknown[row], loops)
+    note_brakes(model, time, 1.0, loops.brake_force, told, loops.braked)
 
 
 @kernel
-def finish_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
-    """Put the mean forces since the sample before into the memory."""
-    span = work.step
-    for row in range(rows_of(memory.loops)):
-        note_loop(memory.rows, row, work.loop_impulse[row] / span, memory.loops)
-    for own in range(work.own_impulse.shape[0]):
-        number = memory.rows.owner[memory.rows.first[CONSTRAINT] + own]
-        memory.loops.constraint_force[number, 0] = work.own_impulse[own] / span
-    tell_resultants(model, work.corners, work.impulse, work.place)
-    for contact in range(work.touched.shape[0]):
-        for k in range(2):
-            memory.contacts.force[contact, k] = work.impulse[contact, k] / span
-    for joint in range(work.stop_impulse.shape[0]):
-        memory.reaction.stop_torque[joint] = work.stop_impulse[joint] / span
-        memory.reaction.friction_torque[joint] = work.dry_impulse[joint] / span
-    memory.tally.cone = max(memory.tally.cone, memory.assembly.answer.residual[1])
+def note_means(span: float, rows: Rows, loop: Floats, own: Floats, loops: Loops) -> None:
+    """Keep the mean forces of loops and constraints from outside, by their impulses over a time."""
+    for row in range(rows_of(loops)):
+        note_loop(rows, row, loop[row] / span, loops)
+    for i in range(own.shape[0]):
+        number = rows.owner[rows.first[CONSTRAINT] + i]
+        loops.constraint_force[number, 0] = own[i] / span
 
 
 @kernel
-def note_events(
-    model: Model, time: float, work: CompliantWorkspace, memory: Memory, record: Record
+def note_mean_forces(
+    span: float, sums: Sums, force: Floats, stop_torque: Floats, friction_torque: Floats
 ) -> None:
-    """Note what happened since the last sample; `time` is now.
+    """Keep the mean forces of contacts and joints, by their impulses over a time."""
+    for contact in range(sums.touched.shape[0]):
+        for k in range(2):
+            force[contact, k] = sums.contact[contact, k] / span
+    for joint in range(sums.stop.shape[0]):
+        stop_torque[joint] = sums.stop[joint] / span
+        friction_torque[joint] = sums.dry[joint] / span
+
+
+@kernel
+def tell_of_contacts(
+    model: Model, time: float, step: float, mean: Floats, force: Floats, slides: Integers,
+    touched: Floats, left: Floats, told: Told, slipping: Integers,
+) -> None:  # fmt: skip
+    """Tell what contact points did since the last sample; `time` is now, `force` that of now.
 
     Touchdown and lift-off are timed where the gap passes zero, stick and slip to the sample.
     """
-    force = memory.contacts.force
-    if work.held_for > 0.0:
-        since = time - work.step + work.held_since
-        log_event(since, BRIDGE, 0, work.held_for, work.held_wrong, record)
     for contact in range(model.contact_link.shape[0]):
-        touched = work.touched[contact]
-        left = work.left[contact]
-        if touched >= 0.0 or left >= 0.0:
-            memory.reported.slipping[contact] = 0
-        if left >= 0.0 and left < touched:
-            note_event(left, LIFTOFF, contact, work.step, force, record)
-        if touched >= 0.0:
-            note_event(touched, TOUCHDOWN, contact, work.step, force, record)
-        if left >= 0.0 and left >= touched:
-            note_event(left, LIFTOFF, contact, work.step, force, record)
-        if left >= 0.0 or work.force[contact, 0] <= 0.0:
+        down, up = touched[contact], left[contact]
+        if down >= 0.0 or up >= 0.0:
+            slipping[contact] = 0
+        if up >= 0.0 and up < down:
+            note_event(up, LIFTOFF, contact, step, mean, told)
+        if down >= 0.0:
+            note_event(down, TOUCHDOWN, contact, step, mean, told)
+        if up >= 0.0 and up >= down:
+            note_event(up, LIFTOFF, contact, step, mean, told)
+        if up >= 0.0 or force[contact, 0] <= 0.0:
             continue
-        if work.now.friction.slides[contact] != memory.reported.slipping[contact]:
-            memory.reported.slipping[contact] = work.now.friction.slides[contact]
-            kind = SLIP if work.now.friction.slides[contact] == 1 else STICK
-            note_event(time, kind, contact, work.step, force, record)
-    for joint in range(model.parent.shape[0]):
-        pressed = memory.reaction.stop_torque[joint] != 0.0
-        if pressed and memory.reported.stopped[joint] == 0:
-            impulse = abs(memory.reaction.stop_torque[joint]) * work.step
-            log_event(time, JOINT_STOP, joint, impulse, 0.0, record)
-        memory.reported.stopped[joint] = 1 if pressed else 0
-    rows = memory.rows
+        if slides[contact] != slipping[contact]:
+            slipping[contact] = slides[contact]
+            note_event(time, SLIP if slides[contact] == 1 else STICK, contact, step, mean, told)
+
+
+@kernel
+def tell_of_stops(time: float, step: float, torque: Floats, told: Told, stopped: Integers) -> None:
+    """Tell which joints came to their stops since the last sample, whose mean torques these are."""
+    for joint in range(torque.shape[0]):
+        pressed = torque[joint] != 0.0
+        if pressed and stopped[joint] == 0:
+            log_event(time, JOINT_STOP, joint, abs(torque[joint]) * step, 0.0, told)
+        stopped[joint] = 1 if pressed else 0
+
+
+@kernel
+def tell_of_constraints(
+    time: float, force: Floats, impulse: Floats, rows: Rows, told: Told, closed: Integers
+) -> None:
+    """Tell which constraints from outside began to hold since the last sample, or let go."""
     for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
         own = entry - rows.first[CONSTRAINT]
-        holds = 1 if work.now.own.force[own] > 0.0 else 0
-        if holds != memory.reported.closed[entry]:
-            kind, impulse = CONSTRAINT_LETS_GO, 0.0
+        holds = 1 if force[own] > 0.0 else 0
+        if holds != closed[entry]:
+            kind, pressed = CONSTRAINT_LETS_GO, 0.0
             if holds == 1:
-                kind, impulse = CONSTRAINT_HOLDS, work.own_impulse[own]
-            log_event(time, kind, rows.owner[entry], impulse, 0.0, record)
-        memory.reported.closed[entry] = holds
+                kind, pressed = CONSTRAINT_HOLDS, impulse[own]
+            log_event(time, kind, rows.owner[entry], pressed, 0.0, told)
+        closed[entry] = holds
 
 
 @kernel
 def note_forces(
-    model: Model, row: int, force: Floats, stop_force: Floats, dry_force: Floats, memory: Memory,
-    record: Record,
+    model: Model, row: int, force: Floats, stop_force: Floats, dry_force: Floats, slip: Floats,
+    residual: float, breakaway: Floats, loop_force: Floats, coupling_force: Floats,
+    constraint_force: Floats, brake_force: Floats, record: Record,
 ) -> None:  # fmt: skip
     """Write the forces of contacts, joints and loops, the slip and the residual of a row."""
     for joint in range(stop_force.shape[0]):
@@ -538,34 +609,30 @@ def note_forces(
     for contact in range(record.contact_force.shape[1]):
         record.contact_force[row, contact, 0] = force[contact, 0]
         record.contact_force[row, contact, 1] = force[contact, 1]
-        record.slip_velocity[row, contact] = memory.reaction.slip[contact]
+        record.slip_velocity[row, contact] = slip[contact]
     for loop in range(record.loop_force.shape[1]):
-        record.loop_force[row, loop, 0] = memory.loops.loop_force[loop, 0]
-        record.loop_force[row, loop, 1] = memory.loops.loop_force[loop, 1]
+        record.loop_force[row, loop, 0] = loop_force[loop, 0]
+        record.loop_force[row, loop, 1] = loop_force[loop, 1]
     for coupling in range(record.coupling_force.shape[1]):
-        record.coupling_force[row, coupling] = memory.loops.coupling_force[coupling]
+        record.coupling_force[row, coupling] = coupling_force[coupling]
     for own in range(record.constraint_force.shape[1]):
         for k in range(2):
-            record.constraint_force[row, own, k] = memory.loops.constraint_force[own, k]
+            record.constraint_force[row, own, k] = constraint_force[own, k]
     for joint in range(record.brake_torque.shape[1]):
-        record.brake_torque[row, joint] = memory.loops.brake_force[joint]
-    share_friction(model, memory.breakaway, record.friction_torque[row], record.brake_torque[row])
-    record.residual[row, 1] = memory.assembly.answer.residual[1]
+        record.brake_torque[row, joint] = brake_force[joint]
+    share_friction(model, breakaway, record.friction_torque[row], record.brake_torque[row])
+    record.residual[row, 1] = residual
 
 
 @kernel
 def begin(
     model: Model, ground: GroundModel, memory: Memory, work: CompliantWorkspace, record: Record
 ) -> int:
-    """Points in the ground, or on it, are closed when the simulation begins; loops are, too."""
-    if work.loop_rows.shape[0] > 0:
-        equations, loops, q = memory.equations, memory.loops, memory.q
-        if not close_loops(model, equations, loops, q):
-            return DIVERGED
-        steady_loops(model, q, equations, loops, memory.v)
-    observe(model, ground, memory.q, memory.v, memory)
+    """Points in the ground, or on it, are closed when the simulation begins."""
+    contacts, tree = memory.contacts, memory.equations.tree
+    observe(model, ground, memory.q, memory.v, tree, contacts, memory.surface)
     for contact in range(model.contact_link.shape[0]):
-        memory.reported.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
+        memory.reported.closed[contact] = contacts.gap[contact] <= LIFTOFF_GAP
     return DONE
 
 
@@ -577,15 +644,16 @@ def prepare(
     work: CompliantWorkspace,
 ) -> None:
     """Kinematics and contact points of the state now."""
-    corners = work.corners
+    q, v, tree, contacts = memory.q, memory.v, memory.equations.tree, memory.contacts
+    corners, surface = work.corners, memory.surface
     points = model.nc
     corners.doubled = points if ground.concave == 1 else 0
     corners.sides = points + corners.doubled
-    observe_sides(model, ground, memory.q, memory.v, memory, corners)
+    observe_sides(model, ground, q, v, tree, contacts, surface, corners)
     if corners.doubled > 0:
-        bend, forces = work.now.friction.bend, work.base_force
-        choose_sides(model, ground, memory.contacts, corners, bend, forces)
-        observe_sides(model, ground, memory.q, memory.v, memory, corners)
+        bend, forces = work.now.friction.bend, work.start.force
+        choose_sides(model, ground, contacts, corners, bend, forces)
+        observe_sides(model, ground, q, v, tree, contacts, surface, corners)
 
 
 @kernel
@@ -595,7 +663,10 @@ def decide(
 ) -> int:  # fmt: skip
     """Forces and rates at this sample, under the torques that the frame asked for."""
     share_over_step(clock.time, work.step, memory.pushes)
-    evaluate(scene.controller, control, scene.model, scene.ground, HELD, clock.time, memory, work)
+    evaluate(
+        scene.controller, control, scene.model, scene.ground, HELD, clock.time, memory, work.laws,
+        work.corners, work.now, work.now_rows, work.force,
+    )  # fmt: skip
     return DONE
 
 
@@ -605,21 +676,19 @@ def report(
     clock: Clock,
 ) -> None:  # fmt: skip
     """Append a row if one is due, with the forces of this instant."""
-    for row in range(rows_of(memory.loops)):
-        note_loop(memory.rows, row, work.now.loop[row], memory.loops)
-    for own in range(work.own_impulse.shape[0]):
-        number = memory.rows.owner[memory.rows.first[CONSTRAINT] + own]
-        memory.loops.constraint_force[number, 0] = work.now.own.force[own]
+    model, now, corners, loops = scene.model, work.now, work.corners, memory.loops
+    note_means(1.0, memory.rows, now.loop, now.own.force, loops)
     work.row = note_row_when_due(memory, clock, record)
     if work.row >= 0:
-        now = work.now
         note_forces(
-            scene.model, work.row, work.force, now.stop_force, now.dry_force, memory, record
-        )
+            model, work.row, work.force, now.stop_force, now.dry_force, memory.reaction.slip,
+            memory.assembly.answer.residual[1], memory.breakaway, loops.loop_force,
+            loops.coupling_force, loops.constraint_force, loops.brake_force, record,
+        )  # fmt: skip
         force, place = record.contact_force[work.row], record.contact_point[work.row]
-        begin_joining(scene.model, memory.contacts, work.corners)
-        join(scene.model, 2.0, work.force, memory.contacts, work.corners)
-        tell_resultants(scene.model, work.corners, force, place)
+        begin_joining(model, memory.contacts, corners)
+        join(model, 2.0, work.force, memory.contacts, corners)
+        tell_resultants(model, corners, force, place)
 
 
 @kernel
@@ -628,31 +697,49 @@ def move(
     clock: Clock,
 ) -> int:  # fmt: skip
     """Move on to the next sample, and note what happened on the way."""
-    model = scene.model
-    begin_sample(model, memory, work)
-    if awaits_hold(memory.loops):
-        brake(model, clock.time, memory, work, record)
-        evaluate(scene.controller, control, model, scene.ground, HELD, clock.time, memory, work)
+    model, loops, rows, contacts = scene.model, memory.loops, memory.rows, memory.contacts
+    reported, reaction, told = memory.reported, memory.reaction, record.told
+    corners, sums, holding, friction = work.corners, work.sums, work.holding, work.now.friction
+    residual = memory.assembly.answer.residual
+    begin_sample(model, contacts, corners, holding, sums)
+    residual[1] = cone_residual(corners.sides, friction.friction, work.force)
+    if awaits_hold(loops.braked):
+        brake(model, clock.time, memory.q, memory.v, rows, memory.equations, loops, sums.loop, told)
+        evaluate(
+            scene.controller, control, model, scene.ground, HELD, clock.time, memory, work.laws,
+            corners, work.now, work.now_rows, work.force,
+        )  # fmt: skip
     code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work)
     if code != DONE:
         return code
-    step = work.step
-    first = record.events
-    note_events(model, clock.time + step, work, memory, record)
-    react(model, first, memory.q, record, memory.loops)
+    step, first, tally = work.step, told.events, memory.tally
+    note_means(step, rows, sums.loop, sums.own, loops)
+    tell_resultants(model, corners, sums.contact, sums.place)
+    note_mean_forces(step, sums, contacts.force, reaction.stop_torque, reaction.friction_torque)
+    tally.cone = max(tally.cone, residual[1])
+    end = clock.time + step
+    if holding.span > 0.0:
+        log_event(end - step + holding.since, BRIDGE, 0, holding.span, holding.wrong, told)
+    tell_of_contacts(
+        model, end, step, contacts.force, work.force, friction.slides, sums.touched, sums.left,
+        told, reported.slipping,
+    )  # fmt: skip
+    tell_of_stops(end, step, reaction.stop_torque, told, reported.stopped)
+    tell_of_constraints(end, work.now.own.force, sums.own, rows, told, reported.closed)
+    react(model, first, memory.q, told, loops.held)
     if work.row >= 0:
         # What acted until the next sample takes the place of what acted at the first instant.
-        reaction = memory.reaction
         note_forces(
-            model, work.row, memory.contacts.force, reaction.stop_torque, reaction.friction_torque,
-            memory, record,
+            model, work.row, contacts.force, reaction.stop_torque, reaction.friction_torque,
+            reaction.slip, residual[1], memory.breakaway, loops.loop_force, loops.coupling_force,
+            loops.constraint_force, loops.brake_force, record,
         )  # fmt: skip
-        for contact in range(work.corners.doubled):
-            if work.corners.joins[contact] == 1:
+        for contact in range(corners.doubled):
+            if corners.joins[contact] == 1:
                 for i in range(2):
-                    record.contact_point[work.row, contact, i] = work.place[contact, i]
+                    record.contact_point[work.row, contact, i] = sums.place[contact, i]
     if control.continuous == 1:
-        show_forces(work.force, work.corners, memory.contacts)
+        show_forces(work.force, corners, contacts)
     clock.time = clock.start + (clock.index + 1) * step
     return DONE
 

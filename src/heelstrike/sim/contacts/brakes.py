@@ -17,6 +17,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
@@ -34,71 +35,72 @@ from heelstrike.sim.contacts.loops import (
 )
 from heelstrike.sim.contacts.rows import DRY_JOINT
 from heelstrike.sim.memory import Loops, Memory
-from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.record import Told
 from heelstrike.sim.record.recording import log_event
 
 JOINT_BRAKE = int(EventKind.JOINT_BRAKE)
 
 
 @kernel
-def awaits_hold(loops: Loops) -> bool:
+def awaits_hold(braked: Integers) -> bool:
     """Whether a brake has been put on and does not hold yet."""
     found = False
-    for brake in range(loops.braked.shape[0]):
-        found = found or loops.braked[brake] == PUT_ON
+    for brake in range(braked.shape[0]):
+        found = found or braked[brake] == PUT_ON
     return found
 
 
 @kernel
-def take_hold(model: Model, loops: Loops) -> bool:
+def take_hold(model: Model, braked: Integers) -> bool:
     """Let the brakes hold that have been put on; return whether any takes hold without slipping."""
     found = False
-    for brake in range(loops.braked.shape[0]):
-        if loops.braked[brake] == PUT_ON:
+    for brake in range(braked.shape[0]):
+        if braked[brake] == PUT_ON:
             slips = model.brake_limit[brake] < np.inf
-            loops.braked[brake] = BEGINS_TO_RUB if slips else TAKES_HOLD
-        found = found or loops.braked[brake] == TAKES_HOLD
+            braked[brake] = BEGINS_TO_RUB if slips else TAKES_HOLD
+        found = found or braked[brake] == TAKES_HOLD
     return found
 
 
 @kernel
-def find_loops_of_step(model: Model, memory: Memory) -> None:
+def find_loops_of_step(model: Model, q: Floats, v: Floats, tree: Workspace, loops: Loops) -> None:
     """Find the rows of loops and brakes.
 
     Where brakes take hold the velocity that J̇ v is of ends: brakes that stop a loop twice over
     could not meet it.
     """
-    loops = memory.loops
-    stops = take_hold(model, loops)
-    find_loops(model, memory.q, memory.v, memory.equations.tree, loops)
+    stops = take_hold(model, loops.braked)
+    find_loops(model, q, v, tree, loops)
     for row in range(loops.rows.bias.shape[0] if stops else 0):
         loops.rows.bias[row] = 0.0
 
 
 @kernel
-def stops_any(model: Model, v: Floats, rest: float, loops: Loops) -> bool:
+def stops_any(model: Model, v: Floats, rest: float, braked: Integers) -> bool:
     """Whether any of the brakes that take hold stops a joint that is faster than `rest`."""
     found = False
-    for brake in range(loops.braked.shape[0]):
+    for brake in range(braked.shape[0]):
         moves = abs(v[model.brake_joint[brake]]) > rest
-        found = found or (loops.braked[brake] == TAKES_HOLD and moves)
+        found = found or (braked[brake] == TAKES_HOLD and moves)
     return found
 
 
 @kernel
-def note_brakes(model: Model, time: float, span: float, record: Record, loops: Loops) -> None:
-    """Tell of the brakes that take hold, with their impulses over a span of time.
+def note_brakes(
+    model: Model, time: float, span: float, force: Floats, told: Told, braked: Integers
+) -> None:
+    """Tell of the brakes that take hold, with the impulses of their forces over a span of time.
 
     One that slips gives none in an instant.
     """
-    for brake in range(loops.braked.shape[0]):
-        if loops.braked[brake] == TAKES_HOLD:
-            loops.braked[brake] = HOLDS
-            impulse = span * loops.brake_force[brake]
-            log_event(time, JOINT_BRAKE, model.brake_joint[brake], impulse, 0.0, record)
-        elif loops.braked[brake] == BEGINS_TO_RUB:
-            loops.braked[brake] = RUBS
-            log_event(time, JOINT_BRAKE, model.brake_joint[brake], 0.0, 0.0, record)
+    for brake in range(braked.shape[0]):
+        if braked[brake] == TAKES_HOLD:
+            braked[brake] = HOLDS
+            impulse = span * force[brake]
+            log_event(time, JOINT_BRAKE, model.brake_joint[brake], impulse, 0.0, told)
+        elif braked[brake] == BEGINS_TO_RUB:
+            braked[brake] = RUBS
+            log_event(time, JOINT_BRAKE, model.brake_joint[brake], 0.0, 0.0, told)
 
 
 @dissolved_kernel

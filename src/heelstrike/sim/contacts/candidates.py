@@ -8,9 +8,12 @@ are not there. What differs between methods is who is near enough, and the free 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, STICK
 from heelstrike.contact.sets import INTERVAL, row_of
+from heelstrike.contact.workspace import ContactProblem
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.geometry import EVERYWHERE, contact_rows, write_unit_row
@@ -30,20 +33,39 @@ from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import Assembly, Memory
 
 
+class Listing(NamedTuple):
+    """Candidates as they are listed, and what is known of all entries of the table before.
+
+    Attributes
+    ----------
+    set, friction, guess : (entries,) array
+        Where impulses of each entry may lie, its friction, and its mode in the last solve.
+    candidate, mode, problem
+        Who the candidates are, their modes to begin with, and their contact problem.
+    """
+
+    set: Integers
+    friction: Floats
+    guess: Integers
+    candidate: Integers
+    mode: Integers
+    problem: ContactProblem
+
+
 @dissolved_kernel
-def list_candidate(entry: int, place: int, components: int, memory: Memory) -> int:
+def list_candidate(entry: int, place: int, components: int, listing: Listing) -> int:
     """List an entry as a candidate, with its set, its friction and its mode before.
 
     Candidates are listed one after the other; `components` tells how many rows this one has.
     Returns the first of them.
     """
-    problem, assembly = memory.assembly.problem, memory.assembly
+    problem = listing.problem
     first = row_of(place, problem.first)
     problem.first[place + 1] = first + components
-    problem.set[place] = memory.rows.set[entry]
-    problem.friction[place] = memory.surface.friction[entry]
-    assembly.answer.mode[place] = memory.reaction.mode[entry]
-    assembly.candidate[place] = entry
+    problem.set[place] = listing.set[entry]
+    problem.friction[place] = listing.friction[entry]
+    listing.mode[place] = listing.guess[entry]
+    listing.candidate[place] = entry
     return first
 
 
@@ -69,36 +91,42 @@ def locate_stops(q: Floats, rows: Rows) -> None:
 
 
 @dissolved_kernel
-def hold_latched(model: Model, count: int, v: Floats, memory: Memory) -> int:
+def hold_latched(
+    model: Model, count: int, v: Floats, stop: Integers, held: Integers, listing: Listing
+) -> int:
     """Let the stops of engaged latches hold; return how many candidates there are with them.
 
-    Where the gap decides, and a method has left a joint before its stop, it is held there.
+    Where the gap decides, and a method has left a joint before its stop, it is held there. `stop`
+    and `held` tell which entry the stop of each latch is, and whether that is engaged.
     """
-    loops, assembly, stops = memory.loops, memory.assembly, memory.rows.latch_stop
-    missing = hold(count, stops, loops.held, assembly)
+    candidate, problem = listing.candidate, listing.problem
+    missing = hold(count, stop, held, candidate, problem.set)
     while missing >= 0:
-        row = list_candidate(stops[missing], count, 1, memory)
+        row = list_candidate(stop[missing], count, 1, listing)
         rate = -model.latch_side[missing] * v[model.latch_joint[missing]]
-        assembly.problem.free[row] = rate
-        assembly.answer.mode[count] = STICK
+        problem.free[row] = rate
+        listing.mode[count] = STICK
         count += 1
-        missing = hold(count, stops, loops.held, assembly)
+        missing = hold(count, stop, held, candidate, problem.set)
     return count
 
 
 @dissolved_kernel
-def list_dry_joints(count: int, span: float, v: Floats, memory: Memory) -> int:
+def list_dry_joints(
+    count: int, span: float, v: Floats, breakaway: Floats, rows: Rows, listing: Listing
+) -> int:
     """List the joints with dry friction over a span of time; return how many candidates there are.
 
-    Those whose brake is off, and that have none of their own, are left out.
+    Those whose brake is off, and that have none of their own, are left out: the most that dry
+    friction is of each joint is its `breakaway`.
     """
-    rows, problem = memory.rows, memory.assembly.problem
+    problem = listing.problem
     for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
         joint = rows.owner[dry]
-        if memory.breakaway[joint] > 0.0:
-            row = list_candidate(dry, count, 2, memory)
+        if breakaway[joint] > 0.0:
+            row = list_candidate(dry, count, 2, listing)
             problem.free[row + 1] = v[joint]
-            problem.bound[count] = span * memory.breakaway[joint]
+            problem.bound[count] = span * breakaway[joint]
             count += 1
     return count
 
@@ -133,78 +161,127 @@ def write_own_rows(
 
 
 @kernel
-def write_rows(
-    model: Model, tree: Workspace, contacts: Contacts, seconds: Contacts, rows: Rows,
+def write_contact_rows(
+    kind: int, model: Model, tree: Workspace, contacts: Contacts, owner: Integers,
     assembly: Assembly,
 ) -> None:  # fmt: skip
-    """Write the Jacobian rows of the candidates, but for those of loops, which have theirs.
+    """Write the Jacobian rows of the candidates that are contact points, on one of their faces.
+
+    `contacts` are the points on faces of that kind, `owner` tells of each entry which it is.
+    """
+    directions, first = assembly.directions, assembly.problem.first
+    for place in range(assembly.begin[kind], assembly.until[kind]):
+        point = owner[assembly.candidate[place]]
+        contact_rows(model, tree, contacts, point, place, first, directions)
+
+
+@kernel
+def write_joint_rows(rows: Rows, assembly: Assembly) -> None:
+    """Write the Jacobian rows of stops, constraints from outside and dry joints.
 
     A stop has one row, ±1 at its joint; a dry joint such a tangent, and a normal row of zeros.
     """
-    first, leaf, jacobian = assembly.problem.first, assembly.leaf, assembly.jacobian
-    for place in range(assembly.begin[POINT], assembly.until[POINT]):
-        contact_rows(model, tree, contacts, rows.owner[assembly.candidate[place]], place, assembly)
+    candidate, first = assembly.candidate, assembly.problem.first
+    leaf, jacobian = assembly.directions.leaf, assembly.directions.jacobian
     for place in range(assembly.begin[STOP], assembly.until[STOP]):
-        stop = assembly.candidate[place]
+        stop = candidate[place]
         write_unit_row(rows.owner[stop], place, 0, rows.side[stop], first, leaf, jacobian)
     for place in range(assembly.begin[CONSTRAINT], assembly.until[CONSTRAINT]):
-        entry = assembly.candidate[place]
-        write_own_rows(entry, place, rows, first, leaf, jacobian)
+        write_own_rows(candidate[place], place, rows, first, leaf, jacobian)
     for place in range(assembly.begin[DRY_JOINT], assembly.until[DRY_JOINT]):
-        joint = rows.owner[assembly.candidate[place]]
+        joint = rows.owner[candidate[place]]
         write_unit_row(joint, place, 1, 1.0, first, leaf, jacobian)
-    for place in range(assembly.begin[SECOND_FACE], assembly.until[SECOND_FACE]):
-        contact_rows(model, tree, seconds, rows.owner[assembly.candidate[place]], place, assembly)
 
 
 @dissolved_kernel
-def note_answer(model: Model, span: float, memory: Memory) -> None:
+def note_answer(span: float, memory: Memory) -> None:
     """Keep the forces of the candidates, whose impulses are those of a span of time, and more.
 
     These are their slips and modes; all others have none.
     """
-    assembly, answer, rows = memory.assembly, memory.assembly.answer, memory.rows
-    candidate, begin, until = assembly.candidate, assembly.begin, assembly.until
-    impulse, force, reaction = answer.impulse, memory.contacts.force, memory.reaction
-    problem, first = assembly.problem, assembly.problem.first
-    for joint in range(model.nv):
-        reaction.stop_torque[joint] = 0.0
-    for contact in range(model.nc):
-        force[contact, 0] = 0.0
-        force[contact, 1] = 0.0
-        reaction.slip[contact] = 0.0
+    assembly, reaction, rows, loops = memory.assembly, memory.reaction, memory.rows, memory.loops
     for entry in range(rows.first[DRY_JOINT]):
         reaction.mode[entry] = OPEN
-    for place in range(begin[POINT], until[POINT]):
-        contact, row = candidate[place], row_of(place, first)
-        force[contact, 0] = impulse[row] / span
-        force[contact, 1] = impulse[row + 1] / span
-        reaction.slip[contact] = answer.velocity[row + 1]
-        reaction.mode[contact] = answer.mode[place]
-    for place in range(begin[STOP], until[STOP]):
-        stop = candidate[place]
-        pressing = rows.side[stop] * impulse[row_of(place, first)]
-        reaction.stop_torque[rows.owner[stop]] += pressing / span
-        reaction.mode[stop] = answer.mode[place] != OPEN
+    keep_points(span, assembly, memory.contacts.force, reaction.slip, reaction.mode)
+    keep_stops(span, rows.owner, rows.side, assembly, reaction.stop_torque, reaction.mode)
+    keep_constraints(span, rows, assembly, loops.constraint_force, reaction.mode)
+    keep_dry_joints(span, rows.owner, assembly, reaction.friction_torque, reaction.mode)
+    keep_second_faces(span, rows.owner, assembly, memory.seconds.force, reaction.mode)
+    first, impulse = assembly.problem.first, assembly.answer.impulse
+    note_loops(rows, assembly.until[LOOP], span, first, impulse, loops)
+
+
+@dissolved_kernel
+def keep_points(
+    span: float, assembly: Assembly, force: Floats, slip: Floats, mode: Integers
+) -> None:
+    """Keep forces, slips and modes of the contact points."""
+    answer, first = assembly.answer, assembly.problem.first
+    for contact in range(force.shape[0]):
+        force[contact, 0] = 0.0
+        force[contact, 1] = 0.0
+        slip[contact] = 0.0
+    for place in range(assembly.begin[POINT], assembly.until[POINT]):
+        contact, row = assembly.candidate[place], row_of(place, first)
+        force[contact, 0] = answer.impulse[row] / span
+        force[contact, 1] = answer.impulse[row + 1] / span
+        slip[contact] = answer.velocity[row + 1]
+        mode[contact] = answer.mode[place]
+
+
+@dissolved_kernel
+def keep_stops(
+    span: float, owner: Integers, side: Floats, assembly: Assembly, torque: Floats, mode: Integers
+) -> None:
+    """Keep torques and modes of the joint stops."""
+    answer, first = assembly.answer, assembly.problem.first
+    for joint in range(torque.shape[0]):
+        torque[joint] = 0.0
+    for place in range(assembly.begin[STOP], assembly.until[STOP]):
+        stop = assembly.candidate[place]
+        torque[owner[stop]] += side[stop] * answer.impulse[row_of(place, first)] / span
+        mode[stop] = answer.mode[place] != OPEN
+
+
+@dissolved_kernel
+def keep_constraints(
+    span: float, rows: Rows, assembly: Assembly, force: Floats, mode: Integers
+) -> None:
+    """Keep forces and modes of the constraints from outside that may let go."""
+    problem, impulse = assembly.problem, assembly.answer.impulse
     for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
-        memory.loops.constraint_force[rows.owner[entry], 0] = 0.0
-        memory.loops.constraint_force[rows.owner[entry], 1] = 0.0
-    for place in range(begin[CONSTRAINT], until[CONSTRAINT]):
-        entry = candidate[place]
-        constraint = memory.loops.constraint_force[rows.owner[entry]]
-        rubs, row = problem.set[place] == INTERVAL, first[place]
-        constraint[0] = impulse[row + (1 if rubs else 0)] / span
-        alone = rubs or first[place + 1] == row + 1
-        constraint[1] = 0.0 if alone else impulse[row + 1] / span
-        reaction.mode[entry] = answer.mode[place]
-    for place in range(begin[DRY_JOINT], until[DRY_JOINT]):
-        dry = candidate[place]
-        reaction.friction_torque[rows.owner[dry]] = impulse[first[place] + 1] / span
-        reaction.mode[dry] = answer.mode[place]
-    for place in range(begin[SECOND_FACE], until[SECOND_FACE]):
-        second = candidate[place]
-        contact, row = rows.owner[second], first[place]
-        memory.seconds.force[contact, 0] = impulse[row] / span
-        memory.seconds.force[contact, 1] = impulse[row + 1] / span
-        reaction.mode[second] = answer.mode[place]
-    note_loops(rows, until[LOOP], span, first, impulse, memory.loops)
+        force[rows.owner[entry], 0] = 0.0
+        force[rows.owner[entry], 1] = 0.0
+    for place in range(assembly.begin[CONSTRAINT], assembly.until[CONSTRAINT]):
+        entry, row = assembly.candidate[place], problem.first[place]
+        its, rubs = force[rows.owner[entry]], problem.set[place] == INTERVAL
+        its[0] = impulse[row + (1 if rubs else 0)] / span
+        alone = rubs or problem.first[place + 1] == row + 1
+        its[1] = 0.0 if alone else impulse[row + 1] / span
+        mode[entry] = assembly.answer.mode[place]
+
+
+@dissolved_kernel
+def keep_dry_joints(
+    span: float, owner: Integers, assembly: Assembly, torque: Floats, mode: Integers
+) -> None:
+    """Keep torques and modes of the joints with dry friction."""
+    answer, first = assembly.answer, assembly.problem.first
+    for place in range(assembly.begin[DRY_JOINT], assembly.until[DRY_JOINT]):
+        dry = assembly.candidate[place]
+        torque[owner[dry]] = answer.impulse[first[place] + 1] / span
+        mode[dry] = answer.mode[place]
+
+
+@dissolved_kernel
+def keep_second_faces(
+    span: float, owner: Integers, assembly: Assembly, force: Floats, mode: Integers
+) -> None:
+    """Keep forces and modes of contact points on their second faces."""
+    answer, first = assembly.answer, assembly.problem.first
+    for place in range(assembly.begin[SECOND_FACE], assembly.until[SECOND_FACE]):
+        second = assembly.candidate[place]
+        contact, row = owner[second], first[place]
+        force[contact, 0] = answer.impulse[row] / span
+        force[contact, 1] = answer.impulse[row + 1] / span
+        mode[second] = answer.mode[place]

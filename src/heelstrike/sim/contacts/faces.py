@@ -8,6 +8,7 @@ of a disc whatever of the ground is nearest beside its own.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel, line_contact, turn_at
 from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Model
+from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import Surface
@@ -148,8 +149,16 @@ def second_face(
     return nearest, second
 
 
+class Located(NamedTuple):
+    """Where entries of the table of rows are: gaps, positions and normals, as it has them."""
+
+    gap: Floats
+    position: Floats
+    normal: Floats
+
+
 @kernel
-def center_of(model: Model, contacts: Contacts | Rows, point: int) -> tuple[float, float]:
+def center_of(model: Model, contacts: Contacts | Rows | Located, point: int) -> tuple[float, float]:
     """Where the centre of the disc of a contact point is."""
     position, normal = contacts.position[point], contacts.normal[point]
     radius = model.contact_radius[point]
@@ -159,7 +168,7 @@ def center_of(model: Model, contacts: Contacts | Rows, point: int) -> tuple[floa
 @kernel
 def locate_on_face(
     model: Model, ground: GroundModel, tree: Workspace, point: int, face: int, entry: int,
-    contacts: Contacts | Rows,
+    contacts: Contacts | Rows | Located,
 ) -> None:  # fmt: skip
     """Contact point, gap and normal of a disc on a face, wherever it is along it.
 

@@ -8,6 +8,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel, ground_contact, path_curvature
 from heelstrike.contact.sets import CONE, INTERVAL
+from heelstrike.contact.workspace import ContactProblem
 from heelstrike.dynamics.articulated import articulate, carry_along, solve_articulated
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import (
@@ -26,7 +27,7 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.contacts.straight_line import EQUATIONS, SOLVE
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.memory import Assembly, Equations, Memory, Surface
+from heelstrike.sim.memory import Directions, Equations, Surface
 
 EVERYWHERE = -1
 """Leaf of a candidate that acts on several links."""
@@ -79,14 +80,18 @@ def bend_acceleration(
 
 @kernel
 def contact_rows(
-    model: Model, tree: Workspace, contacts: Contacts, contact: int, place: int, assembly: Assembly
-) -> None:
-    """Write the Jacobian rows (normal, tangent) of a contact point as candidate `place`."""
+    model: Model, tree: Workspace, contacts: Contacts, contact: int, place: int, first: Integers,
+    directions: Directions,
+) -> None:  # fmt: skip
+    """Write the Jacobian rows (normal, tangent) of a contact point as candidate `place`.
+
+    `first` tells where the rows of each candidate begin.
+    """
     link = model.contact_link[contact]
-    assembly.leaf[place] = link
+    directions.leaf[place] = link
     write_point_rows(
-        model, tree, link, contacts.position[contact], contacts.normal[contact],
-        assembly.problem.first[place], assembly.jacobian,
+        model, tree, link, contacts.position[contact], contacts.normal[contact], first[place],
+        directions.jacobian,
     )  # fmt: skip
 
 
@@ -116,21 +121,23 @@ def write_unit_row(
 
 
 @dissolved_kernel
-def halve_by_factor(model: Model, factor: Floats, place: int, assembly: Assembly) -> None:
-    """Write the two columns of ``assembly.half`` that belong to a candidate, by A = Lᵀ D L."""
-    parents, half = model.parent, assembly.half
-    row = assembly.problem.first[place]
-    j = assembly.leaf[place]
+def halve_by_factor(
+    model: Model, factor: Floats, place: int, row: int, directions: Directions
+) -> None:
+    """Write the two columns of ``half``, from `row` on, of a candidate, by A = Lᵀ D L."""
+    parents, half, root = model.parent, directions.half, directions.root
+    jacobian = directions.jacobian
+    j = directions.leaf[place]
     while j >= 0:
-        half[j, row] = assembly.jacobian[row, j]
-        half[j, row + 1] = assembly.jacobian[row + 1, j]
+        half[j, row] = jacobian[row, j]
+        half[j, row + 1] = jacobian[row + 1, j]
         j = parents[j]
-    j = assembly.leaf[place]
+    j = directions.leaf[place]
     while j >= 0:
         normal = half[j, row]
         tangent = half[j, row + 1]
-        half[j, row] = assembly.root[j] * normal
-        half[j, row + 1] = assembly.root[j] * tangent
+        half[j, row] = root[j] * normal
+        half[j, row + 1] = root[j] * tangent
         i = parents[j]
         while i >= 0:
             half[i, row] -= factor[j, i] * normal
@@ -140,17 +147,18 @@ def halve_by_factor(model: Model, factor: Floats, place: int, assembly: Assembly
 
 
 @dissolved_kernel
-def halve_by_bodies(model: Model, equations: Equations, place: int, assembly: Assembly) -> None:
-    """Write the two columns of ``assembly.half`` of a candidate, by articulated bodies.
+def halve_by_bodies(
+    model: Model, motion: Floats, momentum: Floats, place: int, first: int, directions: Directions
+) -> None:
+    """Write the two columns of ``half``, from `first` on, of a candidate, by articulated bodies.
 
     They are what a force along its rows leaves to each joint on the way to the root.
     """
-    parents, motion, momentum = model.parent, equations.tree.motion, equations.bodies.momentum
-    jacobian, root, half = assembly.jacobian, assembly.root, assembly.half
-    first = assembly.problem.first[place]
+    parents, jacobian = model.parent, directions.jacobian
+    root, half = directions.root, directions.half
     for row in range(first, first + 2):
         left = 0.0, 0.0, 0.0
-        j = assembly.leaf[place]
+        j = directions.leaf[place]
         while j >= 0:
             m0, m1, m2 = spatial(motion, j)
             entry = root[j] * (jacobian[row, j] + m0 * left[0] + m1 * left[1] + m2 * left[2])
@@ -160,14 +168,14 @@ def halve_by_bodies(model: Model, equations: Equations, place: int, assembly: As
 
 
 @kernel
-def halve_all_by_factor(model: Model, factor: Floats, row: int, assembly: Assembly) -> None:
-    """Write a column of ``assembly.half`` for a row that has a part in any joint."""
-    half = assembly.half
+def halve_all_by_factor(model: Model, factor: Floats, row: int, directions: Directions) -> None:
+    """Write a column of ``half`` for a row that has a part in any joint."""
+    half = directions.half
     for j in range(model.nv):
-        half[j, row] = assembly.jacobian[row, j]
+        half[j, row] = directions.jacobian[row, j]
     for j in range(model.nv - 1, -1, -1):
         value = half[j, row]
-        half[j, row] = assembly.root[j] * value
+        half[j, row] = directions.root[j] * value
         i = model.parent[j]
         while i >= 0:
             half[i, row] -= factor[j, i] * value
@@ -175,51 +183,54 @@ def halve_all_by_factor(model: Model, factor: Floats, row: int, assembly: Assemb
 
 
 @kernel
-def halve_all_by_bodies(model: Model, row: int, equations: Equations, assembly: Assembly) -> None:
-    """Write a column of ``assembly.half`` for a row that has a part in any joint."""
-    motion, momentum = equations.tree.motion, equations.bodies.momentum
-    left = equations.tree.force  # scratch
+def halve_all_by_bodies(
+    model: Model, motion: Floats, momentum: Floats, row: int, left: Floats, directions: Directions
+) -> None:
+    """Write a column of ``half`` for a row that has a part in any joint; `left` is scratch."""
+    jacobian, root, half = directions.jacobian, directions.root, directions.half
     for i in range(model.nl):
         write(i, (0.0, 0.0, 0.0), left)
     for j in range(model.nv - 1, -1, -1):
         force = spatial(left, j)
-        entry = assembly.root[j] * (assembly.jacobian[row, j] + power(spatial(motion, j), force))
-        assembly.half[j, row] = entry
+        entry = root[j] * (jacobian[row, j] + power(spatial(motion, j), force))
+        half[j, row] = entry
         parent = model.parent[j]
         if parent >= 0:
-            rest = plus(force, scaled(spatial(momentum, j), -assembly.root[j] * entry))
+            rest = plus(force, scaled(spatial(momentum, j), -root[j] * entry))
             write(parent, plus(spatial(left, parent), rest), left)
 
 
 @kernel
-def assemble_delassus(model: Model, count: int, equations: Equations, assembly: Assembly) -> None:
+def assemble_delassus(
+    model: Model, count: int, equations: Equations, directions: Directions, problem: ContactProblem
+) -> None:
     """Delassus matrix G = J A⁻¹ Jᵀ of the first `count` candidates.
 
-    With A = Lᵀ D L it is the square of ``assembly.half`` = D^(-1/2) L⁻ᵀ Jᵀ, whose rows are
-    coordinates, so that the inner loops run over the candidates.
+    With A = Lᵀ D L it is the square of ``half`` = D^(-1/2) L⁻ᵀ Jᵀ, whose rows are coordinates, so
+    that the inner loops run over the candidates.
     """
-    half, delassus = assembly.half, assembly.problem.delassus
-    factor, inverse = equations.factor, equations.bodies.inverse
+    half, leaf, delassus, first = directions.half, directions.leaf, problem.delassus, problem.first
+    factor, bodies, tree = equations.factor, equations.bodies, equations.tree
+    motion, momentum = tree.motion, bodies.momentum
     straight = equations.programs[EQUATIONS] != 0
-    nv, first = model.nv, assembly.problem.first
-    rows = first[count]
+    nv, rows = model.nv, first[count]
     for j in range(nv):
-        assembly.root[j] = math.sqrt(factor[j, j] if straight else inverse[j])
+        directions.root[j] = math.sqrt(factor[j, j] if straight else bodies.inverse[j])
         for row in range(rows):
             half[j, row] = 0.0
     for place in range(count):
         alone = first[place + 1] == first[place] + 1
-        if alone or assembly.leaf[place] == EVERYWHERE:
-            rubs = assembly.problem.set[place] in (CONE, INTERVAL)
+        if alone or leaf[place] == EVERYWHERE:
+            rubs = problem.set[place] in (CONE, INTERVAL)
             for row in range(first[place], first[place] + (2 if rubs else 1)):
                 if straight:
-                    halve_all_by_factor(model, factor, row, assembly)
+                    halve_all_by_factor(model, factor, row, directions)
                 else:
-                    halve_all_by_bodies(model, row, equations, assembly)
+                    halve_all_by_bodies(model, motion, momentum, row, tree.force, directions)
         elif straight:
-            halve_by_factor(model, factor, place, assembly)
+            halve_by_factor(model, factor, place, first[place], directions)
         else:
-            halve_by_bodies(model, equations, place, assembly)
+            halve_by_bodies(model, motion, momentum, place, first[place], directions)
     for row in range(rows):
         empty = True
         for j in range(nv):
@@ -240,15 +251,16 @@ def assemble_delassus(model: Model, count: int, equations: Equations, assembly: 
 
 @kernel
 def add_impulse(
-    model: Model, assembly: Assembly, count: int, equations: Equations, v: Floats
-) -> None:
-    """Add A⁻¹ Jᵀ λ of the answer to a velocity, after :func:`assemble_delassus`."""
-    change, half, impulse = equations.force, assembly.half, assembly.answer.impulse
+    model: Model, rows: int, impulse: Floats, directions: Directions, equations: Equations,
+    v: Floats,
+) -> None:  # fmt: skip
+    """Add A⁻¹ Jᵀ λ to a velocity, after :func:`assemble_delassus`; λ has so many rows."""
+    change, half = equations.force, directions.half
     for j in range(model.nv):
         total = 0.0
-        for row in range(assembly.problem.first[count]):
+        for row in range(rows):
             total += half[j, row] * impulse[row]
-        change[j] = assembly.root[j] * total
+        change[j] = directions.root[j] * total
     if equations.programs[EQUATIONS] != 0:
         solve_lower(model, equations.factor, change)
     else:
@@ -293,9 +305,11 @@ def solve_mass_matrix(model: Model, equations: Equations, x: Floats) -> None:
 
 
 @kernel
-def observe(model: Model, ground: GroundModel, q: Floats, v: Floats, memory: Memory) -> None:
+def observe(
+    model: Model, ground: GroundModel, q: Floats, v: Floats, tree: Workspace, contacts: Contacts,
+    surface: Surface,
+) -> None:  # fmt: skip
     """Kinematics, velocities and contact points of a state."""
-    tree = memory.equations.tree
     forward_kinematics(model, q, tree)
     link_velocities(model, v, tree)
-    locate_contacts(model, ground, tree, memory.contacts, memory.surface)
+    locate_contacts(model, ground, tree, contacts, surface)

@@ -22,8 +22,7 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.memory import Assembly, Loops
-from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.record import Told
 from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event
 
 JOINT_RELEASE = int(EventKind.JOINT_RELEASE)
@@ -33,58 +32,59 @@ AT_THE_END = 1e-6
 
 
 @dissolved_kernel
-def react(model: Model, first: int, q: Floats, record: Record, loops: Loops) -> None:
+def react(model: Model, first: int, q: Floats, told: Told, held: Integers) -> None:
     """Let latches engage and let go by the events of a run, from the `first` on.
 
     A leg whose foot comes down while its knee is stopped may be told both at once: letting go is
     what comes last.
     """
-    if loops.held.shape[0] > 0 and record.events > first:
-        engage(model, first, q, record, loops)
-        let_go(model, first, record, loops)
+    if held.shape[0] > 0 and told.events > first:
+        engage(model, first, q, told, held)
+        let_go(model, first, told, held)
 
 
 @kernel
-def engage(model: Model, first: int, q: Floats, record: Record, loops: Loops) -> None:
+def engage(model: Model, first: int, q: Floats, told: Told, held: Integers) -> None:
     """Engage the latches of joints that have been stopped at their end."""
-    for event in range(first, record.events):
-        if record.event_kind[event] != JOINT_STOP:
+    for event in range(first, told.events):
+        if told.event_kind[event] != JOINT_STOP:
             continue
-        for latch in range(loops.held.shape[0]):
+        for latch in range(held.shape[0]):
             joint = model.latch_joint[latch]
             above = abs(model.upper[joint] - q[joint]) < abs(q[joint] - model.lower[joint])
-            if record.event_contact[event] == joint and above == (model.latch_side[latch] > 0):
-                loops.held[latch] = 1
+            if told.event_contact[event] == joint and above == (model.latch_side[latch] > 0):
+                held[latch] = 1
 
 
 @kernel
-def let_go(model: Model, first: int, record: Record, loops: Loops) -> None:
+def let_go(model: Model, first: int, told: Told, held: Integers) -> None:
     """Let go the latches whose link has touched down."""
-    for event in range(first, record.events):
-        if record.event_kind[event] != TOUCHDOWN:
+    for event in range(first, told.events):
+        if told.event_kind[event] != TOUCHDOWN:
             continue
-        link = model.contact_link[record.event_contact[event]]
-        for latch in range(loops.held.shape[0]):
-            if loops.held[latch] == 1 and model.latch_release[latch] == link:
-                loops.held[latch] = 0
-                time = record.event_time[event]
-                log_event(time, JOINT_RELEASE, model.latch_joint[latch], 0.0, 0.0, record)
+        link = model.contact_link[told.event_contact[event]]
+        for latch in range(held.shape[0]):
+            if held[latch] == 1 and model.latch_release[latch] == link:
+                held[latch] = 0
+                time = told.event_time[event]
+                log_event(time, JOINT_RELEASE, model.latch_joint[latch], 0.0, 0.0, told)
 
 
 @dissolved_kernel
-def hold(count: int, stop: Integers, held: Integers, assembly: Assembly) -> int:
+def hold(count: int, stop: Integers, held: Integers, candidate: Integers, sets: Integers) -> int:
     """Let the stops of engaged latches hold, where they are among the first `count` candidates.
 
-    `stop` tells the candidate that each latch is, `held` whether it is engaged. Returns an engaged
-    latch whose stop is not among them, or -1.
+    `stop` tells the candidate that each latch is, `held` whether it is engaged, `candidate` and
+    `sets` who they are and where their impulses lie. Returns an engaged latch whose stop is not
+    among them, or -1.
     """
     missing = -1
     for latch in range(held.shape[0]):
         if held[latch] == 1:
             found = False
             for place in range(count):
-                if assembly.candidate[place] == stop[latch]:
-                    assembly.problem.set[place] = LINE
+                if candidate[place] == stop[latch]:
+                    sets[place] = LINE
                     found = True
             if not found:
                 missing = latch

@@ -154,7 +154,7 @@ def free_loops(count: int, loops: Loops, rate: Floats, time: float, assembly: As
 @kernel
 def append_loop(row: int, count: int, components: int, loops: Loops, assembly: Assembly) -> None:
     """Write what a row of the loops brings to the contact problem, but for its free term."""
-    jacobian, problem = assembly.jacobian, assembly.problem
+    jacobian, problem = assembly.directions.jacobian, assembly.problem
     first = problem.first[count]
     problem.first[count + 1] = first + components
     for j in range(jacobian.shape[1]):
@@ -165,7 +165,7 @@ def append_loop(row: int, count: int, components: int, loops: Loops, assembly: A
             jacobian[first + 1, j] = 0.0
     problem.set[count] = LINE
     problem.friction[count] = 0.0
-    assembly.leaf[count] = EVERYWHERE
+    assembly.directions.leaf[count] = EVERYWHERE
     assembly.answer.mode[count] = STICK
     assembly.candidate[count] = loops.entry[row]
 
@@ -173,10 +173,7 @@ def append_loop(row: int, count: int, components: int, loops: Loops, assembly: A
 @kernel
 def speed_along(row: int, loops: Loops, v: Floats) -> float:
     """Velocity, or acceleration, of the coordinates along a row of the loops."""
-    total = 0.0
-    for j in range(v.shape[0]):
-        total += loops.rows.jacobian[row, j] * v[j]
-    return total
+    return row_product(loops.rows.jacobian, row, v)
 
 
 @dissolved_kernel
@@ -278,3 +275,13 @@ def steady_loops(model: Model, q: Floats, equations: Equations, loops: Loops, v:
     for row in range(rows):
         loops.system[row, rows] = -speed_along(row, loops, v)
     push_loops(loops, v)
+
+
+@dissolved_kernel
+def begin_closed(model: Model, q: Floats, equations: Equations, loops: Loops, v: Floats) -> bool:
+    """Begin with closed loops, at which nothing tears; return whether they can be closed."""
+    if rows_of(loops) > 0:
+        if not close_loops(model, equations, loops, q):
+            return False
+        steady_loops(model, q, equations, loops, v)
+    return True

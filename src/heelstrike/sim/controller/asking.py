@@ -9,44 +9,42 @@ import numpy as np
 from heelstrike.compiler.bundle_type import address_of
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.words import copy_words
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.controller.control import OVERRAN, TRUSTED, Control
 from heelstrike.sim.controller.guard import intact, intact_between
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.controller.robot import ControlState
 
 
 @dissolved_kernel
 def ask(
-    controller: Any, time: float, q: Floats, v: Floats, model: Model, memory: Memory,
-    control: Control, torque: Floats,
+    controller: Any, time: float, q: Floats, v: Floats, model: Model, tree: Workspace,
+    contacts: Contacts, control: Control, torque: Floats,
 ) -> None:  # fmt: skip
     """Ask a controller for its torques; they are no number if it wrote where it may not."""
     robot = control.robot
     robot.trial = 0
-    _show(q, v, model, memory, control)
     at = control.kept_at, control.log_at
-    call_law(controller, time, control.kept, at, control, torque)
+    _ask(controller, time, q, v, model, tree, contacts, control.kept, at, control, torque)
 
 
 @dissolved_kernel
 def consult(
-    controller: Any, time: float, q: Floats, v: Floats, model: Model, memory: Memory,
-    control: Control, torque: Floats,
+    controller: Any, time: float, q: Floats, v: Floats, model: Model, tree: Workspace,
+    contacts: Contacts, control: Control, torque: Floats,
 ) -> None:  # fmt: skip
     """Ask a controller for the torques it would want, were this its next call; it forgets that."""
     for i in range(control.kept.shape[0]):
         control.spare[i] = control.kept[i]
     robot = control.robot
     robot.trial = 1
-    _show(q, v, model, memory, control)
     at = control.spare_at, control.spare_log_at
-    call_law(controller, time, control.spare, at, control, torque)
+    _ask(controller, time, q, v, model, tree, contacts, control.spare, at, control, torque)
 
 
 @dissolved_kernel
-def _show(q: Floats, v: Floats, model: Model, memory: Memory, control: Control) -> None:
-    state = control.state
+def _show(q: Floats, v: Floats, model: Model, state: ControlState) -> None:
     for i in range(q.shape[0]):
         state.q[i] = q[i]
     for i in range(v.shape[0]):
@@ -55,10 +53,21 @@ def _show(q: Floats, v: Floats, model: Model, memory: Memory, control: Control) 
         joint = model.actuator_joint[i]
         state.joint_position[i] = q[joint]
         state.joint_velocity[i] = v[joint]
+
+
+@dissolved_kernel
+def _ask(
+    controller: Any, time: float, q: Floats, v: Floats, model: Model, tree: Workspace,
+    contacts: Contacts, kept: Integers, at: tuple[int, int], control: Control, torque: Floats,
+) -> None:  # fmt: skip
+    state = control.state
+    _show(q, v, model, state)
     if control.conduct != TRUSTED:
-        _show_copies(memory, control)
+        _show_kinematics(tree, state.kinematics)
+        show_contacts(contacts, control.contacts)
     if control.believes == 1:
         control.robot.update(state)
+    call_law(controller, time, kept, at, control, torque)
 
 
 @dissolved_kernel
@@ -85,9 +94,8 @@ def call_law(
 
 
 @kernel
-def _show_copies(memory: Memory, control: Control) -> None:
-    """Copy kinematics and contacts: what a controller does to them harms nobody."""
-    tree, own = memory.equations.tree, control.state.kinematics
+def _show_kinematics(tree: Workspace, own: Workspace) -> None:
+    """Copy kinematics: what a controller does to them harms nobody."""
     copy_words(tree.angle, own.angle)
     copy_words(tree.cosine, own.cosine)
     copy_words(tree.sine, own.sine)
@@ -97,7 +105,6 @@ def _show_copies(memory: Memory, control: Control) -> None:
     copy_words(tree.velocity, own.velocity)
     copy_words(tree.bias_acceleration, own.bias_acceleration)
     copy_words(tree.inertia, own.inertia)
-    show_contacts(memory.contacts, control.contacts)
 
 
 @kernel

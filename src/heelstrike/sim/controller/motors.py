@@ -27,8 +27,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.robot.model import Floats, Model
-from heelstrike.sim.controller.control import Control
-from heelstrike.sim.memory import Memory, Tally
+from heelstrike.sim.memory import Tally
 
 INFINITY = float("inf")
 
@@ -96,45 +95,45 @@ def is_obeyed(model: Model, actuator: int, voltage: int, command: float) -> bool
 
 
 @dissolved_kernel
-def limit_torque(model: Model, control: Control, memory: Memory) -> bool:
+def limit_torque(
+    model: Model, voltage: int, v: Floats, tally: Tally, commands: Floats, torques: Floats
+) -> bool:
     """Find the torques of an instant from its commands; return whether all of these were finite."""
-    voltage = control.voltage
     for i in range(model.actuator_joint.shape[0]):
-        wanted = memory.command[i]
+        wanted = commands[i]
         if is_obeyed(model, i, voltage, wanted):
-            memory.torque[i] = wanted
+            torques[i] = wanted
             continue
         if not abs(wanted) < INFINITY:
-            memory.tally.bad_torque = i
+            tally.bad_torque = i
             return False
         command = possible_command(model, i, voltage, wanted)
-        torque = motor_torque(model, i, voltage, command, memory.v)
-        if command != wanted or torque != free_torque(model, i, voltage, command, memory.v):
-            memory.tally.saturations += 1
-        memory.command[i] = command
-        memory.torque[i] = torque
+        torque = motor_torque(model, i, voltage, command, v)
+        if command != wanted or torque != free_torque(model, i, voltage, command, v):
+            tally.saturations += 1
+        commands[i] = command
+        torques[i] = torque
     return True
 
 
 @kernel
 def try_torque(
-    model: Model, control: Control, q: Floats, v: Floats, tally: Tally, command: Floats,
-    torque: Floats,
-) -> None:  # fmt: skip
+    model: Model, voltage: int, q: Floats, v: Floats, tally: Tally, command: Floats, torque: Floats
+) -> None:
     """Find the torques of commands within a step, at a state that may be no good.
 
     Keeps in mind which command was not finite when there was one last at a state that was.
     """
     bad = 0
     for i in range(torque.shape[0]):
-        if is_obeyed(model, i, control.voltage, command[i]):
+        if is_obeyed(model, i, voltage, command[i]):
             torque[i] = command[i]
         elif not abs(command[i]) < INFINITY:
             bad = i + 1
             torque[i] = command[i]
         else:
-            command[i] = possible_command(model, i, control.voltage, command[i])
-            torque[i] = motor_torque(model, i, control.voltage, command[i], v)
+            command[i] = possible_command(model, i, voltage, command[i])
+            torque[i] = motor_torque(model, i, voltage, command[i], v)
     for i in range(v.shape[0]):
         if not (abs(q[i]) < INFINITY and abs(v[i]) < INFINITY):
             return

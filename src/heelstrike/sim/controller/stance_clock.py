@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.bundle import Bundle, cell
 from heelstrike.compiler.compilation import kernel
+from heelstrike.robot.model import Integers
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
@@ -32,10 +33,13 @@ class StanceClock(Bundle):
 
 
 @kernel
-def touches(contacts: Contacts, robot: ControlledRobot, foot: int) -> bool:
-    """Whether a foot is pressed on ground that it could stand on."""
-    for i in range(robot.nc):
-        pressed = robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0
+def touches(contacts: Contacts, contact_foot: Integers, foot: int) -> bool:
+    """Whether a foot is pressed on ground that it could stand on.
+
+    `contact_foot` tells which foot each contact point belongs to.
+    """
+    for i in range(contact_foot.shape[0]):
+        pressed = contact_foot[i] == foot and contacts.force[i, 0] > 0.0
         if pressed and contacts.normal[i, 1] > STEEP:
             return True
     return False
@@ -43,7 +47,7 @@ def touches(contacts: Contacts, robot: ControlledRobot, foot: int) -> bool:
 
 @kernel
 def exchange_at_touchdown(
-    t: float, gone: float, earliest: float, contacts: Contacts, robot: ControlledRobot,
+    t: float, gone: float, earliest: float, contacts: Contacts, contact_foot: Integers,
     clock: StanceClock,
 ) -> bool:  # fmt: skip
     """Exchange stance and swing if the swing foot has met the ground; return whether.
@@ -51,7 +55,7 @@ def exchange_at_touchdown(
     Only once what has `gone` of the step is `earliest` at the least, in whatever unit.
     """
     swing = 1 - clock.stance
-    if gone < earliest or not touches(contacts, robot, swing):
+    if gone < earliest or not touches(contacts, contact_foot, swing):
         return False
     clock.stance = swing
     clock.start = t

@@ -28,7 +28,7 @@ from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.brakes import share_friction
-from heelstrike.sim.contacts.faces import NO_FACE
+from heelstrike.sim.contacts.faces import NO_FACE, Located
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -49,7 +49,7 @@ from heelstrike.sim.event_driven.impact import heading
 from heelstrike.sim.event_driven.phase import Bridge, HeldRows, Impact, Modes, Motion, Phase
 from heelstrike.sim.event_driven.rows import write_row
 from heelstrike.sim.event_driven.smooth.candidates import free_acceleration, solve_candidates
-from heelstrike.sim.event_driven.smooth.corners import IMPACT, report_impulses
+from heelstrike.sim.event_driven.smooth.corners import IMPACT, report_joints, report_points
 from heelstrike.sim.event_driven.smooth.dynamics import (
     copy_state,
     evaluate,
@@ -133,14 +133,18 @@ def gather_near(
 
 @kernel
 def find_faces(
-    model: Model, ground: GroundModel, tree: Workspace, closed: Integers, rows: Rows,
-    face: Integers, surface: Surface,
+    model: Model, ground: GroundModel, tree: Workspace, closed: Integers, seconds: int,
+    located: Located, face: Integers, surface: Surface,
 ) -> None:  # fmt: skip
-    """Put the open points on their nearest faces, for what else they could meet from there."""
+    """Put the open points on their nearest faces, for what else they could meet from there.
+
+    The second faces are the entries of the table from `seconds` on.
+    """
     for point in range(model.nc if ground.concave == 1 else 0):
         if closed[point] == 0:
             face[point] = NO_FACE
-            stand_on_face(point, model, ground, tree, closed, rows, face, surface)
+            second = seconds + point
+            stand_on_face(point, second, model, ground, tree, closed, located, face, surface)
 
 
 @kernel
@@ -229,7 +233,9 @@ def put_in_place(
 
     The `count` contacts among the `total` candidates come before the loops.
     """
-    face, tree, candidate = modes.face, equations.tree, assembly.candidate
+    face, tree, candidate, directions = (
+        modes.face, equations.tree, assembly.candidate, assembly.directions,
+    )  # fmt: skip
     impulse, velocity = assembly.answer.impulse, assembly.answer.velocity
     for row in range(2 * total):
         kept[row] = impulse[row]
@@ -257,7 +263,7 @@ def put_in_place(
             impulse[row] = 0.0
         for i in range(size):
             impulse[held.row[i]] = held.unknown[i]
-        add_impulse(model, assembly, total, equations, end[: model.nq])
+        add_impulse(model, 2 * total, impulse, directions, equations, end[: model.nq])
     for row in range(2 * total):
         impulse[row] = kept[row]
 
@@ -300,6 +306,7 @@ def solve_bridge(
     model, ground, modes = scene.model, scene.ground, phase.modes
     rows, loops, surface = memory.rows, memory.loops, memory.surface
     equations, assembly, end, added = memory.equations, memory.assembly, bridge.end, bridge.added
+    directions, impulse = assembly.directions, assembly.answer.impulse
     for attempt in range(2):
         status = solve_candidates(
             count, loops, False, surface.friction, memory.reaction.mode, rows, modes.slide,
@@ -309,7 +316,7 @@ def solve_bridge(
         if status != SOLVED or made_energy(total, assembly, added):
             return False
         copy_state(bridge.free_end, end)
-        add_impulse(model, assembly, total, equations, end[model.nq :])
+        add_impulse(model, 2 * total, impulse, directions, equations, end[model.nq :])
         move_on(model, length, begin, end)
         put_in_place(
             count, total, model, ground, begin, added, equations, rows, surface, assembly, loops,
@@ -335,6 +342,7 @@ def find_impulses(
     phase, step, impact, bridge = work.phase, work.step, work.impact, work.bridge
     model, ground, modes, rows = scene.model, scene.ground, phase.modes, memory.rows
     equations, assembly, loops = memory.equations, memory.assembly, memory.loops
+    directions = assembly.directions
     begin, end, free_end, after = step.begin, bridge.end, bridge.free_end, bridge.after
     mode, impulse, closed, face = memory.reaction.mode, impact.impulse, modes.closed, modes.face
     leave_faces(model, closed, face)
@@ -347,13 +355,14 @@ def find_impulses(
     )  # fmt: skip
     for i in range(model.nv):
         free_end[model.nq + i] = begin[model.nq + i] + length * equations.rate[i]
-    find_faces(model, ground, equations.tree, closed, rows, face, memory.surface)
+    seconds, located = rows.first[SECOND_FACE], Located(rows.gap, rows.position, rows.normal)
+    find_faces(model, ground, equations.tree, closed, seconds, located, face, memory.surface)
     for contact in range(modes.watched):
         mode[contact] = OPEN
         impulse[contact, 0], impulse[contact, 1] = 0.0, 0.0
     count = gather_near(
         length, bouncing, model, begin, free_end, equations.rate, memory.surface.restitution,
-        equations.tree, rows, modes, assembly.candidate, assembly.leaf, assembly.jacobian,
+        equations.tree, rows, modes, assembly.candidate, directions.leaf, directions.jacobian,
         assembly.problem, bridge.added,
     )  # fmt: skip
     total = append_loops(count, 2, loops, assembly)
@@ -363,7 +372,7 @@ def find_impulses(
     copy_state(free_end, end)
     move_on(model, length, begin, end)
     if total > 0:
-        assemble_delassus(model, total, equations, assembly)
+        assemble_delassus(model, total, equations, directions, assembly.problem)
         lend_faces(count, assembly.candidate, rows, modes, bridge.lent)
         solved = solve_bridge(count, total, length, scene, begin, memory, phase, bridge)
         return_faces(rows, modes, bridge.lent)
@@ -379,7 +388,8 @@ def find_impulses(
         finite = finite and np.isfinite(end[i])
     copy_state(begin, after)
     if total > 0:
-        add_impulse(model, assembly, total, equations, after[model.nq :])
+        moved = after[model.nq :]
+        add_impulse(model, 2 * total, assembly.answer.impulse, directions, equations, moved)
     return finite
 
 
@@ -439,7 +449,8 @@ def adopt_end(
                 slide[contact] = heading(v[owner])
             continue
         if kind == SECOND_FACE and rows.gap[owner] <= CLOSED_GAP:
-            stand_on_face(owner, model, ground, tree, closed, rows, face, surface)
+            located = Located(rows.gap, rows.position, rows.normal)
+            stand_on_face(owner, contact, model, ground, tree, closed, located, face, surface)
         normal, tangent = gap_velocity(contact, model, tree, rows, v)
         # What has come down by the end of the bridge meets the ground there.
         holds = mode[contact] != OPEN and normal >= -SETTLED
@@ -474,8 +485,12 @@ def cross_bridge(
             series.count += 1
     if not found:
         return False
-    log_event(time, BRIDGE, 0, series.length, wrong, record)
-    report_impulses(IMPACT, time, rows, impact, memory.reported, record)
+    log_event(time, BRIDGE, 0, series.length, wrong, record.told)
+    closed, slipping = memory.reported.closed, memory.reported.slipping
+    report_points(
+        IMPACT, time, rows.first[SECOND_FACE], rows.normal, impact, closed, slipping, record
+    )
+    report_joints(time, rows, impact.impulse, closed, record.told)
     for contact in range(modes.watched):
         if rows.kind[contact] != DRY_JOINT:
             modes.closed[contact] = 0

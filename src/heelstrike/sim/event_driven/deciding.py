@@ -15,11 +15,12 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import rows_of
+from heelstrike.sim.contacts.rows import SECOND_FACE
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.impact import collide
 from heelstrike.sim.event_driven.phase import Modes, Motion, Watch
 from heelstrike.sim.event_driven.rows import write_row
-from heelstrike.sim.event_driven.smooth.corners import report_impulses
+from heelstrike.sim.event_driven.smooth.corners import report_joints, report_points
 from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate
 from heelstrike.sim.event_driven.smooth.faces import begin_with_first, choose_faces, locate
 from heelstrike.sim.event_driven.smooth.modes import adopt_modes, form_groups, report_modes
@@ -96,6 +97,7 @@ def is_unclear(ahead: float, watch: Watch) -> bool:
 def jump(model: Model, nudge: float, memory: Memory, work: Motion, record: Record) -> bool:
     """Let velocities jump without a collision (Painlevé's paradox); return success."""
     modes, step, impact, plastic = work.phase.modes, work.step, work.impact, work.bounces.plastic
+    rows = memory.rows
     copy_state(step.begin, impact.before)
     for contact in range(modes.watched):
         impact.hit[contact] = 0
@@ -104,7 +106,12 @@ def jump(model: Model, nudge: float, memory: Memory, work: Motion, record: Recor
     for contact in range(modes.watched):
         plastic[contact] = 0
     if solved:
-        report_impulses(PAINLEVE, step.time, memory.rows, impact, memory.reported, record)
+        closed, slipping = memory.reported.closed, memory.reported.slipping
+        report_points(
+            PAINLEVE, step.time, rows.first[SECOND_FACE], rows.normal, impact, closed, slipping,
+            record,
+        )  # fmt: skip
+        report_joints(step.time, rows, impact.impulse, closed, record.told)
     else:
         copy_state(impact.before, step.begin)
     return bool(solved)
@@ -131,7 +138,7 @@ def leave_if_possible(
         if delassus[row, row] + lean * delassus[row, row + 1] <= 0.0:
             # Pressing it harder would push it into the ground: there are other solutions.
             several = True
-            log_event(time, PAINLEVE, owner[contact], 0.0, 0.0, record)
+            log_event(time, PAINLEVE, owner[contact], 0.0, 0.0, record.told)
     if several and apart:
         for place in range(count):
             if problem.set[place] not in (INTERVAL, LINE):
@@ -181,12 +188,12 @@ def begin_phase(
         step.left = strayed
         if not is_in_place(strayed, fastest):
             return False
-    first, reported = record.events, memory.reported
+    first, reported = record.told.events, memory.reported
     report_modes(
         step.time, decision.started == BEGUN, modes.watched, rows.kind, rows.owner, modes.closed,
         modes.slide, reported.closed, reported.slipping, record,
     )  # fmt: skip
-    react(model, first, q, record, loops)
+    react(model, first, q, record.told, loops.held)
     decision.forced = decision.jammed = 0
     evaluate(scene, step.time, begin, control, memory, phase, step.slopes[0])
     return not contradicts_itself(modes, phase.watch, phase.forces.deficient)

@@ -9,7 +9,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import momentum
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contacts.faces import locate_on_face, take_surface
+from heelstrike.sim.contacts.faces import Located, locate_on_face, take_surface
 from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.rows import DRY_JOINT, POINT, SECOND_FACE, Rows, second_of
 from heelstrike.sim.event_driven.deciding import BEGUN, ON_THE_GROUND, WALKING
@@ -62,9 +62,10 @@ def turns_over(
     if rows.kind[contact] != POINT or fired[corner] == 0:
         return False
     fired[corner] = 0
-    two_faces = ground.concave == 1 and closed[second_of(contact, rows)] == 1
+    second, located = second_of(contact, rows), Located(rows.gap, rows.position, rows.normal)
+    two_faces = ground.concave == 1 and closed[second] == 1
     if two_faces and leave_second_face(
-        contact, model, ground, tree, rows, closed, slide, stuck, face, fired, surface
+        contact, second, model, ground, tree, located, closed, slide, stuck, face, fired, surface
     ):
         return False
     if turn_corner(contact, model, ground, rows, stuck, face):
@@ -109,7 +110,10 @@ def find_what_happened(
             point = rows.owner[contact]
             if modes.closed[point] == 0 and hit[point] == 0:
                 continue  # it is met from the other face only
-            stand_on_face(point, model, ground, tree, modes.closed, rows, modes.face, surface)
+            located = Located(rows.gap, rows.position, rows.normal)
+            stand_on_face(
+                point, contact, model, ground, tree, modes.closed, located, modes.face, surface
+            )
             if rows.gap[contact] == np.inf:
                 continue
             if starting and not is_at_second(point, model, ground, rest, rows, modes.face):
@@ -174,7 +178,7 @@ def meet_event(
     phase, step, impact, decision = work.phase, work.step, work.impact, work.decision
     tree, direction, rows, hit = memory.equations.tree, impact.momentum, memory.rows, impact.hit
     momentum(model, tree, direction)
-    first, shown = record.events, memory.contacts.force
+    first, shown = record.told.events, memory.contacts.force
     strikes, forced = find_what_happened(
         starting, direction[0], model, ground, tree, step.time, step.begin[model.nq :],
         work.bounces.last_blow, rows, memory.surface, phase.modes, phase.watch.fired, hit,
@@ -189,7 +193,7 @@ def meet_event(
                 shown[point, 0], shown[point, 1] = joined(
                     point, second_of(point, rows), impact.impulse, rows.normal, impact.meets
                 )
-        react(model, first, step.begin[: model.nq], record, memory.loops)
+        react(model, first, step.begin[: model.nq], record.told, memory.loops.held)
     for point in range(model.nc):
         impact.meets[point] = 0
     decision.started = BEGUN if starting else WALKING

@@ -16,10 +16,15 @@ from heelstrike.sim.contacts.geometry import (
     row_product,
 )
 from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
-from heelstrike.sim.contacts.rows import DRY_JOINT, Rows, second_of
+from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, Rows, second_of
 from heelstrike.sim.event_driven.phase import Modes, Motion
 from heelstrike.sim.event_driven.smooth.candidates import free_acceleration
-from heelstrike.sim.event_driven.smooth.corners import IMPACT, log_impulse, report_impulses
+from heelstrike.sim.event_driven.smooth.corners import (
+    IMPACT,
+    log_impulse,
+    report_joints,
+    report_points,
+)
 from heelstrike.sim.event_driven.smooth.dynamics import copy_state, list_closed
 from heelstrike.sim.event_driven.smooth.faces import locate
 from heelstrike.sim.event_driven.smooth.gaps import (
@@ -101,8 +106,8 @@ def collide(model: Model, nudge: float, memory: Memory, work: Motion) -> tuple[b
     phase, impact, plastic, begin = work.phase, work.impact, work.bounces.plastic, work.step.begin
     modes, saddle, v, rows = phase.modes, phase.saddle, begin[model.nq :], memory.rows
     equations, assembly, loops = memory.equations, memory.assembly, memory.loops
-    candidate, jacobian = assembly.candidate, assembly.jacobian
-    free, impulse = assembly.problem.free, assembly.answer.impulse
+    candidate, problem, directions = assembly.candidate, assembly.problem, assembly.directions
+    jacobian, free, impulse = directions.jacobian, problem.free, assembly.answer.impulse
     for contact in range(modes.watched):
         impact.impulse[contact, 0] = 0.0
         impact.impulse[contact, 1] = 0.0
@@ -110,9 +115,8 @@ def collide(model: Model, nudge: float, memory: Memory, work: Motion) -> tuple[b
     if count + rows_of(loops) == 0:
         return True, 0.0, 0.0
     write_candidates(
-        count, candidate, model, equations.tree, rows, assembly.problem.first, assembly.leaf,
-        jacobian,
-    )  # fmt: skip
+        count, candidate, model, equations.tree, rows, problem.first, directions.leaf, jacobian
+    )
     for place in range(count):
         contact = candidate[place]
         normal = row_product(jacobian, 2 * place, v)
@@ -124,7 +128,7 @@ def collide(model: Model, nudge: float, memory: Memory, work: Motion) -> tuple[b
     total = append_loops(count, 2, loops, assembly)
     free_loops(total, loops, v, 0.0, assembly)
     clear_rounding(count, total, free)
-    assemble_delassus(model, total, equations, assembly)
+    assemble_delassus(model, total, equations, directions, problem)
     status = solve_contacts(count, False, model, memory, phase)
     note_residual(assembly.answer.residual, memory.tally)
     made = 0.0
@@ -133,12 +137,12 @@ def collide(model: Model, nudge: float, memory: Memory, work: Motion) -> tuple[b
         added = impulse[row] * row_product(jacobian, row, v)
         made += added
         through += abs(added)
-    note_loops(rows, total, 1.0, assembly.problem.first, impulse, loops)
+    note_loops(rows, total, 1.0, problem.first, impulse, loops)
     if saddle.used == 1:
         for j in range(model.nv):
             v[j] += saddle.unknown[j]
     else:
-        add_impulse(model, assembly, total, equations, v)
+        add_impulse(model, 2 * total, impulse, directions, equations, v)
     for place in range(count):
         contact = candidate[place]
         normal = row_product(jacobian, 2 * place, v)
@@ -172,7 +176,8 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
     modes, saddle, q, v = phase.modes, phase.saddle, state[: model.nq], state[model.nq :]
     was_closed, rows, loops = memory.reported.closed, memory.rows, memory.loops
     equations, assembly = memory.equations, memory.assembly
-    candidate, jacobian, free = assembly.candidate, assembly.jacobian, assembly.problem.free
+    candidate, problem, directions = assembly.candidate, assembly.problem, assembly.directions
+    jacobian, free, first = directions.jacobian, problem.free, problem.first
     tree, rate, face, bend = equations.tree, equations.rate, modes.face, modes.bend
     evaluate_equations(model, q, v, equations)
     locate(q, v, model, ground, tree, rows, modes, memory.surface)
@@ -181,21 +186,18 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
         saddle.force,
     )  # fmt: skip
     find_loops(model, q, v, tree, loops)
-    count = list_closed(rows, modes, candidate, assembly.problem.bound)
-    write_candidates(
-        count, candidate, model, tree, rows, assembly.problem.first, assembly.leaf,
-        jacobian,
-    )  # fmt: skip
+    count = list_closed(rows, modes, candidate, problem.bound)
+    write_candidates(count, candidate, model, tree, rows, first, directions.leaf, jacobian)
     for place in range(count):
         contact = candidate[place]
         free_gap_acceleration(contact, place, model, tree, rows, face, bend, rate, jacobian, free)
     total = append_loops(count, 2, loops, assembly)
     free_loops(total, loops, rate, 1.0, assembly)
     if total > 0:  # the forces of what is closed act on the rest
-        assemble_delassus(model, total, equations, assembly)
+        assemble_delassus(model, total, equations, directions, problem)
         solve_contacts(count, True, model, memory, phase)
         if saddle.used == 0:
-            add_impulse(model, assembly, total, equations, rate)
+            add_impulse(model, 2 * total, assembly.answer.impulse, directions, equations, rate)
         for i in range(model.nv if saddle.used == 1 else 0):
             rate[i] = saddle.unknown[i]
     found = False
@@ -203,8 +205,7 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
         touched = hit[contact] == 1 or was_closed[contact] == 1
         if modes.closed[contact] == 1 or not touched:
             continue
-        first = assembly.problem.first
-        gap_rows(contact, total, model, tree, rows, first, assembly.leaf, jacobian)
+        gap_rows(contact, total, model, tree, rows, first, directions.leaf, jacobian)
         free_gap_acceleration(contact, total, model, tree, rows, face, bend, rate, jacobian, free)
         normal, _ = gap_velocity(contact, model, tree, rows, v)
         pull = -free[2 * total]
@@ -260,7 +261,11 @@ def strike(model: Model, ground: GroundModel, memory: Memory, work: Motion, reco
         bounces.plastic[contact] = 0
         if hit[contact] == 1:
             bounces.last_impact[contact] = time
-    made_at = report_impulses(IMPACT, time, rows, impact, reported, record)
+    made_at = report_points(
+        IMPACT, time, rows.first[SECOND_FACE], rows.normal, impact, reported.closed,
+        reported.slipping, record,
+    )  # fmt: skip
+    report_joints(time, rows, impact.impulse, reported.closed, record.told)
     if made > NOTICEABLE_ENERGY * through:
         memory.tally.energy_gain += made
         second = second_of(made_at, rows)

@@ -27,7 +27,6 @@ from heelstrike.sim.clock import Clock
 from heelstrike.sim.contacts.brakes import awaits_hold
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import evaluate_equations
-from heelstrike.sim.contacts.loops import close_loops, rows_of, steady_loops
 from heelstrike.sim.contacts.rows import SECOND_FACE, contact_count
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.deciding import LOOKS, ON_THE_GROUND, decide_modes
@@ -39,7 +38,7 @@ from heelstrike.sim.event_driven.rubbing import begin_rubbing, brake, rubs_other
 from heelstrike.sim.event_driven.smooth.corners import show_forces
 from heelstrike.sim.event_driven.smooth.dynamics import evaluate
 from heelstrike.sim.event_driven.smooth.faces import locate
-from heelstrike.sim.frame import DIVERGED, DONE, Kernels, Scene
+from heelstrike.sim.frame import DONE, Kernels, Scene
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
@@ -215,16 +214,12 @@ class EventDriven(Method):
 @kernel
 def begin(model: Model, ground: GroundModel, memory: Memory, work: Motion, record: Record) -> int:
     """Find what the robot stands on when the simulation begins."""
-    step, modes, loops = work.step, work.phase.modes, memory.loops
+    step, modes = work.step, work.phase.modes
     q, v, rows, equations = memory.q, memory.v, memory.rows, memory.equations
     # Modes that are guessed here are those of another instant: where forces or accelerations are
     # not unique, what comes of correcting them need not be what the solvers would say.
     memory.solver.settings.corrections = 0
     memory.solver.settings.patient = 1
-    if rows_of(loops) > 0:
-        if not close_loops(model, equations, loops, q):
-            return DIVERGED
-        steady_loops(model, q, equations, loops, v)
     modes.watched = rows.end[SECOND_FACE] if ground.concave == 1 else rows.first[SECOND_FACE]
     for second in range(rows.first[SECOND_FACE], rows.end[SECOND_FACE]):
         rows.gap[second] = np.inf
@@ -261,7 +256,7 @@ def decide(
         change = abs(memory.torque[i] - step.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
         step.torque[i] = memory.torque[i]
-    if awaits_hold(memory.loops) or rubs_otherwise(memory.breakaway, rows, phase.modes):
+    if awaits_hold(memory.loops.braked) or rubs_otherwise(memory.breakaway, rows, phase.modes):
         brake(scene, control, memory, work, record)
     decision.at_event = decision.undecided
     if decision.bridging == 0:

@@ -22,7 +22,7 @@ from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate
 from heelstrike.sim.event_driven.steps import ALMOST, integrate, longest_turn, shortest_step
 from heelstrike.sim.frame import DONE, FORK, RECORD_FULL, SOLVER_FAILED, Scene
 from heelstrike.sim.memory import Memory
-from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.record import Record, Told
 from heelstrike.sim.record.recording import log_event
 
 ZENO = int(EventKind.ZENO)
@@ -60,15 +60,13 @@ def next_stop(watched: int, accumulation: Floats, next_push: float, clock: Clock
 
 
 @kernel
-def end_bounces(
-    rows: Rows, watched: int, time: float, accumulation: Floats, record: Record
-) -> None:
+def end_bounces(rows: Rows, watched: int, time: float, accumulation: Floats, told: Told) -> None:
     """Let the points rest whose accumulating impacts have come to an end by now."""
     for contact in range(watched):
         if accumulation[contact] <= time:
             if rows.kind[contact] in (POINT, SECOND_FACE):
                 point = rows.owner[contact]
-                log_event(accumulation[contact], ZENO, point, 0.0, 0.0, record)
+                log_event(accumulation[contact], ZENO, point, 0.0, 0.0, told)
             accumulation[contact] = np.inf
 
 
@@ -117,11 +115,11 @@ def move_over(
         period = output.period * output.every
         due = output.next_row * period
         end = min(stop, due if due > step.time + EVENT_TIME else due + period)
-    first = record.events
+    first = record.told.events
     if not cross_bridge(scene, end, control, memory, work, record):
         series.reason = NO_BRIDGE
         return SOLVER_FAILED
-    react(model, first, begin[: model.nq], record, memory.loops)
+    react(model, first, begin[: model.nq], record.told, memory.loops.held)
     step.time, _ = pass_time(step.time, series.length, end, decision.allowance)
     clock.time = series.last_end = time = step.time
     for contact in range(phase.modes.watched):
@@ -170,7 +168,7 @@ def move(
         if stop - step.time < shortest_step(step.time):
             # The same time but for rounding: 0.3 for one, 3 · 0.1 for the other.
             step.time = clock.time = stop
-            end_bounces(rows, watched, step.time, accumulation, record)
+            end_bounces(rows, watched, step.time, accumulation, record.told)
             return DONE
         turn = longest_turn(model, memory.equations.tree.motion, step.begin)
         step.next_length = min(step.next_length, turn)
@@ -195,7 +193,7 @@ def move(
     step.time, decision.allowance = pass_time(step.time, step.length, stop, decision.allowance)
     copy_state(step.end, step.begin)
     show_forces(step.end_force, rows, impact.meets, memory.contacts.force)
-    end_bounces(rows, watched, step.time, accumulation, record)
+    end_bounces(rows, watched, step.time, accumulation, record.told)
     step.finished = 0
     memory.tally.steps += 1
     count_event(step.length, step.longest, step.time, step.has_fired == 1, decision)

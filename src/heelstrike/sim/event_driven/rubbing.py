@@ -54,12 +54,12 @@ def brake(scene: Scene, control: Control, memory: Memory, work: Motion, record: 
     if work.output.last_row < time:
         write_row(scene, True, control, memory, work, record)
     begin_rubbing(v, memory.breakaway, memory.rows, phase.modes, memory.reported)
-    stops = take_hold(model, loops)
+    stops = take_hold(model, loops.braked)
     # Of joints at rest there is no impact to solve: its data would be rounding.
-    if stops and stops_any(model, v, REST, loops):
+    if stops and stops_any(model, v, REST, loops.braked):
         evaluate(scene, time, begin, control, memory, phase, step.slopes[0])
         for contact in range(impact.hit.shape[0]):
             impact.hit[contact] = 0
         if not strike(model, scene.ground, memory, work, record):
             work.decision.bridging = 1
-    note_brakes(model, time, 1.0, record, loops)
+    note_brakes(model, time, 1.0, loops.brake_force, record.told, loops.braked)

@@ -7,7 +7,8 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.robot.model import Floats, Model
-from heelstrike.sim.contacts.rows import Rows
+from heelstrike.sim.contacts.faces import Located
+from heelstrike.sim.contacts.rows import SECOND_FACE, Rows
 from heelstrike.sim.event_driven.dormand_prince import (
     NODES,
     SLOPES,
@@ -123,6 +124,7 @@ def end_at_event(length: float, taken: Integration) -> tuple[float, bool, bool]:
     model, ground, memory = taken.scene.model, taken.scene.ground, taken.memory
     modes, watch, step = taken.phase.modes, taken.phase.watch, taken.step
     value, rate, fired, tree = watch.value, watch.rate, watch.fired, memory.equations.tree
+    rows = memory.rows
     for attempt in range(4):
         if not take_step(length, taken) <= 1.0:
             return length, False, True
@@ -131,10 +133,11 @@ def end_at_event(length: float, taken: Integration) -> tuple[float, bool, bool]:
             memory.loops, taken.phase, step,
         ):  # fmt: skip
             return length, True, False
-        look(step.end, model, ground, tree, memory.rows, modes, memory.surface, watch)
+        look(step.end, model, ground, tree, rows, modes, memory.surface, watch)
         if has_corners(ground):
             rate_corners(
-                model, ground, tree, modes.watched, memory.rows, modes.closed, modes.face, fired,
+                model, ground, tree, modes.watched, rows.first[SECOND_FACE],
+                Located(rows.gap, rows.position, rows.normal), modes.closed, modes.face, fired,
                 rate,
             )  # fmt: skip
         change = 0.0

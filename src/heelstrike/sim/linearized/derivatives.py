@@ -357,8 +357,13 @@ class _TimeSteps:
                 held[_at_limits(simulation, asked)] = 0.0
             refuse_step(simulation)
             found = other_modes(simulation, modes or {}) if single else ()
-            differentiate_step(robot.model, simulation._work, simulation._memory, slopes)
-            close_positions(robot.model, simulation._work, simulation._memory, slopes)
+            memory, work = simulation._memory, simulation._work
+            differentiate_step(
+                robot.model, work.step, work.scheme, memory.stiffness, memory.next_v,
+                memory.equations.added, memory.contacts.normal, memory.rows, memory.surface,
+                memory.assembly, work.impact, memory.pushes, slopes,
+            )  # fmt: skip
+            close_positions(robot.model, work, memory, slopes)
             moved = slopes.state[:, :size] @ change[:size]
             moved += slopes.state[:, size : size + robot.nu] @ (added + held)
             by_number = slopes.state[:, size + robot.nu :]

@@ -42,15 +42,16 @@ from heelstrike.sim.contacts.rows import (
     LOOP,
     POINT,
     STOP,
+    Rows,
     lay_out_rows,
 )
-from heelstrike.sim.memory import Assembly, Memory
+from heelstrike.sim.memory import Assembly, Surface
 from heelstrike.sim.push import Pushes, add_push_slopes
+from heelstrike.sim.time_stepping.impact import Impact
 from heelstrike.sim.time_stepping.method import (
     LINEARLY_IMPLICIT,
     MOREAU_JEAN,
     PAPER_EXPLICIT,
-    Stepping,
     is_linearised,
 )
 
@@ -136,16 +137,28 @@ def allocate_slopes(
 
 
 @kernel
-def differentiate_step(model: Model, work: Stepping, memory: Memory, slopes: StepSlopes) -> None:
-    """Differentiate the step that `memory` has just taken from ``slopes.q``, ``slopes.v``.
+def differentiate_step(
+    model: Model, step: float, scheme: int, stiffness: Floats, next_v: Floats, added: Floats,
+    normal: Floats, table: Rows, surface: Surface, assembly: Assembly, impact: Impact,
+    pushes: Pushes, slopes: StepSlopes,
+) -> None:  # fmt: skip
+    """Differentiate the step that has just been taken from ``slopes.q``, ``slopes.v``.
 
     Its contact problem is still there; where an impact fell into it, both are.
+
+    Parameters
+    ----------
+    stiffness, next_v, added, normal, table, surface, assembly, pushes
+        As the simulation's memory has them; `added` is that of its equations, `normal` that of its
+        contacts.
+    impact : Impact
+        Of the method.
+    slopes : StepSlopes
+        Receives the derivative.
     """
-    assembly, impact, surface = memory.assembly, work.impact, memory.surface
-    added, normal = memory.equations.added, memory.contacts.normal
     pose_balance(slopes.q, slopes.v, added, normal, slopes.balance)
-    if memory.pushes.link.shape[0] > 0:
-        find_pushes(model, slopes.q, memory.pushes, slopes.tree, slopes.pushed_by_q)
+    if pushes.link.shape[0] > 0:
+        find_pushes(model, slopes.q, pushes, slopes.tree, slopes.pushed_by_q)
     bounces = False
     for place in range(assembly.begin[POINT], assembly.until[POINT]):
         bounces = bounces or surface.restitution[assembly.candidate[place]] > 0.0
@@ -154,21 +167,21 @@ def differentiate_step(model: Model, work: Stepping, memory: Memory, slopes: Ste
         for row in range(slopes.bounce_by_q.shape[0]):
             for j in range(model.nq):
                 slopes.bounce_by_q[row, j] = slopes.partials.along_by_q[row, j]
-    linearised = is_linearised(work.scheme)
+    linearised, pushed = is_linearised(scheme), pushes.link.shape[0] > 0
     if impact.happens == 1:
         differentiate_problem(
-            model, work, memory, impact.arriving, impact.arriving_impulse, impact.arriving_mode,
-            True, False, slopes, slopes.arriving,
+            model, step, scheme, stiffness, pushed, table, surface, assembly, impact.arriving,
+            impact.arriving_impulse, impact.arriving_mode, True, False, slopes, slopes.arriving,
         )  # fmt: skip
     answer = assembly.answer
     gaps = linearised and impact.happens == 0
     bounces = bounces and not gaps
     differentiate_problem(
-        model, work, memory, memory.next_v, answer.impulse, answer.mode, gaps, bounces, slopes,
-        slopes.after,
+        model, step, scheme, stiffness, pushed, table, surface, assembly, next_v, answer.impulse,
+        answer.mode, gaps, bounces, slopes, slopes.after,
     )  # fmt: skip
     moves = slopes.arriving if impact.happens == 1 else slopes.after
-    write_state(model.nq, work.scheme, work.step, moves, slopes.after, slopes.state)
+    write_state(model.nq, scheme, step, moves, slopes.after, slopes.state)
 
 
 @kernel
@@ -209,13 +222,16 @@ def evaluate(model: Model, going: Floats, slopes: StepSlopes) -> None:
 
 @kernel
 def differentiate_problem(
-    model: Model, work: Stepping, memory: Memory, after: Floats, impulse: Floats, mode: Integers,
+    model: Model, step: float, scheme: int, stiffness: Floats, pushed: bool, table: Rows,
+    surface: Surface, assembly: Assembly, after: Floats, impulse: Floats, mode: Integers,
     gaps: bool, bounces: bool, slopes: StepSlopes, result: Floats,
 ) -> None:  # fmt: skip
     """Write the derivative of a velocity that a contact problem of the step has found.
 
     Parameters
     ----------
+    pushed : bool
+        Whether there are pushes.
     after, impulse, mode : (nv,), (2 capacity,) and (capacity,) array
         The velocity, and the answer of the problem.
     gaps, bounces : bool
@@ -223,7 +239,7 @@ def differentiate_problem(
     result : (nv, columns) float
         Receives the derivative.
     """
-    assembly, balance, step = memory.assembly, slopes.balance, work.step
+    balance = slopes.balance
     for j in range(model.nv):
         balance.acceleration[j] = (after[j] - slopes.v[j]) / step
     for contact in range(model.nc):
@@ -241,22 +257,22 @@ def differentiate_problem(
     rows, partials = slopes.active, slopes.partials
     rate = 1.0 / step if gaps else 0.0
     bounce = slopes.bounce_by_q
-    surface, candidate = memory.surface, assembly.candidate
+    candidate = assembly.candidate
     active = write_points(
         model, assembly.until[POINT], candidate, impulse, mode, rate, bounces, bounce,
         surface.friction, surface.restitution, balance.rows, partials.along_by_q, rows,
     )  # fmt: skip
-    active = write_joints(active, mode, rate, assembly, memory.rows.owner, memory.rows.side, rows)
+    active = write_joints(active, mode, rate, assembly, table.owner, table.side, rows)
     active = write_loops(
         active, assembly.begin[LOOP], assembly.until[LOOP], candidate, model.brake_joint,
-        memory.rows.kind, memory.rows.owner, slopes.loops.jacobian, partials, rows,
+        table.kind, table.owner, slopes.loops.jacobian, partials, rows,
     )  # fmt: skip
     write_free(model, step, active, partials, rows)
-    if memory.pushes.link.shape[0] > 0:
+    if pushed:
         push_free(step, active, slopes.pushed_by_q, rows.response)
-    if work.scheme == LINEARLY_IMPLICIT:
-        stiffen(step, 1.0, active + model.nq, memory.stiffness, rows.response)
-    elif work.scheme == MOREAU_JEAN:
+    if scheme == LINEARLY_IMPLICIT:
+        stiffen(step, 1.0, active + model.nq, stiffness, rows.response)
+    elif scheme == MOREAU_JEAN:
         stiffen(step, 0.5, active + model.nq, model.stiffness, rows.response)
     if slopes.rubs == 1:
         rub(active, result.shape[1], balance.rows, rows)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from heelstrike.compiler.bundle import Bundle, array, cell
+from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.spatial.robot import SpatialRobot
@@ -13,22 +13,31 @@ from heelstrike.sim.dimension import dimension_of
 from heelstrike.sim.run import QUANTITIES, Quantity
 
 
-class RowsAndEvents(Bundle):
-    """What every record has: how much of it is used, times, logs and events.
+class Told(Bundle):
+    """The events of a run, as far as they are known."""
 
-    `rows` and `events` are the numbers of rows used. `log` holds the words of what the controller
-    logged, of the first `logged` rows.
-    """
-
-    rows: int = cell(int)
     events: int = cell(int)
-    logged: int = cell(int)
-    time: Floats = array("nt")
-    log: Integers = array("nt", "words", of=int)
+    """How many there are."""
     event_time: Floats = array("ne")
     event_kind: Integers = array("ne", of=int)
     event_contact: Integers = array("ne", of=int)
     event_impulse: Floats = array("ne", "components")
+    """event_time, event_kind, event_contact, event_impulse: When each was (s), what, of which
+    contact point, joint or constraint, and its impulse (N s)."""
+
+
+class RowsAndEvents(Bundle):
+    """What every record has: how much of it is used, times, logs and events.
+
+    `rows` is the number of rows used. `log` holds the words of what the controller
+    logged, of the first `logged` rows.
+    """
+
+    rows: int = cell(int)
+    told: Told = part(Told, flat=True)
+    logged: int = cell(int)
+    time: Floats = array("nt")
+    log: Integers = array("nt", "words", of=int)
 
     if TYPE_CHECKING:
 

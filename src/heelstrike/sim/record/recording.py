@@ -13,9 +13,10 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT
-from heelstrike.sim.memory import Memory, Tally
-from heelstrike.sim.record.record import Record, RowsAndEvents
+from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, Rows
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.memory import Reaction, Reported, Tally
+from heelstrike.sim.record.record import RowsAndEvents, Told
 from heelstrike.sim.run import QUANTITIES, Quantity
 from heelstrike.tolerances import STANDING_SPEED
 
@@ -40,14 +41,13 @@ millimetre is left of the one, and no step is as short as the other asks for."""
 
 
 @dissolved_kernel
-def note_extremes(model: Model, memory: Memory) -> None:
-    """Keep the worst penetration and residuals of the run."""
-    tally = memory.tally
+def note_extremes(gap: Floats, residual: Floats, tally: Tally) -> None:
+    """Keep the worst penetration of the contact points and the worst residuals of the run."""
     deepest = tally.penetration
-    for contact in range(model.contact_link.shape[0]):
-        deepest = max(deepest, -memory.contacts.gap[contact])
+    for contact in range(gap.shape[0]):
+        deepest = max(deepest, -gap[contact])
     tally.penetration = deepest
-    note_residual(memory.assembly.answer.residual, tally)
+    note_residual(residual, tally)
 
 
 @kernel
@@ -60,123 +60,133 @@ def note_residual(residual: Floats, tally: Tally) -> None:
 
 @kernel
 def log_event(
-    time: float, kind: int, place: int, normal: float, tangent: float, record: Record
+    time: float, kind: int, place: int, normal: float, tangent: float, told: Told
 ) -> None:
     """Append an event of a contact point or joint, with its impulse."""
-    event = record.events
-    record.event_time[event] = time
-    record.event_kind[event] = kind
-    record.event_contact[event] = place
-    record.event_impulse[event, 0] = normal
-    record.event_impulse[event, 1] = tangent
-    record.events = event + 1
+    event = told.events
+    told.event_time[event] = time
+    told.event_kind[event] = kind
+    told.event_contact[event] = place
+    told.event_impulse[event, 0] = normal
+    told.event_impulse[event, 1] = tangent
+    told.events = event + 1
 
 
 @kernel
 def note_event(
-    time: float, kind: int, contact: int, step: float, force: Floats, record: Record
+    time: float, kind: int, contact: int, step: float, force: Floats, told: Told
 ) -> None:
     """Append an event of a contact point; its impulse is that of the step it happened in."""
-    log_event(time, kind, contact, force[contact, 0] * step, force[contact, 1] * step, record)
+    log_event(time, kind, contact, force[contact, 0] * step, force[contact, 1] * step, told)
 
 
 @dissolved_kernel
 def note_events(
-    model: Model, time: float, end: float, step: float, memory: Memory, record: Record
-) -> None:
+    model: Model, time: float, end: float, step: float, steps: int, q: Floats, v: Floats,
+    next_v: Floats, breakaway: Floats, tree: Workspace, contacts: Contacts, reaction: Reaction,
+    constraint_force: Floats, rows: Rows, told: Told, reported: Reported,
+) -> None:  # fmt: skip
     """Find touchdowns, lift-offs and changes between stick and slip of this step.
 
     It ends at `end`, which is the `time` of the next step to the last bit: what a step ends with
     comes before what the next begins with. An impulse closes a contact by the end of the step; a
     gap opens it at the start of a step. Points that already stand on the ground when the run begins
-    do not touch down, and joints that rest at a stop do not reach it. Joints with dry friction come
-    to rest, or begin to move.
+    do not touch down, and joints that rest at a stop do not reach it: `steps` is how many came
+    before. Joints with dry friction come to rest, or begin to move.
     """
     for contact in range(model.contact_link.shape[0]):
-        note_events_of_contact(model, time, end, step, contact, memory, record)
+        note_events_of_contact(
+            model, time, end, step, steps, contact, tree, contacts, reaction.slip, told, reported
+        )
     for joint in range(model.parent.shape[0]):
-        if memory.reaction.stop_torque[joint] != 0.0 or memory.reported.stopped[joint] != 0:
-            note_stop(model, end, step, joint, memory, record)
-    rows = memory.rows
-    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
-        note_constraint(time, end, step, entry, memory, record)
-    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
-        joint = rows.owner[dry]
-        if memory.breakaway[joint] == 0.0:
-            continue
-        rests = abs(memory.next_v[joint]) <= SLIP_SPEED
-        if memory.reported.resting[dry] == -1:
-            memory.reported.resting[dry] = 1 if abs(memory.v[joint]) <= SLIP_SPEED else 0
-        if rests != (memory.reported.resting[dry] == 1):
-            log_event(end, JOINT_STICK if rests else JOINT_SLIP, joint, 0.0, 0.0, record)
-            memory.reported.resting[dry] = 1 if rests else 0
+        torque = reaction.stop_torque[joint]
+        if torque != 0.0 or reported.stopped[joint] != 0:
+            note_stop(model, end, step, steps, joint, torque, q, v, told, reported.stopped)
+    note_constraints(time, end, step, steps, constraint_force, rows, told, reported.closed)
+    note_dry_joints(end, v, next_v, breakaway, rows, told, reported.resting)
 
 
 @dissolved_kernel
 def note_events_of_contact(
-    model: Model, time: float, end: float, step: float, contact: int, memory: Memory,
-    record: Record,
+    model: Model, time: float, end: float, step: float, steps: int, contact: int, tree: Workspace,
+    contacts: Contacts, slip: Floats, told: Told, reported: Reported,
 ) -> None:  # fmt: skip
     """Find what happened to a contact point in this step."""
-    force, gap = memory.contacts.force, memory.contacts.gap[contact]
-    closed, slipping = memory.reported.closed, memory.reported.slipping
+    force, gap = contacts.force, contacts.gap[contact]
+    closed, slipping = reported.closed, reported.slipping
     pushed = force[contact, 0] > 0.0
     if closed[contact] == 0 and pushed:
         closed[contact] = 1
         slipping[contact] = 0
-        stood = memory.tally.steps == 0 and gap <= LIFTOFF_GAP
+        stood = steps == 0 and gap <= LIFTOFF_GAP
         if stood:
-            normal, _ = contact_velocity(model, memory.equations.tree, memory.contacts, contact)
+            normal, _ = contact_velocity(model, tree, contacts, contact)
             stood = normal >= -STANDING_SPEED
         if not stood:
-            note_event(end, TOUCHDOWN, contact, step, force, record)
+            note_event(end, TOUCHDOWN, contact, step, force, told)
     elif closed[contact] == 1 and not pushed and gap > LIFTOFF_GAP:
         closed[contact] = 0
         slipping[contact] = 0
-        note_event(time, LIFTOFF, contact, step, force, record)
+        note_event(time, LIFTOFF, contact, step, force, told)
     if closed[contact] == 1 and pushed:
-        slips = abs(memory.reaction.slip[contact]) > SLIP_SPEED
+        slips = abs(slip[contact]) > SLIP_SPEED
         if slips != (slipping[contact] == 1):
             slipping[contact] = 1 if slips else 0
-            note_event(end, SLIP if slips else STICK, contact, step, force, record)
+            note_event(end, SLIP if slips else STICK, contact, step, force, told)
 
 
-@kernel
-def note_constraint(
-    time: float, end: float, step: float, entry: int, memory: Memory, record: Record
-) -> None:
-    """Find whether a constraint from outside took hold in this step, or let go."""
-    rows, closed = memory.rows, memory.reported.closed
-    if rows.set[entry] == INTERVAL:
-        return
-    number, gap = rows.owner[entry], rows.gap[entry]
-    force = memory.loops.constraint_force[number]
-    if closed[entry] == 0 and force[0] > 0.0:
-        closed[entry] = 1
-        if memory.tally.steps > 0 or gap > LIFTOFF_GAP:
-            log_event(end, CONSTRAINT_HOLDS, number, step * force[0], step * force[1], record)
-    elif closed[entry] == 1 and force[0] == 0.0 and gap > LIFTOFF_GAP:
-        closed[entry] = 0
-        log_event(time, CONSTRAINT_LETS_GO, number, 0.0, 0.0, record)
-
-
-@kernel
+@dissolved_kernel
 def note_stop(
-    model: Model, end: float, step: float, joint: int, memory: Memory, record: Record
-) -> None:
+    model: Model, end: float, step: float, steps: int, joint: int, torque: float, q: Floats,
+    v: Floats, told: Told, stopped: Integers,
+) -> None:  # fmt: skip
     """Find whether a joint reached a stop in this step, or left it."""
-    pushed = memory.reaction.stop_torque[joint] != 0.0
-    way = min(memory.q[joint] - model.lower[joint], model.upper[joint] - memory.q[joint])
-    stood = (
-        memory.tally.steps == 0 and way <= LIFTOFF_GAP and abs(memory.v[joint]) <= STANDING_SPEED
-    )
-    if pushed and memory.reported.stopped[joint] == 0 and not stood:
-        impulse = abs(memory.reaction.stop_torque[joint]) * step
-        log_event(end, JOINT_STOP, joint, impulse, 0.0, record)
-    if pushed:
-        memory.reported.stopped[joint] = 1
+    way = min(q[joint] - model.lower[joint], model.upper[joint] - q[joint])
+    stood = steps == 0 and way <= LIFTOFF_GAP and abs(v[joint]) <= STANDING_SPEED
+    if torque != 0.0 and stopped[joint] == 0 and not stood:
+        log_event(end, JOINT_STOP, joint, abs(torque) * step, 0.0, told)
+    if torque != 0.0:
+        stopped[joint] = 1
     elif way > LIFTOFF_GAP:
-        memory.reported.stopped[joint] = 0
+        stopped[joint] = 0
+
+
+@dissolved_kernel
+def note_constraints(
+    time: float, end: float, step: float, steps: int, forces: Floats, rows: Rows, told: Told,
+    closed: Integers,
+) -> None:  # fmt: skip
+    """Find which constraints from outside took hold in this step, or let go."""
+    for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
+        number, gap = rows.owner[entry], rows.gap[entry]
+        force = forces[number]
+        if rows.set[entry] == INTERVAL:
+            continue
+        if closed[entry] == 0 and force[0] > 0.0:
+            closed[entry] = 1
+            if steps > 0 or gap > LIFTOFF_GAP:
+                log_event(end, CONSTRAINT_HOLDS, number, step * force[0], step * force[1], told)
+        elif closed[entry] == 1 and force[0] == 0.0 and gap > LIFTOFF_GAP:
+            closed[entry] = 0
+            log_event(time, CONSTRAINT_LETS_GO, number, 0.0, 0.0, told)
+
+
+@dissolved_kernel
+def note_dry_joints(
+    end: float, v: Floats, next_v: Floats, breakaway: Floats, rows: Rows, told: Told,
+    resting: Integers,
+) -> None:  # fmt: skip
+    """Find which joints with dry friction came to rest in this step, or began to move."""
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
+        joint = rows.owner[dry]
+        if breakaway[joint] == 0.0:
+            continue
+        rests = abs(next_v[joint]) <= SLIP_SPEED
+        if resting[dry] == -1:
+            resting[dry] = 1 if abs(v[joint]) <= SLIP_SPEED else 0
+        if rests != (resting[dry] == 1):
+            log_event(end, JOINT_STICK if rests else JOINT_SLIP, joint, 0.0, 0.0, told)
+            resting[dry] = 1 if rests else 0
 
 
 def row_writer(
@@ -215,19 +225,21 @@ def note_log(kept: Integers, logged: Integers, record: RowsAndEvents) -> None:
     record.logged = record.rows
 
 
-@dissolved_kernel
-def is_row_due(clock: Clock) -> bool:
-    """Whether a row is due: every so many steps and at the end."""
-    return bool(clock.index % clock.record_every == 0 or clock.finishing == 1)
+def when_due(note_row: Callable[[float, Any, Any], None]) -> Callable[[Any, Clock, Any], int]:
+    """Make the kernel that appends a row, by `note_row`, if one is due."""
+
+    @kernel
+    def note_row_when_due(memory: Any, clock: Clock, record: Any) -> int:
+        """Append a row if one is due, every so many steps and at the end; return which, or -1."""
+        if clock.index % clock.record_every != 0 and clock.finishing == 0:
+            return -1
+        note_row(clock.time, memory, record)
+        return int(record.rows - 1)
+
+    return note_row_when_due
 
 
-@kernel
-def note_row_when_due(memory: Memory, clock: Clock, record: Record) -> int:
-    """Append a row if one is due, every so many steps and at the end; return which, or -1."""
-    if not is_row_due(clock):
-        return -1
-    note_row(clock.time, memory, record)
-    return int(record.rows - 1)
+note_row_when_due = when_due(note_row)
 
 
 @dissolved_kernel
@@ -245,9 +257,9 @@ def center_height(model: Model, ground: GroundModel, tree: Workspace) -> float:
 
 
 @dissolved_kernel
-def sound(memory: Memory) -> bool:
+def sound(q: Floats, v: Floats) -> bool:
     """Whether the state is finite and not absurd."""
     good = 0
-    for i in range(memory.v.shape[0]):
-        good += (abs(memory.q[i]) < FARTHEST) & (abs(memory.v[i]) < FASTEST)
-    return good == memory.v.shape[0]
+    for i in range(v.shape[0]):
+        good += (abs(q[i]) < FARTHEST) & (abs(v[i]) < FASTEST)
+    return good == v.shape[0]

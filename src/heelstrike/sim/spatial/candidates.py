@@ -30,15 +30,10 @@ from heelstrike.dynamics.spatial.rows import (
     write_point_rows,
     write_velocity_row,
 )
-from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
-from heelstrike.robot.model import Floats
+from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import SpatialModel
-from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.spatial.memory import (
-    SpatialAssembly,
-    SpatialEquations,
-    SpatialFeet,
-)
+from heelstrike.sim.spatial.memory import SpatialAssembly, SpatialFeet
 from heelstrike.sim.spatial.table import BALL_STOP, DRY_JOINT, POINT, STOP, WALL, BlockTable
 
 CLOSING = 5.0
@@ -121,17 +116,17 @@ def keep_foot(entry: int, point: Vector, gap: float, normal: Vector, feet: Spati
 @kernel
 def locate_points(
     model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, table: BlockTable,
-    contacts: Contacts, feet: SpatialFeet,
+    position: Floats, normals: Floats, gaps: Floats, feet: SpatialFeet,
 ) -> None:  # fmt: skip
     """Find where the contact points are, and the ground that is nearest to each."""
     for contact in range(model.nc):
         face, wall = faces_of(model, ground, tree, contact)
         point, gap, normal = meet_face(model, ground, tree, contact, face)
         for k in range(3):
-            contacts.position[contact, k] = point[k]
-            contacts.normal[contact, k] = normal[k]
+            position[contact, k] = point[k]
+            normals[contact, k] = normal[k]
         keep_foot(contact, point, gap, normal, feet)
-        contacts.gap[contact] = gap
+        gaps[contact] = gap
         table.gap[contact] = gap
         table.friction[contact] = model.friction_scale[contact] * ground.friction[face]
         bounces = model.restitution_scale[contact] * ground.restitution[face]
@@ -299,24 +294,24 @@ def write_rows_of(
 @kernel
 def assemble(
     model: SpatialModel, step: float, table: BlockTable, feet: SpatialFeet, q: Floats, v: Floats,
-    next_v: Floats, equations: SpatialEquations, assembly: SpatialAssembly,
+    next_v: Floats, tree: SpatialWorkspace, factor: TreeFactor, count: int, candidate: Integers,
+    first_row: Integers, chain_end: Integers, rows: Floats, free: Floats,
+    delassus: Floats, before: Floats,
 ) -> None:  # fmt: skip
     """Write the contact problem of the candidates, gaps linearised over the step.
 
-    v is the velocity as the step begins, next_v the free one at its end.
+    v is the velocity as the step begins, next_v the free one at its end; `chain_end` is the last
+    velocity of the chain of each candidate. Receives the normal velocities `before`.
     """
-    problem, rows = assembly.problem, assembly.rows
-    for place in range(assembly.count):
-        entry = assembly.candidate[place]
-        first, last = problem.first[place], assembly.last[place]
-        size = problem.first[place + 1] - first
-        write_rows_of(model, equations.tree, entry, first, table, feet, q, rows)
-        along_rows(model, last, first, 1, rows, v, problem.free)
-        assembly.before[place] = problem.free[first]
-        along_rows(model, last, first, size, rows, next_v, problem.free)
+    for place in range(count):
+        entry = candidate[place]
+        first, last = first_row[place], chain_end[place]
+        size = first_row[place + 1] - first
+        write_rows_of(model, tree, entry, first, table, feet, q, rows)
+        along_rows(model, last, first, 1, rows, v, free)
+        before[place] = free[first]
+        along_rows(model, last, first, size, rows, next_v, free)
         if table.kind[entry] != DRY_JOINT:
-            problem.free[first] += table.gap[entry] / step
-        whiten_rows(model, equations.factor, last, first, size, rows)
-    write_delassus(
-        model, assembly.count, problem.first, assembly.last, rows, problem.delassus
-    )  # fmt: skip
+            free[first] += table.gap[entry] / step
+        whiten_rows(model, factor, last, first, size, rows)
+    write_delassus(model, count, first_row, chain_end, rows, delassus)

@@ -28,7 +28,7 @@ from heelstrike.sim.controller.control import TRUSTED, Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import ControllerFunction, machine_code_of
 from heelstrike.sim.controller.robot import NO_ENDING
-from heelstrike.sim.spatial.memory import SpatialMemory
+from heelstrike.sim.memory import CommonTally
 
 
 class SpatialControlState(Bundle):
@@ -143,7 +143,7 @@ class SpatialControl(Control):
 @dissolved_kernel
 def ask_in_space(
     controller: Any, time: float, q: Floats, v: Floats, model: SpatialModel,
-    memory: SpatialMemory, control: SpatialControl, torque: Floats,
+    tree: SpatialWorkspace, contacts: Contacts, control: SpatialControl, torque: Floats,
 ) -> None:  # fmt: skip
     """Ask a controller for its torques; they are no number if it wrote where it may not."""
     state = control.state
@@ -153,8 +153,8 @@ def ask_in_space(
         state.v[k] = v[k]
     show_driven(model, control.robot.position_of, q, v, state)
     if control.conduct != TRUSTED:
-        show_kinematics(memory.equations.tree, state.kinematics)
-        show_contacts(memory.contacts, control.contacts)
+        show_kinematics(tree, state.kinematics)
+        show_contacts(contacts, control.contacts)
     if control.believes == 1:
         control.robot.update(state)
     at = control.kept_at, control.log_at
@@ -176,28 +176,30 @@ def show_kinematics(tree: SpatialWorkspace, own: SpatialWorkspace) -> None:
 @dissolved_kernel
 def limit_torque_in_space(
     model: SpatialModel,
-    control: SpatialControl,  # noqa: ARG001 - in space there are no voltages
-    memory: SpatialMemory,
+    voltage: int,  # noqa: ARG001 - in space there are none
+    v: Floats,
+    tally: CommonTally,
+    commands: Floats,
+    torques: Floats,
 ) -> bool:
     """Find the torques of an instant from its commands; return whether all of these are finite.
 
     Torques keep to the limits of their actuators, and to the line from stall torque to no-load
     speed where a motor has one.
     """
-    command, v = memory.command, memory.v
     for i in range(model.nu):
-        wanted = command[i]
+        wanted = commands[i]
         if not abs(wanted) < math.inf:
-            memory.tally.bad_torque = i
+            tally.bad_torque = i
             return False
-        command[i] = min(max(wanted, model.torque_lower[i]), model.torque_upper[i])
+        commands[i] = min(max(wanted, model.torque_lower[i]), model.torque_upper[i])
         k = model.actuator_velocity[i]
-        stall, applied = model.stall_torque[k], command[i]
+        stall, applied = model.stall_torque[k], commands[i]
         if stall < math.inf:
             drag = stall / model.no_load_speed[k] * v[k]
             applied = min(max(applied, -stall - drag), stall - drag)
-        memory.tally.saturations += applied != wanted
-        memory.torque[i] = applied
+        tally.saturations += applied != wanted
+        torques[i] = applied
     return True
 
 

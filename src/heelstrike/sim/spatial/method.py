@@ -11,12 +11,13 @@ from heelstrike.contact.spatial.ground import SpatialGroundModel
 from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind, Scheme
 from heelstrike.sim.frame import DONE, SOLVER_FAILED, Common, Kernels, Scene
 from heelstrike.sim.method import Method
-from heelstrike.sim.record.recording import FARTHEST, FASTEST, is_row_due
+from heelstrike.sim.record.recording import FARTHEST, FASTEST
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.spatial.controlled import (
     SpatialControl,
@@ -29,7 +30,7 @@ from heelstrike.sim.spatial.record import (
     SpatialRecord,
     log_spatial_event,
     note_deepest,
-    note_row,
+    note_row_when_due,
     note_spatial_events,
 )
 from heelstrike.sim.spatial.stepping import find_state, take_step
@@ -141,13 +142,13 @@ def way_in_space(method: Method | None) -> InSpace:
 
 
 @dissolved_kernel
-def sound_in_space(memory: SpatialMemory) -> bool:
+def sound_in_space(q: Floats, v: Floats) -> bool:
     """Whether the state is finite and not absurd."""
     bad = 0
-    for i in range(memory.q.shape[0]):
-        bad += not abs(memory.q[i]) < FARTHEST
-    for i in range(memory.v.shape[0]):
-        bad += not abs(memory.v[i]) < FASTEST
+    for i in range(q.shape[0]):
+        bad += not abs(q[i]) < FARTHEST
+    for i in range(v.shape[0]):
+        bad += not abs(v[i]) < FASTEST
     return bad == 0
 
 
@@ -165,12 +166,6 @@ def height_of_mass(
         z += inertia[i, 3]
     along = normal[0] * (pivot[0] + x / mass) + normal[1] * (pivot[1] + y / mass)
     return along + normal[2] * (pivot[2] + z / mass) - ground.height
-
-
-@dissolved_kernel
-def begin(model: Any, ground: Any, memory: Any, work: Any, record: Any) -> int:
-    """Nothing has to be done before the first instant."""
-    return DONE
 
 
 @dissolved_kernel
@@ -213,16 +208,6 @@ def decide(
 
 
 @dissolved_kernel
-def report(
-    scene: Scene, control: SpatialControl, memory: SpatialMemory, work: SpatialStepping,
-    record: SpatialRecord, clock: Clock,
-) -> None:  # fmt: skip
-    """Append a row if one is due."""
-    if is_row_due(clock):
-        note_row(clock.time, memory, record)
-
-
-@dissolved_kernel
 def move(
     scene: Scene, control: SpatialControl, memory: SpatialMemory, work: SpatialStepping,
     record: SpatialRecord, clock: Clock,
@@ -232,12 +217,12 @@ def move(
     end = clock.start + (clock.index + 1) * work.step
     note_spatial_events(
         clock.time, end, work.step, tally.steps == 0, step.v, memory.reaction.slip,
-        memory.blocks, memory.reported, record,
+        memory.blocks, record.told, memory.reported,
     )  # fmt: skip
     if step.uncertified == 1:
-        log_spatial_event(end, UNCERTIFIED, -1, NO_IMPULSE, record)
+        log_spatial_event(end, UNCERTIFIED, -1, NO_IMPULSE, record.told)
     if step.energy_gain > 0.0:
-        log_spatial_event(end, ENERGY_GAIN, -1, NO_IMPULSE, record)
+        log_spatial_event(end, ENERGY_GAIN, -1, NO_IMPULSE, record.told)
     for i in range(memory.q.shape[0]):
         memory.q[i] = step.q[i]
     for k in range(memory.v.shape[0]):
@@ -253,7 +238,8 @@ def move(
 
 COMMON = Common(
     (SpatialModel, SpatialGroundModel, SpatialControl, SpatialMemory, SpatialRecord),
-    sound_in_space, ask_in_space, limit_torque_in_space, height_of_mass, try_ways,
+    sound_in_space, ask_in_space, limit_torque_in_space, height_of_mass,
+    note_row_when_due, try_ways,
 )  # fmt: skip
 
-InSpace.kernels = Kernels(begin, prepare, decide, report, move, COMMON)
+InSpace.kernels = Kernels(None, prepare, decide, None, move, COMMON)

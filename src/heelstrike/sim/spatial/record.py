@@ -5,7 +5,7 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.record.record import RowsAndEvents, rows_of_quantities
+from heelstrike.sim.record.record import RowsAndEvents, Told, rows_of_quantities
 from heelstrike.sim.record.recording import (
     JOINT_SLIP,
     JOINT_STICK,
@@ -17,6 +17,7 @@ from heelstrike.sim.record.recording import (
     STICK,
     TOUCHDOWN,
     row_writer,
+    when_due,
 )
 from heelstrike.sim.spatial.memory import SpatialReported, SpatialTally
 from heelstrike.sim.spatial.run import RECORDED
@@ -35,22 +36,22 @@ class SpatialRecord(RowsAndEvents):
     vars().update(rows_of_quantities(RECORDED))
 
 
-note_row = row_writer(RECORDED, __name__)
+note_row_when_due = when_due(row_writer(RECORDED, __name__))
 
 
 @kernel
 def log_spatial_event(
     time: float, kind: int, contact: int, impulse: tuple[float, float, float],
-    record: RowsAndEvents,
+    told: Told,
 ) -> None:  # fmt: skip
     """Append an event."""
-    event = record.events
-    record.event_time[event] = time
-    record.event_kind[event] = kind
-    record.event_contact[event] = contact
+    event = told.events
+    told.event_time[event] = time
+    told.event_kind[event] = kind
+    told.event_contact[event] = contact
     for k in range(3):
-        record.event_impulse[event, k] = impulse[k]
-    record.events = event + 1
+        told.event_impulse[event, k] = impulse[k]
+    told.events = event + 1
 
 
 @kernel
@@ -63,7 +64,7 @@ def note_deepest(faces: int, gap: Floats, tally: SpatialTally) -> None:
 @kernel
 def note_spatial_events(
     time: float, end: float, step: float, first_step: bool, v: Floats, slip: Floats,
-    table: BlockTable, reported: SpatialReported, record: RowsAndEvents,
+    table: BlockTable, told: Told, reported: SpatialReported,
 ) -> None:  # fmt: skip
     """Find what happened in a step that ends at `end`, to every entry of the table.
 
@@ -81,7 +82,7 @@ def note_spatial_events(
             moves = int(abs(v[owner]) > SLIP_SPEED)
             if not first_step and moves != slipping[entry]:
                 log_spatial_event(
-                    end, JOINT_SLIP if moves == 1 else JOINT_STICK, owner, impulse, record
+                    end, JOINT_SLIP if moves == 1 else JOINT_STICK, owner, impulse, told
                 )  # fmt: skip
             slipping[entry] = moves
             continue
@@ -91,15 +92,15 @@ def note_spatial_events(
             slipping[entry] = 0
             if not (first_step and table.gap[entry] <= LIFTOFF_GAP):
                 arrives = TOUCHDOWN if kind == POINT else JOINT_STOP
-                log_spatial_event(end, arrives, owner, impulse, record)
+                log_spatial_event(end, arrives, owner, impulse, told)
         elif closed[entry] == 1 and not pushed and table.gap[entry] > LIFTOFF_GAP:
             closed[entry] = 0
             slipping[entry] = 0
             if kind == POINT:
-                log_spatial_event(time, LIFTOFF, owner, impulse, record)
+                log_spatial_event(time, LIFTOFF, owner, impulse, told)
         if kind == POINT and closed[entry] == 1 and pushed:
             s, t = slip[owner, 0], slip[owner, 1]
             slides = int(s * s + t * t > SLIP_SPEED * SLIP_SPEED)
             if slides != slipping[entry]:
                 slipping[entry] = slides
-                log_spatial_event(end, SLIP if slides == 1 else STICK, owner, impulse, record)
+                log_spatial_event(end, SLIP if slides == 1 else STICK, owner, impulse, told)

@@ -88,7 +88,8 @@ def find_state(
 ) -> None:  # fmt: skip
     """Equations of motion and contact points of the state now."""
     state_equations(model, q, v, equations.tree, equations.factor, equations.bias)
-    locate_points(model, ground, equations.tree, table, contacts, feet)
+    position, normal, gap = contacts.position, contacts.normal, contacts.gap
+    locate_points(model, ground, equations.tree, table, position, normal, gap, feet)
     locate_ends(model, q, table)
 
 
@@ -261,8 +262,11 @@ def solve_step_of(
         for k in range(model.nv):
             impact.arriving[k] = next_v[k]
         if assembly.count > 0:
+            problem = assembly.problem
             assemble(
-                model, step, table, memory.feet, memory.q, v, next_v, equations, assembly
+                model, step, table, memory.feet, memory.q, v, next_v, equations.tree,
+                equations.factor, assembly.count, assembly.candidate, problem.first,
+                assembly.last, assembly.rows, problem.free, problem.delassus, assembly.before,
             )  # fmt: skip
             status = solve_positions(
                 step, number, table, memory.solver, assembly, memory.wedge

@@ -21,7 +21,6 @@ from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
-from heelstrike.sim.contacts.rows import SECOND_FACE, Rows
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import Surface
 
@@ -35,13 +34,13 @@ class Corner(Bundle):
 
 @kernel
 def locate_corners(
-    model: Model, ground: GroundModel, tree: Workspace, rows: Rows, contacts: Contacts,
+    model: Model, ground: GroundModel, tree: Workspace, first: int, contacts: Contacts,
     surface: Surface, corner: Corner,
 ) -> None:  # fmt: skip
-    """Find the second faces of the contact points."""
+    """Find the second faces of the contact points, the entries of the table from `first` on."""
     corner.near = 0
-    for second in range(rows.first[SECOND_FACE], rows.end[SECOND_FACE]):
-        i = rows.owner[second]
+    for i in range(model.nc):
+        second = first + i
         point, normal, radius = contacts.position[i], contacts.normal[i], model.contact_radius[i]
         point_position(tree, model.contact_link[i], model.contact_position[i], point)
         contacts.gap[i], friction, restitution = second_contact(

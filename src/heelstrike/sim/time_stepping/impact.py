@@ -79,6 +79,15 @@ ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
 HALVINGS = 10
 
 
+class Calls(Bundle):
+    """What takes part in a step although it seemed too far away."""
+
+    count: int = cell(int)
+    """How many there are."""
+    called: Integers = array("entries", of=int)
+    """Whether each entry of the table of rows is one."""
+
+
 class Impact(Bundle):
     """What a step has to know of the contacts that close in it."""
 
@@ -86,9 +95,8 @@ class Impact(Bundle):
     """Whether an impact falls into this step."""
     touching: Integers = array("entries", of=int)
     """The last step at whose end each entry of the table of rows touched."""
-    called: Integers = array("entries", of=int)
-    """What takes part although it seemed too far away; `calls` tells whether there is any."""
-    calls: int = cell(int)
+    calls: Calls = part(Calls)
+    """What is called to take part."""
     relaxed: int = cell(int)
     wedged: int = cell(int)
     since: int = cell(int)
@@ -134,18 +142,18 @@ def allocate_impact(robot: Robot, *, bounded: bool = False) -> Impact:
 
 
 @kernel
-def dismiss(impact: Impact) -> None:
+def dismiss(calls: Calls) -> None:
     """Let nothing be called any more."""
-    impact.calls = 0
-    for place in range(impact.called.shape[0]):
-        impact.called[place] = 0
+    calls.count = 0
+    for place in range(calls.called.shape[0]):
+        calls.called[place] = 0
 
 
 @dissolved_kernel
-def call(entry: int, impact: Impact) -> None:
-    """Call a contact point or stop to take part."""
-    impact.calls += 1 - impact.called[entry]
-    impact.called[entry] = 1
+def call(entry: int, calls: Calls) -> None:
+    """Call a contact point, a stop or a constraint to take part."""
+    calls.count += 1 - calls.called[entry]
+    calls.called[entry] = 1
 
 
 @kernel

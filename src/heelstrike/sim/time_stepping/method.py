@@ -28,7 +28,7 @@ the work K (q + Δq/2) Δq. The linearly implicit scheme has θ = 1.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -40,7 +40,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import INTERVAL, ImpulseSet
-from heelstrike.contact.workspace import ContactProblem
+from heelstrike.contact.workspace import ContactProblem, ContactWorkspace
 from heelstrike.dynamics.kernels import integrate, passive_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
@@ -51,6 +51,7 @@ from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
 from heelstrike.sim.contacts.brakes import find_loops_of_step, note_brakes, share_friction
 from heelstrike.sim.contacts.candidates import (
+    Listing,
     are_there,
     find_constraints,
     hold_latched,
@@ -59,7 +60,8 @@ from heelstrike.sim.contacts.candidates import (
     locate_stops,
     note_answer,
     note_group,
-    write_rows,
+    write_contact_rows,
+    write_joint_rows,
 )
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
@@ -79,8 +81,6 @@ from heelstrike.sim.contacts.loops import (
     close_loops,
     free_loops,
     rows_of,
-    speed_along,
-    steady_loops,
 )
 from heelstrike.sim.contacts.points import point_velocities
 from heelstrike.sim.contacts.rows import (
@@ -98,16 +98,22 @@ from heelstrike.sim.contacts.writers import Writers, rate_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.frame import DIVERGED, DONE, SOLVER_FAILED, Kernels, Scene
-from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
+from heelstrike.sim.memory import (
+    Assembly,
+    Directions,
+    Equations,
+    Memory,
+    Surface,
+    UsualPoints,
+)
 from heelstrike.sim.method import Method, solver_order
-from heelstrike.sim.push import add_pushes, share_over_step
+from heelstrike.sim.push import Pushes, add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import (
     log_event,
     note_event,
     note_events,
     note_extremes,
-    note_row_when_due,
 )
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.corners import join_forces, locate_corners
@@ -116,6 +122,7 @@ from heelstrike.sim.time_stepping.impact import (
     ENERGY_GAIN,
     NEVER,
     WEDGED,
+    Calls,
     Impact,
     allocate_impact,
     call,
@@ -157,6 +164,29 @@ CLOSING_RATE = 20.0
 SUNK = 1e-2
 # The same of joints beyond their stops (rad, m): 20 rad/s for a millisecond.
 PAST = 2e-2
+
+
+class Rule(NamedTuple):
+    """By what a step decides who takes part in it.
+
+    Attributes
+    ----------
+    step : float
+        Length of the step (s).
+    scheme : int
+    activation : float
+        Gap up to which something takes part, for schemes that decide by it (m, rad).
+    calls : int
+        How many there are that are called, and take part although they seemed too far away.
+    relaxed : int
+        Whether nothing bounces.
+    """
+
+    step: float
+    scheme: int
+    activation: float
+    calls: int
+    relaxed: int
 
 
 class Stepping(Bundle):
@@ -314,17 +344,6 @@ def is_linearised(scheme: int) -> bool:
     return scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT, IMPACT_RESOLVED)
 
 
-@dissolved_kernel
-def begin(model: Model, ground: GroundModel, memory: Memory, work: Stepping, record: Record) -> int:
-    """Begin with closed loops."""
-    if rows_of(memory.loops) > 0:
-        equations, loops, q = memory.equations, memory.loops, memory.q
-        if not close_loops(model, equations, loops, q):
-            return DIVERGED
-        steady_loops(model, q, equations, loops, memory.v)
-    return DONE
-
-
 @kernel
 def add_springs(
     model: Model, ahead: float, stiffness: Floats, damping: Floats, added: Floats
@@ -345,35 +364,37 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
     evaluate_equations(model, memory.q, memory.v, equations)
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
     if memory.loops.unknown.shape[0] > 0:
-        find_loops_of_step(model, memory)
+        find_loops_of_step(model, memory.q, memory.v, equations.tree, memory.loops)
     if memory.rows.outside.kernel.shape[0] > 0:
         find_constraints(model, memory.q, memory.v, equations.tree, memory.rows)
     if ground.concave == 1:
         locate_corners(
-            model, ground, equations.tree, memory.rows, memory.seconds, memory.surface,
-            work.impact.corner,
+            model, ground, equations.tree, memory.rows.first[SECOND_FACE], memory.seconds,
+            memory.surface, work.impact.corner,
         )  # fmt: skip
 
 
 @dissolved_kernel
-def free_velocity(model: Model, work: Stepping, time: float, memory: Memory) -> None:
-    """Velocity at the end of the step if there were no ground, into ``memory.next_v``.
+def free_velocity(
+    model: Model, step: float, scheme: int, time: float, q: Floats, v: Floats, torque: Floats,
+    stiffness: Floats, pushes: Pushes, equations: Equations, next_v: Floats,
+) -> None:  # fmt: skip
+    """Velocity at the end of the step if there were no ground.
 
     Springs and dampers that a scheme takes later in the step are added to the mass matrix, as if
-    they were armature.
+    they were armature; `stiffness` is that of the joints and of the controller.
     """
-    step, equations, v, next_v = work.step, memory.equations, memory.v, memory.next_v
     force, rate = equations.force, equations.rate
-    passive_force(model, memory.q, v, force)
+    passive_force(model, q, v, force)
     for i in range(model.nu):
-        force[model.actuator_joint[i]] += memory.torque[i]
-    if work.scheme in (LINEARLY_IMPLICIT, MOREAU_JEAN):
-        halved = work.scheme == MOREAU_JEAN
+        force[model.actuator_joint[i]] += torque[i]
+    if scheme in (LINEARLY_IMPLICIT, MOREAU_JEAN):
+        halved = scheme == MOREAU_JEAN
         ahead = 0.5 * step if halved else step
-        stiffness = model.stiffness if halved else memory.stiffness
+        springs = model.stiffness if halved else stiffness
         added = 0.0
         for i in range(model.nv):
-            force[i] -= ahead * stiffness[i] * v[i]
+            force[i] -= ahead * springs[i] * v[i]
             added += equations.added[i]
         if (added > 0.0 or not halved) and equations.programs[SOLVE] != 0:
             weigh(model, equations)  # the program has not heard of it
@@ -382,10 +403,10 @@ def free_velocity(model: Model, work: Stepping, time: float, memory: Memory) -> 
     solve_mass_matrix(model, equations, rate)
     for i in range(model.nv):
         next_v[i] = v[i] + rate[i]
-    if share_over_step(time, step, memory.pushes):
+    if share_over_step(time, step, pushes):
         for i in range(model.nv):
             rate[i] = 0.0
-        add_pushes(model, equations.tree, memory.pushes, rate)
+        add_pushes(model, equations.tree, pushes, rate)
         solve_mass_matrix(model, equations, rate)
         for i in range(model.nv):
             next_v[i] += step * rate[i]
@@ -414,18 +435,20 @@ def are_usual(candidate: Integers, near: int, program: int, usual: UsualPoints) 
 
 
 @dissolved_kernel
-def select_candidates(model: Model, curved: bool, work: Stepping, memory: Memory) -> int:
+def select_candidates(
+    model: Model, curved: bool, rule: Rule, contacts: Contacts, surface: Surface, next_v: Floats,
+    called: Integers, tree: Workspace, usual: UsualPoints, bounce: Floats, listing: Listing,
+) -> int:  # fmt: skip
     """List the contact points that could act in this step, with their free terms.
 
     On curved ground a gap is linearised along the chord of the step, as loops are: with half of
     what turning normals add to its rate.
     """
-    contacts, assembly, step = memory.contacts, memory.assembly, work.step
-    candidate, problem = assembly.candidate, assembly.problem
-    linearised, calls = is_linearised(work.scheme), work.impact.calls
+    step, candidate, problem = rule.step, listing.candidate, listing.problem
+    linearised = is_linearised(rule.scheme)
     farthest = FAR_STEPS * CLOSING_SPEED * step
-    if work.scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
-        farthest = work.activation
+    if rule.scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
+        farthest = rule.activation
     near = 0
     for contact in range(model.nc):
         if contacts.gap[contact] <= farthest:
@@ -433,31 +456,30 @@ def select_candidates(model: Model, curved: bool, work: Stepping, memory: Memory
             near += 1
     if near == 0:
         return 0
-    straight = are_usual(candidate, near, VELOCITIES, memory.usual)
-    tree = memory.equations.tree
-    find_velocities(model, contacts, memory.next_v, straight, tree, memory.usual)
-    velocity = memory.usual.point_velocity
+    straight = are_usual(candidate, near, VELOCITIES, usual)
+    find_velocities(model, contacts, next_v, straight, tree, usual)
+    velocity = usual.point_velocity
     count = 0
     for place in range(near):
         contact = candidate[place]
         gap = contacts.gap[contact]
         normal = velocity[contact, 0]
         if curved and linearised:
-            bend = memory.surface.bend[contact]
+            bend = surface.bend[contact]
             normal += 0.5 * step * bend_acceleration(model, tree, contacts, contact, bend)
         if linearised:
             far = gap > step * max(CLOSING_SPEED, -2.0 * normal)
-            if far and (calls == 0 or work.impact.called[contact] == 0):
+            if far and (rule.calls == 0 or called[contact] == 0):
                 continue
             normal += gap / step
-        elif work.scheme == MOREAU_JEAN:
+        elif rule.scheme == MOREAU_JEAN:
             before, _ = contact_velocity(model, tree, contacts, contact)
-            if gap + 0.5 * step * before > work.activation:
+            if gap + 0.5 * step * before > rule.activation:
                 continue
-            if work.impact.relaxed == 0:
-                work.impact.bounce[count] = memory.surface.restitution[contact] * before
-                normal += work.impact.bounce[count]
-        row = list_candidate(contact, count, 2, memory)
+            if rule.relaxed == 0:
+                bounce[count] = surface.restitution[contact] * before
+                normal += bounce[count]
+        row = list_candidate(contact, count, 2, listing)
         problem.free[row] = normal
         problem.free[row + 1] = velocity[contact, 1]
         count += 1
@@ -475,131 +497,134 @@ def stops_are_near(model: Model, step: float, q: Floats, v: Floats) -> bool:
 
 
 @dissolved_kernel
-def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> int:
+def select_stops(
+    model: Model, rule: Rule, count: int, q: Floats, v: Floats, next_v: Floats, called: Integers,
+    rows: Rows, listing: Listing,
+) -> int:  # fmt: skip
     """Append the joint stops that could act in this step: contacts without friction."""
-    problem, step, rows = memory.assembly.problem, work.step, memory.rows
-    linearised, calls = is_linearised(work.scheme), work.impact.calls
-    if linearised and calls == 0 and not stops_are_near(model, step, memory.q, memory.next_v):
+    step, linearised = rule.step, is_linearised(rule.scheme)
+    if linearised and rule.calls == 0 and not stops_are_near(model, step, q, next_v):
         return count
-    locate_stops(memory.q, rows)
+    locate_stops(q, rows)
     for stop in range(rows.first[STOP], rows.end[STOP]):
         joint, side, gap = rows.owner[stop], rows.side[stop], rows.gap[stop]
-        normal = side * memory.next_v[joint]
+        normal = side * next_v[joint]
         if linearised:
             far = not gap < step * max(CLOSING_RATE, -2.0 * normal)
-            if far and (calls == 0 or work.impact.called[stop] == 0):
+            if far and (rule.calls == 0 or called[stop] == 0):
                 continue
             normal += gap / step
-        elif work.scheme == MOREAU_JEAN:
-            if not gap + 0.5 * step * side * memory.v[joint] <= work.activation:
+        elif rule.scheme == MOREAU_JEAN:
+            if not gap + 0.5 * step * side * v[joint] <= rule.activation:
                 continue
-        elif not gap <= work.activation:
+        elif not gap <= rule.activation:
             continue
-        problem.free[list_candidate(stop, count, 1, memory)] = normal
+        listing.problem.free[list_candidate(stop, count, 1, listing)] = normal
         count += 1
     return count
 
 
 @kernel
-def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> int:
-    """Append the second faces of corners that could act in this step."""
-    assembly, rows, step = memory.assembly, memory.rows, work.step
-    problem, tree = assembly.problem, memory.equations.tree
-    for second in range(rows.first[SECOND_FACE], rows.end[SECOND_FACE]):
-        gap = rows.gap[second]
+def select_corners(
+    model: Model, rule: Rule, count: int, first: int, v: Floats, next_v: Floats, tree: Workspace,
+    seconds: Contacts, gaps: Floats, restitution: Floats, directions: Directions, bounce: Floats,
+    listing: Listing,
+) -> int:  # fmt: skip
+    """Append the second faces of corners that could act in this step.
+
+    They are the entries of the table from `first` on.
+    """
+    step, problem, jacobian = rule.step, listing.problem, directions.jacobian
+    for point in range(model.nc):
+        second = first + point
+        gap = gaps[second]
         if gap > FAR_STEPS * CLOSING_SPEED * step:
             continue
-        contact_rows(model, tree, memory.seconds, rows.owner[second], count, assembly)
+        contact_rows(model, tree, seconds, point, count, problem.first, directions)
         row = problem.first[count]
-        normal = row_product(assembly.jacobian, row, memory.next_v)
-        if is_linearised(work.scheme):
+        normal = row_product(jacobian, row, next_v)
+        if is_linearised(rule.scheme):
             if gap > step * max(CLOSING_SPEED, -2.0 * normal):
                 continue
             normal += gap / step
-        elif work.scheme == MOREAU_JEAN:
-            before = row_product(assembly.jacobian, row, memory.v)
-            if gap + 0.5 * step * before > work.activation:
+        elif rule.scheme == MOREAU_JEAN:
+            before = row_product(jacobian, row, v)
+            if gap + 0.5 * step * before > rule.activation:
                 continue
-            if work.impact.relaxed == 0:
-                work.impact.bounce[count] = memory.surface.restitution[second] * before
-                normal += work.impact.bounce[count]
-        elif gap > work.activation:
+            if rule.relaxed == 0:
+                bounce[count] = restitution[second] * before
+                normal += bounce[count]
+        elif gap > rule.activation:
             continue
-        row = list_candidate(second, count, 2, memory)
+        row = list_candidate(second, count, 2, listing)
         problem.free[row] = normal
-        problem.free[row + 1] = row_product(assembly.jacobian, row + 1, memory.next_v)
+        problem.free[row + 1] = row_product(jacobian, row + 1, next_v)
         count += 1
     return count
 
 
 @kernel
-def select_constraints(count: int, work: Stepping, memory: Memory) -> int:
+def select_constraints(
+    count: int, rule: Rule, v: Floats, next_v: Floats, restitution: Floats, called: Integers,
+    rows: Rows, bounce: Floats, listing: Listing,
+) -> int:  # fmt: skip
     """Append the constraints from outside that could act in this step, and may let go.
 
     As with loops, half of what turning rows add to a rate is in the free term: to second order that
     is the chord of the step.
     """
-    rows, problem, step = memory.rows, memory.assembly.problem, work.step
-    outside, calls = rows.outside, work.impact.calls
+    problem, step, outside = listing.problem, rule.step, rows.outside
     for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
         own = rows.owner[entry]
-        normal = rate_of(own, 0, memory.next_v, outside)
+        normal = rate_of(own, 0, next_v, outside)
         if rows.set[entry] == INTERVAL:
-            row = list_candidate(entry, count, 2, memory)
+            row = list_candidate(entry, count, 2, listing)
             problem.free[row + 1] = normal
             problem.bound[count] = step * rows.limit[entry]
             count += 1
             continue
         gap = outside.gap[own, 0]
-        if is_linearised(work.scheme):
+        if is_linearised(rule.scheme):
             normal += 0.5 * step * outside.bias[own, 0]
             far = gap > step * max(CLOSING_SPEED, -2.0 * normal)
-            if far and (calls == 0 or work.impact.called[entry] == 0):
+            if far and (rule.calls == 0 or called[entry] == 0):
                 continue
             normal += gap / step
-        elif work.scheme == MOREAU_JEAN:
-            before = rate_of(own, 0, memory.v, outside)
-            if gap + 0.5 * step * before > work.activation:
+        elif rule.scheme == MOREAU_JEAN:
+            before = rate_of(own, 0, v, outside)
+            if gap + 0.5 * step * before > rule.activation:
                 continue
-            if work.impact.relaxed == 0:
-                work.impact.bounce[count] = memory.surface.restitution[entry] * before
-                normal += work.impact.bounce[count]
-        elif gap > work.activation:
+            if rule.relaxed == 0:
+                bounce[count] = restitution[entry] * before
+                normal += bounce[count]
+        elif gap > rule.activation:
             continue
-        row = list_candidate(entry, count, rows.components[entry], memory)
+        row = list_candidate(entry, count, rows.components[entry], listing)
         problem.free[row] = normal
         if rows.components[entry] == 2:
-            problem.free[row + 1] = rate_of(own, 1, memory.next_v, outside)
+            problem.free[row + 1] = rate_of(own, 1, next_v, outside)
         count += 1
     return count
 
 
-@kernel
-def joint_row(rows: Rows, assembly: Assembly, place: int) -> tuple[int, int, float]:
-    """Row of a candidate that is a stop or a dry joint, its joint, and the sign of the two."""
-    entry = assembly.candidate[place]
-    row = assembly.problem.first[place + 1] - 1
-    return row, rows.owner[entry], rows.side[entry]
+@dissolved_kernel
+def last_row(place: int, first: Integers) -> int:
+    """Last row of a candidate: of a stop the only one, of a dry joint the one that rubs."""
+    return int(first[place + 1] - 1)
 
 
 @dissolved_kernel
-def gather_delassus(
-    model: Model, contacts: Contacts, rows: Rows, near: int, count: int, equations: Equations,
-    usual: UsualPoints, assembly: Assembly,
+def gather_points(
+    model: Model, contacts: Contacts, tree: Workspace, factor: Floats, near: int,
+    candidate: Integers, usual: UsualPoints, delassus: Floats,
 ) -> None:  # fmt: skip
-    """Delassus matrix of all usual points; that of the candidates too, if these are others."""
-    candidate, usual_place = assembly.candidate, usual.usual_place
+    """Delassus matrix of all usual points; that of the points among the candidates, too."""
+    usual_place, whole = usual.usual_place, usual.usual_problem.delassus
     if near > 0:
         play(
             usual.programs[DELASSUS],
-            (
-                model, usual.usual_points, equations.tree, contacts, equations.factor,
-                usual.point_rows, usual.usual_problem.delassus,
-            ),
-        )  # fmt: skip
-    if near == count == usual.usual_points.shape[0]:
-        return
-    whole, delassus = usual.usual_problem.delassus, assembly.problem.delassus
+            (model, usual.usual_points, tree, contacts, factor, usual.point_rows, whole),
+        )
     if near == usual.usual_points.shape[0]:  # they are listed in the same order
         for row in range(2 * near):
             for column in range(2 * near):
@@ -612,112 +637,80 @@ def gather_delassus(
                 for i in range(2):
                     for j in range(2):
                         delassus[2 * place + i, 2 * other + j] = whole[row + i, column + j]
-    for place in range(near, assembly.until[DRY_JOINT]):
-        add_joint(model, contacts, rows, near, place, equations, usual, assembly)
 
 
 @dissolved_kernel
-def add_joint(
-    model: Model, contacts: Contacts, rows: Rows, near: int, place: int, equations: Equations,
-    usual: UsualPoints, assembly: Assembly,
+def couple(
+    near: int, joints: int, place: int, candidate: Integers, first: Integers, owner: Integers,
+    side: Floats, loop_jacobian: Floats, point_velocity: Floats, change: Floats, delassus: Floats,
 ) -> None:  # fmt: skip
-    """Add the stop or dry joint at a place to the Delassus matrix of the candidates before.
+    """Write the entries of the Delassus matrix of a stop, a dry joint or a loop at a place.
 
-    What a unit impulse along its row does to the joint velocities, A⁻¹ e, goes to that row of
-    ``assembly.jacobian``. The other row of a dry joint is the solvers'.
+    A unit impulse along its row changes the velocities of the coordinates by `change`, those of the
+    points by `point_velocity`. Of the candidates the points come first, `near` of them, and the
+    loops last, after `joints`. The other row of a dry joint is the solvers'.
     """
-    candidate, delassus = assembly.candidate, assembly.problem.delassus
-    row, joint, sign = joint_row(rows, assembly, place)
-    change = assembly.jacobian[row]
-    for j in range(model.nv):
-        change[j] = 0.0
-    change[joint] = sign
-    solve_mass_matrix(model, equations, change)
-    if near > 0:
-        find_velocities(model, contacts, change, True, equations.tree, usual)
+    row = last_row(place, first)
     for other in range(near):
         for i in range(2):
-            entry = usual.point_velocity[candidate[other], i]
+            entry = point_velocity[candidate[other], i]
             delassus[row, 2 * other + i] = entry
             delassus[2 * other + i, row] = entry
     for other in range(near, place + 1):
-        column, its_joint, its_sign = joint_row(rows, assembly, other)
-        entry = its_sign * change[its_joint]
-        delassus[row, column] = entry
-        delassus[column, row] = entry
-
-
-@kernel
-def add_loop(model: Model, near: int, joints: int, place: int, memory: Memory) -> None:
-    """Add the row of a loop at a place to the Delassus matrix, after all points and joints.
-
-    As with joints, A⁻¹ Jᵀ goes to that row of ``assembly.jacobian``.
-    """
-    assembly, usual, first = memory.assembly, memory.usual, memory.assembly.problem.first
-    candidate, delassus = assembly.candidate, assembly.problem.delassus
-    row = first[place]
-    change = assembly.jacobian[row]
-    solve_mass_matrix(model, memory.equations, change)
-    if near > 0:
-        find_velocities(model, memory.contacts, change, True, memory.equations.tree, usual)
-    for other in range(near):
-        for i in range(2):
-            entry = usual.point_velocity[candidate[other], i]
-            delassus[row, 2 * other + i] = entry
-            delassus[2 * other + i, row] = entry
-    for other in range(near, place + 1):
-        column = first[other]
+        column = last_row(other, first)
         if other < joints:
-            column, joint, sign = joint_row(memory.rows, assembly, other)
-            entry = sign * change[joint]
+            joint = candidate[other]
+            entry = side[joint] * change[owner[joint]]
         else:
-            entry = speed_along(other - joints, memory.loops, change)
+            entry = row_product(loop_jacobian, other - joints, change)
         delassus[row, column] = entry
         delassus[column, row] = entry
 
 
 @dissolved_kernel
 def push_candidates(
-    model: Model, contacts: Contacts, rows: Rows, assembly: Assembly, near: int, count: int,
-    equations: Equations, usual: UsualPoints, v: Floats,
+    model: Model, near: int, count: int, contacts: Contacts, points: Integers,
+    candidate: Integers, first: Integers, impulse: Floats, jacobian: Floats, equations: Equations,
+    point_impulse: Floats, v: Floats,
 ) -> None:  # fmt: skip
-    """Add what the impulses of the candidates do to a velocity, after `gather_delassus`."""
-    impulse = assembly.answer.impulse
+    """Add what the impulses of the candidates do to a velocity, after `gather_points`.
+
+    The rows of the Jacobian are A⁻¹ Jᵀ but for those of points, whose impulses the program takes.
+    """
     for contact in range(model.nc):
         for k in range(2):
-            usual.point_impulse[contact, k] = 0.0
+            point_impulse[contact, k] = 0.0
     for place in range(near):
         for k in range(2):
-            usual.point_impulse[assembly.candidate[place], k] = impulse[2 * place + k]
+            point_impulse[candidate[place], k] = impulse[2 * place + k]
     if near > 0:
         play(
-            usual.programs[PUSH],
+            equations.programs[PUSH],
             (
-                model, usual.usual_points, contacts, equations.factor, usual.point_impulse,
-                equations.tree, equations.rate, v,
+                model, points, contacts, equations.factor, point_impulse, equations.tree,
+                equations.rate, v,
             ),
         )  # fmt: skip
     for place in range(near, count):
-        row, _, _ = joint_row(rows, assembly, place)
+        row = last_row(place, first)
         for j in range(model.nv):
-            v[j] += impulse[row] * assembly.jacobian[row, j]
+            v[j] += impulse[row] * jacobian[row, j]
 
 
 @kernel
 def push_all(
-    model: Model, near: int, count: int, straight: bool, memory: Memory, v: Floats
-) -> None:
-    """Add what the impulses of the candidates do to a velocity."""
-    contacts, assembly = memory.contacts, memory.assembly
-    equations, usual = memory.equations, memory.usual
+    model: Model, near: int, count: int, straight: bool, contacts: Contacts, points: Integers,
+    candidate: Integers, first: Integers, impulse: Floats, directions: Directions,
+    equations: Equations, point_impulse: Floats, v: Floats,
+) -> None:  # fmt: skip
+    """Add what the impulses of the candidates do to a velocity: the points are the first `near`."""
     if straight:
-        joints = count - rows_of(memory.loops)
-        push_candidates(model, contacts, memory.rows, assembly, near, joints, equations, usual, v)
-        for row in range(assembly.problem.first[joints], assembly.problem.first[count]):
-            for j in range(model.nv):
-                v[j] += assembly.answer.impulse[row] * assembly.jacobian[row, j]
+        push_candidates(
+            model, near, count, contacts, points, candidate, first, impulse, directions.jacobian,
+            equations, point_impulse, v,
+        )  # fmt: skip
     else:
-        add_impulse(model, assembly, count, equations, v)
+        add_impulse(model, first[count], impulse, directions, equations, v)
 
 
 @dissolved_kernel
@@ -726,91 +719,134 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
 
     Points are the first `near` of `count`.
     """
-    assembly, contacts, rows = memory.assembly, memory.contacts, memory.rows
-    equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
-    impact, step = work.impact, work.step
+    assembly, contacts, rows, loops = memory.assembly, memory.contacts, memory.rows, memory.loops
+    equations, usual, problem, seconds = (
+        memory.equations, memory.usual, memory.assembly.problem, memory.seconds,
+    )  # fmt: skip
+    directions, candidate, first = assembly.directions, assembly.candidate, problem.first
+    answer, tree, points = assembly.answer, equations.tree, usual.usual_points
+    impact, step, next_v = work.impact, work.step, memory.next_v
+    joints = count - rows_of(loops)
     others = are_there(SECOND_FACE, assembly) or are_there(CONSTRAINT, assembly)
-    straight = not others and are_usual(assembly.candidate, near, DELASSUS, usual)
-    if straight:
-        gather_delassus(model, contacts, rows, near, count, equations, usual, assembly)
-        loops = count - rows_of(memory.loops)
-        for place in range(loops, count):
-            add_loop(model, near, loops, place, memory)
-        if near == count == usual.usual_points.shape[0]:
-            problem = usual.usual_problem
+    straight = not others and are_usual(candidate, near, DELASSUS, usual)
+    if straight and near == count == points.shape[0]:
+        play(
+            usual.programs[DELASSUS],
+            (
+                model, points, tree, contacts, equations.factor, usual.point_rows,
+                usual.usual_problem.delassus,
+            ),
+        )  # fmt: skip
+        problem = usual.usual_problem
+    elif straight:
+        factor, delassus = equations.factor, problem.delassus
+        gather_points(model, contacts, tree, factor, near, candidate, usual, delassus)
+        for place in range(near, count):  # the rows of loops are there
+            row = last_row(place, first)
+            change = directions.jacobian[row]
+            if place < joints:
+                write_unit(rows.owner[candidate[place]], rows.side[candidate[place]], change)
+            solve_mass_matrix(model, equations, change)
+            if near > 0:
+                find_velocities(model, contacts, change, True, tree, usual)
+            couple(
+                near, joints, place, candidate, first, rows.owner, rows.side, loops.rows.jacobian,
+                usual.point_velocity, change, delassus,
+            )  # fmt: skip
     else:
-        write_rows(model, equations.tree, contacts, memory.seconds, rows, assembly)
-        assemble_delassus(model, count, equations, assembly)
+        write_contact_rows(POINT, model, tree, contacts, rows.owner, assembly)
+        write_joint_rows(rows, assembly)
+        write_contact_rows(SECOND_FACE, model, tree, seconds, rows.owner, assembly)
+        assemble_delassus(model, count, equations, directions, problem)
     problem.count = count
     if work.scheme == MOREAU_JEAN:
-        status = solve_restitution(work.order, problem, memory.solver, impact, assembly.answer)
-        solved = status == SOLVED
+        status = solve_restitution(work.order, problem, memory.solver, impact, answer)
     else:
-        status = solve_contact_kernel(work.order, problem, memory.solver, assembly.answer)
-        solved = status == SOLVED
+        status = solve_contact_kernel(work.order, problem, memory.solver, answer)
+    solved = status == SOLVED
     resolves = solved and work.scheme == IMPACT_RESOLVED
     gap, before = rows.gap, memory.tally.steps - 1
     if resolves and falls_into(step, before, gap, impact.touching, problem, assembly):
         impact.happens = 1
         arriving = impact.arriving
         for j in range(model.nv):
-            arriving[j] = memory.next_v[j]
-        push_all(model, near, count, straight, memory, arriving)
+            arriving[j] = next_v[j]
+        push_all(
+            model, near, count, straight, contacts, points, candidate, first, answer.impulse,
+            directions, equations, usual.point_impulse, arriving,
+        )  # fmt: skip
         if impact.relaxed == 1:
-            push_out(model, near, count, straight, problem, work, memory)
+            push_out(
+                model, near, count, straight, step, work.order, gap, contacts, points, problem,
+                equations, memory.solver, usual.point_impulse, assembly, impact,
+            )  # fmt: skip
         members = find_members(step, before, gap, impact.touching, problem, assembly, impact.member)
         for place in range(members):
-            entry = assembly.candidate[impact.member[place]]
+            entry = candidate[impact.member[place]]
             restitution = memory.surface.restitution[entry]
             impact.bounce[place] = 0.0
             if impact.relaxed == 0 and restitution > 0.0:
                 impact.bounce[place] = restitution * speed_before(
-                    model, entry, memory.v, rows, equations.tree, contacts, memory.seconds
+                    model, entry, memory.v, rows, tree, contacts, seconds
                 )
-        pose_impact(step, members, assembly.candidate, gap, assembly.answer.mode, problem, impact)
+        pose_impact(step, members, candidate, gap, answer.mode, problem, impact)
         solved = solve_impact(work.order, members, problem, memory.solver, impact, assembly)
-    push_all(model, near, count, straight, memory, memory.next_v)
+    push_all(
+        model, near, count, straight, contacts, points, candidate, first, answer.impulse,
+        directions, equations, usual.point_impulse, next_v,
+    )  # fmt: skip
     return solved
+
+
+@dissolved_kernel
+def write_unit(joint: int, sign: float, row: Floats) -> None:
+    """Write the row of a Jacobian that is the velocity of a joint, with a sign."""
+    for j in range(row.shape[0]):
+        row[j] = 0.0
+    row[joint] = sign
 
 
 @kernel
 def push_out(
-    model: Model, near: int, count: int, straight: bool, problem: ContactProblem, work: Stepping,
-    memory: Memory,
+    model: Model, near: int, count: int, straight: bool, step: float, order: Integers, gap: Floats,
+    contacts: Contacts, points: Integers, problem: ContactProblem, equations: Equations,
+    solver: ContactWorkspace, point_impulse: Floats, assembly: Assembly, impact: Impact,
 ) -> None:  # fmt: skip
     """Let the positions of a wedge come out of the ground, where a way without friction leads."""
-    impact, answer = work.impact, memory.assembly.answer
-    pose_way_out(
-        work.step, memory.assembly.candidate, memory.rows.gap, answer.velocity, problem, impact
-    )
-    solver, its = memory.solver, impact.answer
-    if solve_contact_kernel(work.order, impact.problem, solver, its) == SOLVED:
+    answer, its, candidate = assembly.answer, impact.answer, assembly.candidate
+    pose_way_out(step, candidate, gap, answer.velocity, problem, impact)
+    if solve_contact_kernel(order, impact.problem, solver, its) == SOLVED:
         for row in range(problem.first[count]):
             answer.impulse[row] = its.impulse[row]
-        push_all(model, near, count, straight, memory, impact.arriving)
+        push_all(
+            model, near, count, straight, contacts, points, candidate, assembly.problem.first,
+            answer.impulse, assembly.directions, equations, point_impulse, impact.arriving,
+        )  # fmt: skip
 
 
 @dissolved_kernel
 def may_go_through(
-    model: Model, work: Stepping, near: int, count: int, v: Floats, memory: Memory
-) -> bool:
+    model: Model, step: float, near: int, count: int, strikes: bool, outside: bool, v: Floats,
+    gaps: Floats, assembly: Assembly, usual: UsualPoints,
+) -> bool:  # fmt: skip
     """Whether the velocity that was found could take something through a stop or the ground.
 
     What is no candidate is too far away to get there at its free velocity: it has to be thrown. A
-    stop has to be reached faster than any that is out of reach can be.
+    stop has to be reached faster than any that is out of reach can be. `strikes` tells whether an
+    impact falls into the step, `outside` whether there are constraints from outside.
     """
     if count == 0:
         return False
     thrown = 0
     for joint in range(model.nv):
         thrown += abs(v[joint]) > CLOSING_RATE
-    if thrown > 0 or memory.rows.outside.kernel.shape[0] > 0:
+    if thrown > 0 or outside:
         return True
-    known = near == count and work.impact.happens == 0
+    known = near == count and not strikes
     for contact in range(model.nc):
-        gap = memory.contacts.gap[contact]
-        if work.step * CLOSING_SPEED < gap <= work.step * CLOSING_SPEED * FAR_STEPS and not (
-            known and stays_above(work.step, contact, gap, near, memory.assembly, memory.usual)
+        gap = gaps[contact]
+        if step * CLOSING_SPEED < gap <= step * CLOSING_SPEED * FAR_STEPS and not (
+            known and stays_above(step, contact, gap, near, assembly, usual)
         ):
             return True
     return False
@@ -846,26 +882,30 @@ def far_beyond(step: float, own: int, outside: Writers) -> float:
 
 
 @kernel
-def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Impact) -> bool:
-    """Call what would go through at the velocity that was found; return if any is new."""
-    calls = impact.calls
-    usual, contacts = memory.usual, memory.contacts
+def call_points(
+    model: Model, step: float, v: Floats, contacts: Contacts, tree: Workspace, usual: UsualPoints,
+    calls: Calls,
+) -> None:  # fmt: skip
+    """Call the contact points that would go through at the velocity that was found."""
     straight = are_usual(usual.every_point, model.nc, VELOCITIES, usual)
-    find_velocities(model, contacts, v, straight, memory.equations.tree, usual)
+    find_velocities(model, contacts, v, straight, tree, usual)
     for contact in range(model.nc):
         if contacts.gap[contact] + step * usual.point_velocity[contact, 0] < -CLOSED_GAP:
-            call(contact, impact)
-    rows = memory.rows
+            call(contact, calls)
+
+
+@kernel
+def call_joints(step: float, q: Floats, v: Floats, rows: Rows, calls: Calls) -> None:
+    """Call the stops and the constraints from outside that would go through at that velocity."""
     for stop in range(rows.first[STOP], rows.end[STOP]):
         joint, side = rows.owner[stop], rows.side[stop]
-        if side * (memory.q[joint] + step * v[joint]) < side * rows.limit[stop] - CLOSED_GAP:
-            call(stop, impact)
+        if side * (q[joint] + step * v[joint]) < side * rows.limit[stop] - CLOSED_GAP:
+            call(stop, calls)
     for entry in range(rows.first[CONSTRAINT], rows.end[CONSTRAINT]):
         own = rows.owner[entry]
         ahead = rows.outside.gap[own, 0] + step * rate_of(own, 0, v, rows.outside)
         if rows.set[entry] != INTERVAL and ahead < -far_beyond(step, own, rows.outside):
-            call(entry, impact)
-    return impact.calls > calls
+            call(entry, calls)
 
 
 @dissolved_kernel
@@ -877,63 +917,86 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
     out of where they are already, or lets them bounce; they are left there, then, and in a wedge
     that lasts at once.
     """
-    assembly, impact = memory.assembly, work.impact
-    gap, restitution = memory.rows.gap, memory.surface.restitution
+    step, scheme, impact, calls = work.step, work.scheme, work.impact, work.impact.calls
+    assembly, rows, surface, loops = memory.assembly, memory.rows, memory.surface, memory.loops
+    q, v, next_v, contacts = memory.q, memory.v, memory.next_v, memory.contacts
+    equations, usual, steps = memory.equations, memory.usual, memory.tally.steps
+    gap, restitution, tree, called = rows.gap, surface.restitution, equations.tree, calls.called
+    outside, linearised = rows.outside.kernel.shape[0] > 0, is_linearised(scheme)
+    listing = Listing(
+        rows.set, surface.friction, memory.reaction.mode, assembly.candidate, assembly.answer.mode,
+        assembly.problem,
+    )  # fmt: skip
     again = True
     solved = True
     near = count = 0
-    impact.relaxed = int(stays_wedged(memory.tally.steps, impact))
+    impact.relaxed = int(stays_wedged(steps, impact))
     at_once = impact.relaxed == 1
     while again:
-        free_velocity(model, work, time, memory)
+        free_velocity(
+            model, step, scheme, time, q, v, memory.torque, memory.stiffness, memory.pushes,
+            equations, next_v,
+        )  # fmt: skip
         impact.happens = impact.gains = 0
-        for place in range(impact.bounce.shape[0] if work.scheme == MOREAU_JEAN else 0):
+        for place in range(impact.bounce.shape[0] if scheme == MOREAU_JEAN else 0):
             impact.bounce[place] = 0.0
         for i in range(3):
             assembly.answer.residual[i] = 0.0
-        near = select_candidates(model, curved, work, memory)
+        rule = Rule(step, scheme, work.activation, calls.count, impact.relaxed)
+        near = select_candidates(
+            model, curved, rule, contacts, surface, next_v, called, tree, usual, impact.bounce,
+            listing,
+        )  # fmt: skip
         note_group(POINT, 0, near, assembly)
-        count = select_stops(model, work, near, memory)
-        count = hold_latched(model, count, memory.next_v, memory)
+        count = select_stops(model, rule, near, q, v, next_v, called, rows, listing)
+        count = hold_latched(model, count, next_v, rows.latch_stop, loops.held, listing)
         first = note_group(STOP, near, count, assembly)
-        if memory.rows.outside.kernel.shape[0] > 0:
-            count = select_constraints(count, work, memory)
+        if outside:
+            count = select_constraints(
+                count, rule, v, next_v, restitution, called, rows, impact.bounce, listing
+            )
         first = note_group(CONSTRAINT, first, count, assembly)
-        count = list_dry_joints(count, work.step, memory.next_v, memory)
+        count = list_dry_joints(count, step, next_v, memory.breakaway, rows, listing)
         first = note_group(DRY_JOINT, first, count, assembly)
         if impact.corner.near > 0:
-            count = select_corners(model, count, work, memory)
+            count = select_corners(
+                model, rule, count, rows.first[SECOND_FACE], v, next_v, tree, memory.seconds, gap,
+                restitution, assembly.directions, impact.bounce, listing,
+            )  # fmt: skip
         first = note_group(SECOND_FACE, first, count, assembly)
-        count = append_loops(count, 1, memory.loops, assembly)
+        count = append_loops(count, 1, loops, assembly)
         note_group(LOOP, first, count, assembly)
-        free_loops(count, memory.loops, memory.next_v, 0.5 * work.step, assembly)
+        free_loops(count, loops, next_v, 0.5 * step, assembly)
         if at_once:
             deepest, bounces = left_alone(count, assembly.candidate, gap, restitution)
             if deepest == 0.0 and not bounces:  # the wedge is over
                 impact.relaxed = 0
-        if impact.relaxed == 1 and is_linearised(work.scheme):
-            close_gaps(work.step, count, gap, assembly)
+        if impact.relaxed == 1 and linearised:
+            close_gaps(step, count, gap, assembly)
         if count > 0:
             solved = solve_candidates(model, near, count, work, memory)
-        v = impact.arriving if impact.happens == 1 else memory.next_v
+        moved = impact.arriving if impact.happens == 1 else next_v
         if not solved:
             deepest, bounces = left_alone(count, assembly.candidate, gap, restitution)
-            again = relax(is_linearised(work.scheme), deepest, bounces, memory.tally.steps, impact)
+            again = relax(linearised, deepest, bounces, steps, impact)
         elif at_once and impact.relaxed == 1 and modes_change(assembly, memory.reaction.mode):
             at_once, impact.relaxed = False, 0
-        elif is_linearised(work.scheme):
-            again = may_go_through(model, work, near, count, v, memory) and call_missed(
-                model, work.step, v, memory, impact
-            )
         else:
-            again = False
-    if impact.calls > 0:
-        dismiss(impact)
-    if work.scheme == IMPACT_RESOLVED:
-        note_touching(work.step, count, memory.tally.steps, assembly, impact.touching)
-    note_answer(model, work.step, memory)
+            again = linearised and may_go_through(
+                model, step, near, count, impact.happens == 1, outside, moved, contacts.gap,
+                assembly, usual,
+            )  # fmt: skip
+            if again:
+                call_points(model, step, moved, contacts, tree, usual, calls)
+                call_joints(step, q, moved, rows, calls)
+                again = calls.count > rule.calls
+    if calls.count > 0:
+        dismiss(calls)
+    if scheme == IMPACT_RESOLVED:
+        note_touching(step, count, steps, assembly, impact.touching)
+    note_answer(step, memory)
     if are_there(SECOND_FACE, assembly):
-        join_forces(model, memory.seconds, memory.contacts)
+        join_forces(model, memory.seconds, contacts)
     return solved
 
 
@@ -944,32 +1007,29 @@ def decide(
     """Find the velocity at the end of the step, and note what happens in it."""
     model = scene.model
     solved = solve_step(model, scene.ground.curved == 1, clock.time, work, memory)
-    note_extremes(model, memory)
+    note_extremes(memory.contacts.gap, memory.assembly.answer.residual, memory.tally)
     if work.impact.relaxed == 1:
         memory.solver.tally.relaxed += 1
         if note_wedge(memory.tally.steps, work.impact):
-            log_event(clock.time, WEDGED, deepest_point(memory.contacts.gap), 0.0, 0.0, record)
-    first = record.events
+            log_event(clock.time, WEDGED, deepest_point(memory.contacts.gap), 0.0, 0.0, record.told)
+    first = record.told.events
     end = clock.start + (clock.index + 1) * work.step
-    note_events(model, clock.time, end, work.step, memory, record)
-    react(model, first, memory.q, record, memory.loops)
+    note_events(
+        model, clock.time, end, work.step, memory.tally.steps, memory.q, memory.v, memory.next_v,
+        memory.breakaway, memory.equations.tree, memory.contacts, memory.reaction,
+        memory.loops.constraint_force, memory.rows, record.told, memory.reported,
+    )  # fmt: skip
+    react(model, first, memory.q, record.told, memory.loops.held)
     share_friction(
         model, memory.breakaway, memory.reaction.friction_torque, memory.loops.brake_force
     )
-    note_brakes(model, clock.time, work.step, record, memory.loops)
+    force, braked = memory.loops.brake_force, memory.loops.braked
+    note_brakes(model, clock.time, work.step, force, record.told, braked)
     if work.impact.gains == 1:
         force = memory.contacts.force
-        note_event(end, ENERGY_GAIN, hardest_point(force), work.step, force, record)
+        note_event(end, ENERGY_GAIN, hardest_point(force), work.step, force, record.told)
         memory.tally.energy_gain += work.impact.gain
     return DONE if solved else SOLVER_FAILED
-
-
-@dissolved_kernel
-def report(
-    scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
-) -> None:
-    """Append a row if one is due."""
-    note_row_when_due(memory, clock, record)
 
 
 @dissolved_kernel
@@ -1001,4 +1061,4 @@ def move(
 
 TimeStepping.work = Stepping
 TimeStepping.usual_numbers = {"scheme": IMPACT_RESOLVED}
-TimeStepping.kernels = Kernels(begin, prepare, decide, report, move)
+TimeStepping.kernels = Kernels(None, prepare, decide, None, move)

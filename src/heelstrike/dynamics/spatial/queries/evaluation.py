@@ -17,9 +17,10 @@ from heelstrike.dynamics.spatial import equations, kinematics
 from heelstrike.dynamics.spatial.algebra import Vector
 from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
 from heelstrike.errors import RobotError
+from heelstrike.robot.coordinates import index_of
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import SpatialModel
-from heelstrike.robot.spatial.robot import SpatialRobot, checked_position, index_in
+from heelstrike.robot.spatial.robot import SpatialRobot, checked_position
 
 
 class SpatialEvaluation:
@@ -150,7 +151,7 @@ def spatial_link(robot: SpatialRobot, link: int | str) -> int:
     names = robot.link_names
     if link in names:
         return len(names) - 1 - names[::-1].index(str(link))
-    return index_in(robot, "link", names, link)
+    return index_of(robot, "link", names, link)
 
 
 def spatial_contacts(robot: SpatialRobot, contacts: Any) -> tuple[int, ...]:
@@ -158,4 +159,4 @@ def spatial_contacts(robot: SpatialRobot, contacts: Any) -> tuple[int, ...]:
     names = robot.contact_names
     given: Any = range(robot.nc) if contacts is None else contacts
     given = (given,) if isinstance(given, str | int | np.integer) else given
-    return tuple(dict.fromkeys(index_in(robot, "contact point", names, one) for one in given))
+    return tuple(dict.fromkeys(index_of(robot, "contact point", names, one) for one in given))

@@ -42,8 +42,8 @@ def free_acceleration(
 
 @kernel
 def pose_problem(
-    count: int, total: int, accelerations: bool, friction: Floats, guess: Integers, rows: Rows,
-    slide: Integers, held: Integers, assembly: Assembly,
+    count: int, total: int, accelerations: bool, sets: Integers, friction: Floats, guess: Integers,
+    slide: Integers, stop: Integers, held: Integers, assembly: Assembly,
 ) -> None:  # fmt: skip
     """Pose the contact problem of the candidates at the level of accelerations or velocities.
 
@@ -54,7 +54,7 @@ def pose_problem(
     problem, mode = assembly.problem, assembly.answer.mode
     for place in range(count):
         contact = assembly.candidate[place]
-        problem.set[place] = rows.set[contact]
+        problem.set[place] = sets[contact]
         problem.friction[place] = friction[contact]
         mode[place] = STICK
         if accelerations:
@@ -64,7 +64,7 @@ def pose_problem(
                 mode[place] = SLIDING_BACKWARD
             elif guess[contact] < SLIDING_FORWARD:
                 mode[place] = guess[contact]
-    hold(count, rows.latch_stop, held, assembly)
+    hold(count, stop, held, assembly.candidate, problem.set)
     problem.count = total
     for place in range(count, total):
         mode[place] = STICK
@@ -80,7 +80,10 @@ def solve_candidates(
     Forces or impulses and modes go to ``assembly.answer``.
     """
     total = count + rows_of(loops)
-    pose_problem(count, total, accelerations, friction, guess, rows, slide, loops.held, assembly)
+    pose_problem(
+        count, total, accelerations, rows.set, friction, guess, slide, rows.latch_stop, loops.held,
+        assembly,
+    )  # fmt: skip
     return int(solve_contact_kernel(solvers, assembly.problem, solver, assembly.answer))
 
 

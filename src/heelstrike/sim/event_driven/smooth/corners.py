@@ -14,11 +14,10 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.rows import CONSTRAINT, POINT, STOP, Rows, second_of
+from heelstrike.sim.contacts.rows import CONSTRAINT, STOP, Rows, second_of
 from heelstrike.sim.event_driven.phase import Impact
 from heelstrike.sim.event_driven.steps import shortest_step
-from heelstrike.sim.memory import Reported
-from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.record import Record, Told
 from heelstrike.sim.record.recording import CONSTRAINT_HOLDS, JOINT_STOP, TOUCHDOWN, log_event
 
 IMPACT = int(EventKind.IMPACT)
@@ -65,36 +64,41 @@ def log_impulse(
         told = record.contact_normal[row, point]
         if told[0] != frame[0] or told[1] != frame[1]:
             along, across = into_frame(told, out_of_frame(frame, (along, across)))
-    log_event(time, kind, point, along, across, record)
+    log_event(time, kind, point, along, across, record.told)
 
 
 @kernel
-def report_impulses(
-    kind: int, time: float, rows: Rows, impact: Impact, reported: Reported, record: Record
-) -> int:
-    """Append the impulses of this instant to the events; return the point with the largest.
+def report_points(
+    kind: int, time: float, seconds: int, normal: Floats, impact: Impact, closed: Integers,
+    slipping: Integers, record: Record,
+) -> int:  # fmt: skip
+    """Append the impulses of contact points in this instant; return the one with the largest.
 
-    Those of contact points have a kind of their own, or are touchdowns where `kind` is ``IMPACT``
-    and the point was not on the ground.
+    They are of a kind of their own, or touchdowns where `kind` is ``IMPACT`` and the point was not
+    on the ground. The second faces are the entries of the table from `seconds` on.
     """
     impulse, largest = impact.impulse, 0
-    for contact in range(rows.end[CONSTRAINT]):
-        normal = impulse[contact, 0]
-        if rows.kind[contact] != POINT:
-            if normal != 0.0:  # it may pull, as a latch does
-                holds = JOINT_STOP if rows.kind[contact] == STOP else CONSTRAINT_HOLDS
-                reported.closed[contact] = 1
-                log_event(time, holds, rows.owner[contact], normal, 0.0, record)
+    for point in range(impact.meets.shape[0]):
+        second, told = seconds + point, kind
+        largest = point if impulse[point, 0] > impulse[largest, 0] else largest
+        if not (impulse[point, 0] > 0.0 or impulse[second, 0] > 0.0):
             continue
-        second, told = second_of(contact, rows), kind
-        largest = contact if normal > impulse[largest, 0] else largest
-        if not (normal > 0.0 or impulse[second, 0] > 0.0):
-            continue
-        if kind == IMPACT and reported.closed[contact] == 0:
-            reported.closed[contact], reported.slipping[contact] = 1, 0
+        if kind == IMPACT and closed[point] == 0:
+            closed[point], slipping[point] = 1, 0
             told = TOUCHDOWN
-        log_impulse(told, contact, second, time, rows.normal, impact, record)
+        log_impulse(told, point, second, time, normal, impact, record)
     return largest
+
+
+@kernel
+def report_joints(time: float, rows: Rows, impulse: Floats, closed: Integers, told: Told) -> None:
+    """Append the impulses of joint stops and constraints in this instant to the events."""
+    for entry in range(rows.first[STOP], rows.end[CONSTRAINT]):
+        normal = impulse[entry, 0]
+        if normal != 0.0:  # it may pull, as a latch does
+            holds = JOINT_STOP if rows.kind[entry] == STOP else CONSTRAINT_HOLDS
+            closed[entry] = 1
+            log_event(time, holds, rows.owner[entry], normal, 0.0, told)
 
 
 @kernel

@@ -217,11 +217,12 @@ def hold_closed(
     Returns whether they are ambiguous.
     """
     candidate, free, impulse = assembly.candidate, assembly.problem.free, assembly.answer.impulse
+    directions, jacobian = assembly.directions, assembly.directions.jacobian
     for place in range(count):
         contact = candidate[place]
         free_gap_acceleration(
             contact, place, model, equations.tree, rows, modes.face, modes.bend, equations.rate,
-            assembly.jacobian, free,
+            jacobian, free,
         )  # fmt: skip
         impulse[2 * place] = 0.0
         impulse[2 * place + 1] = 0.0
@@ -237,8 +238,7 @@ def hold_closed(
     if is_delicate(size, rank, held.system):
         return hold_by_saddle_point(
             size, count, total, model, rows, modes.face, modes.bend, loops.rows.bias, loops.held,
-            candidate,
-            assembly.jacobian, equations.tree, equations.mass_matrix, equations.rate,
+            candidate, jacobian, equations.tree, equations.mass_matrix, equations.rate,
             assembly.answer, held, saddle,
         )  # fmt: skip
     if rank < size:
@@ -249,7 +249,7 @@ def hold_closed(
         impulse[held.row[i]] += held.unknown[i]
         if held.lean[i] != 0.0:
             impulse[held.row[i] + 1] += held.lean[i] * held.unknown[i]
-    add_impulse(model, assembly, total, equations, equations.rate)
+    add_impulse(model, 2 * total, impulse, directions, equations, equations.rate)
     return rank < size
 
 
@@ -283,7 +283,10 @@ def look(
 ) -> None:  # fmt: skip
     """Pose, contact points, and the event functions that need no forces, of a state (q, v)."""
     observe_faces(state, model, ground, tree, rows, modes, surface)
-    watch_geometry(model, ground, tree, state[model.nq :], rows, modes, watch.value, watch.rate)
+    watch_geometry(
+        model, ground, tree, state[model.nq :], rows, modes.watched, modes.closed, modes.passing,
+        modes.slide, modes.group, modes.face, watch.value, watch.rate,
+    )  # fmt: skip
 
 
 @kernel
@@ -300,29 +303,33 @@ def evaluate(
     model, ground, rows, loops = scene.model, scene.ground, memory.rows, memory.loops
     q, v = state[: model.nq], state[model.nq :]
     equations, assembly, friction = memory.equations, memory.assembly, memory.surface.friction
+    problem, directions = assembly.problem, assembly.directions
     tree, rate = equations.tree, equations.rate
     evaluate_equations(model, q, v, equations)
     locate(q, v, model, ground, tree, rows, modes, memory.surface)
-    watch_geometry(model, ground, tree, v, rows, modes, watch.value, watch.rate)
+    watch_geometry(
+        model, ground, tree, v, rows, modes.watched, modes.closed, modes.passing, modes.slide,
+        modes.group, modes.face, watch.value, watch.rate,
+    )  # fmt: skip
     if control.continuous == 1:
-        consult(scene.controller, time, q, v, model, memory, control, memory.command)
-    try_torque(model, control, q, v, memory.tally, memory.command, memory.torque)
+        consult(scene.controller, time, q, v, model, tree, memory.contacts, control, memory.command)
+    try_torque(model, control.voltage, q, v, memory.tally, memory.command, memory.torque)
     free_acceleration(
         model, state, memory.torque, rows, modes.slide, modes.breakaway, memory.pushes, equations,
         saddle.force,
     )  # fmt: skip
     if rows_of(loops) > 0:
         find_loops(model, q, v, tree, loops)
-    count = list_closed(rows, modes, assembly.candidate, assembly.problem.bound)
+    count = list_closed(rows, modes, assembly.candidate, problem.bound)
     write_candidates(
-        count, assembly.candidate, model, tree, rows, assembly.problem.first, assembly.leaf,
-        assembly.jacobian,
+        count, assembly.candidate, model, tree, rows, problem.first, directions.leaf,
+        directions.jacobian,
     )  # fmt: skip
     total = append_loops(count, 2, loops, assembly)
     forces.count = count
     saddle.needed = 0
     if total > 0:
-        assemble_delassus(model, total, equations, assembly)
+        assemble_delassus(model, total, equations, directions, problem)
         ambiguous = hold_closed(
             count, total, model, rows, modes, friction, loops, equations, assembly, phase.held,
             saddle,

@@ -23,6 +23,7 @@ from heelstrike.sim.contacts.candidates import find_constraints, locate_stops
 from heelstrike.sim.contacts.faces import (
     CURVE,
     NO_FACE,
+    Located,
     along_segment,
     center_of,
     is_beside,
@@ -54,24 +55,23 @@ def has_corners(ground: GroundModel) -> bool:
 
 @kernel
 def locate_second(
-    point: int, model: Model, ground: GroundModel, tree: Workspace, closed: Integers, rows: Rows,
-    face: Integers, surface: Surface,
+    point: int, second: int, model: Model, ground: GroundModel, tree: Workspace, closed: Integers,
+    located: Located, face: Integers, surface: Surface,
 ) -> None:  # fmt: skip
     """Contact point, gap and normal of a point on its second face, the one it is on or could meet.
 
     Where there is none the gap is infinite.
     """
-    second = second_of(point, rows)
-    rows.gap[second] = np.inf
+    located.gap[second] = np.inf
     if face[point] == NO_FACE:
         return
     if closed[second] == 0:
-        x, z = center_of(model, rows, point)
+        x, z = center_of(model, located, point)
         _, face[second] = second_face(
             ground, face[point], NO_FACE, x, z, model.contact_radius[point]
         )
     if face[second] != NO_FACE:
-        locate_on_face(model, ground, tree, point, face[second], second, rows)
+        locate_on_face(model, ground, tree, point, face[second], second, located)
         take_surface(model, ground, point, second, face[second], surface)
 
 
@@ -105,14 +105,16 @@ def locate(
             locate_on_face(model, ground, tree, point, its, point, rows)
             take_surface(model, ground, point, point, its, surface)
     if ground.concave == 1:
+        located = Located(rows.gap, rows.position, rows.normal)
         for point in range(model.nc):
-            locate_second(point, model, ground, tree, closed, rows, face, surface)
+            second = second_of(point, rows)
+            locate_second(point, second, model, ground, tree, closed, located, face, surface)
 
 
 @kernel
 def stand_on_face(
-    point: int, model: Model, ground: GroundModel, tree: Workspace, closed: Integers, rows: Rows,
-    face: Integers, surface: Surface,
+    point: int, second: int, model: Model, ground: GroundModel, tree: Workspace, closed: Integers,
+    located: Located, face: Integers, surface: Surface,
 ) -> None:  # fmt: skip
     """Put a point that has reached the ground on the face that its normal is of.
 
@@ -120,16 +122,16 @@ def stand_on_face(
     """
     if face[point] != NO_FACE or not has_corners(ground):
         return
-    x, z = center_of(model, rows, point)
+    gap, normal = located.gap, located.normal
+    x, z = center_of(model, located, point)
     face[point] = nearest_face(ground, x, z, model.contact_radius[point])
     if ground.concave == 1:
-        locate_second(point, model, ground, tree, closed, rows, face, surface)
-        second = second_of(point, rows)
-        own, other = rows.normal[point], rows.normal[second]
+        locate_second(point, second, model, ground, tree, closed, located, face, surface)
+        own, other = normal[point], normal[second]
         twice = own[0] * other[0] + own[1] * other[1] > 1.0 - ONE_NORMAL
-        if twice and abs(rows.gap[second] - rows.gap[point]) < ONE_GAP:
+        if twice and abs(gap[second] - gap[point]) < ONE_GAP:
             face[point] = face[second]
-            locate_second(point, model, ground, tree, closed, rows, face, surface)
+            locate_second(point, second, model, ground, tree, closed, located, face, surface)
 
 
 @kernel
@@ -220,64 +222,66 @@ def turn_corner(
 
 @kernel
 def watch_corners(
-    model: Model, ground: GroundModel, rows: Rows, modes: Modes, value: Floats
-) -> None:
+    model: Model, ground: GroundModel, rows: Rows, watched: int, closed: Integers, face: Integers,
+    value: Floats,
+) -> None:  # fmt: skip
     """Event functions of the points on faces: how far each is from the end of its own."""
-    first = 2 * modes.watched
+    first = 2 * watched
     for point in range(model.nc):
         value[first + point] = 1.0
-        if modes.face[point] != NO_FACE:
+        if face[point] != NO_FACE:
             x, z = center_of(model, rows, point)
-            radius = model.contact_radius[point]
-            left = way_left(point, ground, x, z, radius, rows, modes.closed, modes.face)
+            radius, second = model.contact_radius[point], second_of(point, rows)
+            left = way_left(point, second, ground, x, z, radius, closed, face)
             value[first + point] = min(left, 1.0)
 
 
 @kernel
 def way_left(
-    point: int, ground: GroundModel, x: float, z: float, radius: float, rows: Rows,
+    point: int, second: int, ground: GroundModel, x: float, z: float, radius: float,
     closed: Integers, face: Integers,
 ) -> float:  # fmt: skip
     """How far a disc on a face is from the end of it, or what there is to meet or leave besides."""
     left, _ = following_face(ground, face[point], x, z, radius)
     if ground.concave == 1:
-        left = min(left, *way_out(point, ground, x, z, radius, rows, closed, face))
+        left = min(left, *way_out(point, second, ground, x, z, radius, closed, face))
     return float(left)
 
 
 @kernel
 def rate_corners(
-    model: Model, ground: GroundModel, tree: Workspace, watched: int, rows: Rows, closed: Integers,
-    face: Integers, fired: Integers, rate: Floats,
+    model: Model, ground: GroundModel, tree: Workspace, watched: int, seconds: int,
+    located: Located, closed: Integers, face: Integers, fired: Integers, rate: Floats,
 ) -> None:  # fmt: skip
     """Rates of the event functions of corners that have fired.
 
-    They are linear in the place of a disc, or nearly so: a short way ahead tells.
+    They are linear in the place of a disc, or nearly so: a short way ahead tells. The second faces
+    are the entries of the table from `seconds` on.
     """
     for point in range(model.nc):
         corner = 2 * watched + point
         if fired[corner] == 0 or face[point] == NO_FACE:
             continue
-        x, z = center_of(model, rows, point)
+        x, z = center_of(model, located, point)
         link, radius = model.contact_link[point], model.contact_radius[point]
         place = x - tree.pivot[0], z - tree.pivot[1]
         along_x, along_z = velocity_at(tree.velocity, link, place)
         soon_x, soon_z = x + SOON * along_x, z + SOON * along_z
-        here = way_left(point, ground, x, z, radius, rows, closed, face)
-        later = way_left(point, ground, soon_x, soon_z, radius, rows, closed, face)
+        second = seconds + point
+        here = way_left(point, second, ground, x, z, radius, closed, face)
+        later = way_left(point, second, ground, soon_x, soon_z, radius, closed, face)
         rate[corner] = (later - here) / SOON
 
 
 @kernel
 def way_out(
-    point: int, ground: GroundModel, x: float, z: float, radius: float, rows: Rows,
+    point: int, second: int, ground: GroundModel, x: float, z: float, radius: float,
     closed: Integers, face: Integers,
 ) -> tuple[float, float]:  # fmt: skip
     """How far a disc that is on two faces is from the end of the second, and from a third.
 
     Between parallel walls a disc can move on both.
     """
-    second = second_of(point, rows)
     if closed[second] == 0:
         return np.inf, np.inf
     left, _ = following_face(ground, face[second], x, z, radius)
@@ -287,23 +291,24 @@ def way_out(
 
 @kernel
 def leave_second_face(
-    point: int, model: Model, ground: GroundModel, tree: Workspace, rows: Rows, closed: Integers,
-    slide: Integers, stuck: Integers, face: Integers, fired: Integers, surface: Surface,
+    point: int, second: int, model: Model, ground: GroundModel, tree: Workspace, located: Located,
+    closed: Integers, slide: Integers, stuck: Integers, face: Integers, fired: Integers,
+    surface: Surface,
 ) -> bool:  # fmt: skip
     """Let a point that is on two faces go over from the second to a third that it meets.
 
     Or off the end of the second. Returns false if it has come to the end of the first.
     """
-    x, z = center_of(model, rows, point)
-    second, radius = second_of(point, rows), model.contact_radius[point]
+    x, z = center_of(model, located, point)
+    radius = model.contact_radius[point]
     own, _ = following_face(ground, face[point], x, z, radius)
-    left, third = way_out(point, ground, x, z, radius, rows, closed, face)
+    left, third = way_out(point, second, ground, x, z, radius, closed, face)
     if own < min(left, third):
         return False
     closed[second], slide[second], stuck[second] = 0, 0, 0
     if third <= left:
         _, face[second] = second_face(ground, face[point], face[second], x, z, radius)
-        locate_on_face(model, ground, tree, point, face[second], second, rows)
+        locate_on_face(model, ground, tree, point, face[second], second, located)
         take_surface(model, ground, point, second, face[second], surface)
         fired[2 * second] = 1
     return True

@@ -170,23 +170,23 @@ def report_modes(
         if kind[contact] == DRY_JOINT:
             if now != before and touches:
                 told = JOINT_STICK if now == 0 else JOINT_SLIP
-                log_event(time, told, owner[contact], 0.0, 0.0, record)
+                log_event(time, told, owner[contact], 0.0, 0.0, record.told)
         elif kind[contact] == STOP:
             if landed and not starting:
-                log_event(time, JOINT_STOP, owner[contact], 0.0, 0.0, record)
+                log_event(time, JOINT_STOP, owner[contact], 0.0, 0.0, record.told)
         elif kind[contact] == CONSTRAINT:
             if landed and not starting:
-                log_event(time, CONSTRAINT_HOLDS, owner[contact], 0.0, 0.0, record)
+                log_event(time, CONSTRAINT_HOLDS, owner[contact], 0.0, 0.0, record.told)
             elif was_closed[contact] == 1 and not touches:
-                log_event(time, CONSTRAINT_LETS_GO, owner[contact], 0.0, 0.0, record)
+                log_event(time, CONSTRAINT_LETS_GO, owner[contact], 0.0, 0.0, record.told)
         elif kind[contact] == POINT:
             if was_closed[contact] == 1 and not touches:
-                log_event(time, LIFTOFF, contact, 0.0, 0.0, record)
+                log_event(time, LIFTOFF, contact, 0.0, 0.0, record.told)
             if landed and not starting:
-                log_event(time, TOUCHDOWN, contact, 0.0, 0.0, record)
+                log_event(time, TOUCHDOWN, contact, 0.0, 0.0, record.told)
             before = 0 if landed else before
             if touches and now != before:
                 told = SLIP if before == 0 else STICK if now == 0 else REVERSAL
-                log_event(time, told, contact, 0.0, 0.0, record)
+                log_event(time, told, contact, 0.0, 0.0, record.told)
         was_closed[contact] = closed[contact]
         slipping[contact] = now if touches else 0

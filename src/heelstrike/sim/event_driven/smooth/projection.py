@@ -128,22 +128,24 @@ def project(
     not agree - and how far it was off, and how fast (m/s), to begin with.
     """
     modes, held = phase.modes, phase.held
-    candidate, jacobian = assembly.candidate, assembly.jacobian
+    candidate, problem, directions = assembly.candidate, assembly.problem, assembly.directions
+    jacobian, impulse = directions.jacobian, assembly.answer.impulse
     tree, q, v = equations.tree, state[: model.nq], state[model.nq :]
     system, row = held.system, held.row
     strayed, fastest = 0.0, 0.0
     for attempt in range(5):
         observe_rows(state, model, ground, tree, rows, modes, surface, loops)
         weigh(model, equations)
-        count = list_closed(rows, modes, candidate, assembly.problem.bound)
+        count = list_closed(rows, modes, candidate, problem.bound)
         if attempt < 4:
             count = list_sunk(count, rows, modes, phase.watch.fired, candidate)
-        first = assembly.problem.first
-        write_candidates(count, candidate, model, tree, rows, first, assembly.leaf, jacobian)
+        write_candidates(
+            count, candidate, model, tree, rows, problem.first, directions.leaf, jacobian
+        )
         total = append_loops(count, 2, loops, assembly)
         if total == 0:
             return 0.0, strayed, 0.0
-        assemble_delassus(model, total, equations, assembly)
+        assemble_delassus(model, total, equations, directions, problem)
         size = list_unknowns(count, total, candidate, surface.friction, modes, held)
         worst = 0.0
         for i in range(size):
@@ -164,7 +166,7 @@ def project(
                 fastest = max(fastest, abs(speed))
         for i in range(size):
             phase.saddle.bias[i] = -system[i, size]
-        rank = solve_constraints(size, 0.0, assembly.problem.delassus, held)
+        rank = solve_constraints(size, 0.0, problem.delassus, held)
         along = q if positions else v
         if is_delicate(size, rank, system):
             move_by_saddle_point(
@@ -172,10 +174,10 @@ def project(
             )
         else:
             for i in range(2 * total):
-                assembly.answer.impulse[i] = 0.0
+                impulse[i] = 0.0
             for i in range(size):
-                assembly.answer.impulse[row[i]] = held.unknown[i]
-            add_impulse(model, assembly, total, equations, along)
+                impulse[row[i]] = held.unknown[i]
+            add_impulse(model, 2 * total, impulse, directions, equations, along)
         if not positions:
             return worst, strayed, fastest
     return math.inf, strayed, fastest

@@ -266,12 +266,13 @@ def corrected_mode(
     What closes goes on sliding as it did, by ``slide``, or sticks to begin with.
     """
     problem, normal, tangent = assembly.problem, 2 * place, 2 * place + 1
+    jacobian = assembly.directions.jacobian
     impulse, velocity = assembly.answer.impulse, assembly.answer.velocity
     mode = assembly.answer.mode[place]
-    across = PROVEN * data * unit_of(tangent, nv, assembly.jacobian, scale)
+    across = PROVEN * data * unit_of(tangent, nv, jacobian, scale)
     speed, limit = across, problem.bound[place]
     if problem.set[place] != INTERVAL:
-        speed = PROVEN * data * unit_of(normal, nv, assembly.jacobian, scale)
+        speed = PROVEN * data * unit_of(normal, nv, jacobian, scale)
         limit = problem.friction[place] * impulse[normal]
     force = (PROVEN * data) ** 2 / speed if speed > 0.0 else 0.0
     if mode == OPEN:
@@ -332,7 +333,7 @@ def is_proven(
     and no unknown is beyond all proportion to them.
     """
     nv = matrix.shape[0]
-    answer, jacobian = assembly.answer, assembly.jacobian
+    answer, jacobian = assembly.answer, assembly.directions.jacobian
     worst = 0.0
     largest = 0.0
     for i in range(nv):
@@ -362,12 +363,12 @@ def solve_by_saddle_point(
     Forces or impulses, velocities, modes and residuals go to ``assembly.answer``, the accelerations
     of the coordinates, or what the impulses change of their velocities, to ``saddle.unknown``.
     """
-    nv, scale = matrix.shape[0], saddle.scale
+    nv, scale, jacobian = matrix.shape[0], saddle.scale, assembly.directions.jacobian
     for _ in range(ROUNDS):
         size = solve_modes(
-            count, total, matrix, assembly.jacobian, assembly.problem, assembly.answer, held, saddle
+            count, total, matrix, jacobian, assembly.problem, assembly.answer, held, saddle
         )
-        data = size_of_data(total, nv, assembly.jacobian, saddle)
+        data = size_of_data(total, nv, jacobian, saddle)
         if not correct_modes(total, accelerations, nv, data, slide, scale, assembly):
             return is_proven(size, total, data, matrix, held.row, saddle, assembly)
     return False
@@ -442,7 +443,7 @@ def solve_contacts(
     face, bend = phase.modes.face, phase.modes.bend
     tree, matrix = memory.equations.tree, memory.equations.mass_matrix
     assembly, loops, rows = memory.assembly, memory.loops, memory.rows
-    candidate, jacobian, bias = assembly.candidate, assembly.jacobian, saddle.bias
+    candidate, jacobian, bias = assembly.candidate, assembly.directions.jacobian, saddle.bias
     friction, guess, tally = memory.surface.friction, memory.reaction.mode, memory.solver.tally
     total = count + rows_of(loops)
     saddle.used = 0
@@ -451,7 +452,10 @@ def solve_contacts(
             count, total, candidate, model, tree, rows, face, bend, loops.rows.bias, jacobian, bias
         )
         mass_matrix(model, tree, matrix)
-        pose_problem(count, total, True, friction, guess, rows, slide, loops.held, assembly)
+        pose_problem(
+            count, total, True, rows.set, friction, guess, slide, rows.latch_stop, loops.held,
+            assembly,
+        )  # fmt: skip
         for row in range(2 * total):
             assembly.answer.impulse[row] = 0.0
         if solve_by_saddle_point(count, total, True, matrix, slide, assembly, held, saddle):

@@ -31,15 +31,15 @@ def friction_limit(
 
 @kernel
 def watch_faces(
-    kind: int, model: Model, ground: GroundModel, tree: Workspace, v: Floats, rows: Rows,
+    kind: int, model: Model, cornered: bool, tree: Workspace, v: Floats, rows: Rows,
     closed: Integers, passing: Integers, slide: Integers, group: Integers, value: Floats,
     rate: Floats,
 ) -> None:  # fmt: skip
     """Event functions of the contact points on their first or their second faces.
 
     Second faces are there for points on the ground, with those that they could meet. That of a
-    point that is let pass below the ground is its depth. On ground with corners the second rate of
-    an open point bounds how fast it moves, or the centre of its disc.
+    point that is let pass below the ground is its depth. On ground with corners (it is `cornered`)
+    the second rate of an open point bounds how fast it moves, or the centre of its disc.
     """
     first = kind == POINT
     for entry in range(rows.first[kind], rows.end[kind]):
@@ -54,7 +54,7 @@ def watch_faces(
             side = 1.0 - 2.0 * passing[entry]
             value[2 * entry] = side * rows.gap[entry]
             rate[2 * entry] = side * normal
-            if first and has_corners(ground):
+            if first and cornered:
                 spin = tree.velocity[model.contact_link[point], 0]
                 rolls = abs(model.contact_radius[point] * spin)
                 rate[2 * entry + 1] = abs(normal) + abs(tangent) + rolls
@@ -64,16 +64,17 @@ def watch_faces(
 
 @kernel
 def watch_geometry(
-    model: Model, ground: GroundModel, tree: Workspace, v: Floats, rows: Rows, modes: Modes,
+    model: Model, ground: GroundModel, tree: Workspace, v: Floats, rows: Rows, watched: int,
+    closed: Integers, passing: Integers, slide: Integers, group: Integers, face: Integers,
     value: Floats, rate: Floats,
 ) -> None:  # fmt: skip
     """Event functions that need no forces: gaps of open points, speeds of what slides, corners."""
-    closed, passing, slide, group = modes.closed, modes.passing, modes.slide, modes.group
-    if has_corners(ground):
-        watch_corners(model, ground, rows, modes, value)
+    cornered = has_corners(ground)
+    if cornered:
+        watch_corners(model, ground, rows, watched, closed, face, value)
         if ground.concave == 1:
             watch_faces(
-                SECOND_FACE, model, ground, tree, v, rows, closed, passing, slide, group, value,
+                SECOND_FACE, model, cornered, tree, v, rows, closed, passing, slide, group, value,
                 rate,
             )  # fmt: skip
     for contact in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
@@ -88,7 +89,7 @@ def watch_geometry(
         if closed[entry] == 0:
             value[2 * entry] = rows.gap[entry]
             rate[2 * entry] = rate_of(rows.owner[entry], 0, v, rows.outside)
-    watch_faces(POINT, model, ground, tree, v, rows, closed, passing, slide, group, value, rate)
+    watch_faces(POINT, model, cornered, tree, v, rows, closed, passing, slide, group, value, rate)
 
 
 @dissolved_kernel
