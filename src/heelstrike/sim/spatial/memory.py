@@ -40,7 +40,7 @@ class SpatialTally(Bundle):
     uncertified: int = cell(int)
     relaxed: int = cell(int)
     """halved, uncertified, relaxed: Steps that were halved; that went on with a residual above the
-    tolerance; that were not asked to leave the ground."""
+    tolerance; that were not asked to leave the ground, or left their impact to the next."""
     penetration: float = cell(float)
     """Deepest penetration of a contact point (m)."""
     residual: float = cell(float)
