@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from live_humanoid import Shown, ask, go_on, humanoid, standing
 
 import heelstrike as hs
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
@@ -20,10 +20,6 @@ from heelstrike.sim.spatial.record import SpatialEventKind
 from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.view.live.session import Session
 from heelstrike.view.live.stage import GivenStage, Stage
-
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-
-from live_humanoid import Shown, ask, go_on, humanoid, standing
 
 
 @pytest.fixture(scope="module")
