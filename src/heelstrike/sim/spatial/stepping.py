@@ -74,7 +74,7 @@ BEARABLE = 1e-6
 LAST_EFFORT = 20000
 """Iterations of a contact problem that no part of a step could be certified without."""
 
-AT_ONCE = 1e-9
+NO_PART = 1e-9
 """Part of a step up to which a push that ends, or begins, within it does so where it ends: what is
 left is the rounding of times."""
 
@@ -105,7 +105,7 @@ def add_spatial_pushes(
     tree = equations.tree
     for i in range(pushes.link.shape[0]):
         acting = min(time + step, pushes.end[i]) - max(time, pushes.start[i])
-        if acting <= AT_ONCE * step:
+        if acting <= NO_PART * step:
             continue
         share = acting / step
         f = share * pushes.force[i, 0], share * pushes.force[i, 1], share * pushes.force[i, 2]
