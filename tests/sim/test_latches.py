@@ -249,7 +249,7 @@ def test_latches_go_through_files_and_mirrors(tmp_path: Path) -> None:
     [
         (("knee", "upper", None), "no joint 'knee' to latch"),
         (("hinge", "top", None), "is at an end, 'lower' or 'upper', not 'top'"),
-        (("free", "upper", None), "holds it at its upper limit, and it has none"),
+        (("free", "upper", None), "holds it at its upper limit: give the joint limits"),
         (("hinge", "upper", "foot"), "lets go by link 'foot', which there is not"),
     ],
 )

@@ -354,7 +354,7 @@ class RobotBuilder:
             )
         if not math.isfinite(self._links[place].numbers[end]):
             raise self._error(
-                f"the latch of joint {joint!r} holds it at its {end} limit, and it has none."
+                f"the latch of joint {joint!r} holds it at its {end} limit: give the joint limits."
             )
         if any(place == known for known, _, _ in self._latches):
             raise self._error(f"joint {joint!r} has a latch already.")

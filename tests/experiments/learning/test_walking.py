@@ -205,9 +205,9 @@ def test_lanes_are_commanded_with_as_many_numbers() -> None:
     state = robot.reference_state()
     batch = hs.Batch(robot, law, state=state, lanes=2)
     assert batch.command.shape == (2, robot.nu + 3)
-    with pytest.raises(hs.SimulationError, match="as many numbers"):
+    with pytest.raises(hs.SimulationError, match="equally many commands"):
         batch.lay(1, controller=hs.HeldTorque(robot))
-    with pytest.raises(hs.SimulationError, match="as many numbers"):
+    with pytest.raises(hs.SimulationError, match="equally many commands"):
         hs.Batch(robot, [law, hs.HeldTorque(robot)], state=state)
 
 

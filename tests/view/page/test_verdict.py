@@ -30,7 +30,8 @@ def test_a_walk_that_reaches_nothing() -> None:
     assert verdict.good
     assert verdict.headline.startswith("bravo7 walks: 2 steps, 0.")
     assert verdict.headline.endswith(
-        "Nothing has to change for this walk. No push and no slope was tried."
+        "Limits, falls and contact certificates were checked: nothing needs to change. "
+        "No push and no slope was tried."
     )
     push = Tried("largest push", "5 N s (not 6)")
     tried = judge(walking.walk(steps=2), walking.gait(), tried=[push])
@@ -144,7 +145,7 @@ def test_a_walk_without_reserve_is_told_so() -> None:
     verdict = judge(make_run(walking.bravo7(), [0.0, 0.1], force=force))
     assert verdict.good
     assert "friction of the right foot has no reserve at 0.1 s" in verdict.advice[0]
-    assert "Nothing has to change" not in verdict.headline
+    assert "nothing needs to change" not in verdict.headline
 
 
 def test_what_was_seen_to_work_comes_first() -> None:

@@ -702,7 +702,7 @@ def commanded_width(plans: Sequence[Plan], others: Sequence[int] = ()) -> int:
     found = {*others, *(int(getattr(law.parameters, law.commanded).size) for law in laws)}
     if len(found) > 1:
         raise SimulationError(
-            f"all lanes of a batch are commanded with as many numbers, got {sorted(found)}"
+            f"the controllers of all lanes must take equally many commands, got {sorted(found)}"
         )
     return found.pop() if found else plans[0].setting.robot.nu
 

@@ -307,8 +307,9 @@ class _Instant:
         orders = [order for each in permutations(self.fresh) if (order := self._in_order(each))]
         if not orders:
             raise SimulationError(
-                f"the impact at t = {self.time:.6g} s cannot be linearised: nothing comes down in "
-                "it, or of several points none after the other"
+                f"the impact at t = {self.time:.6g} s cannot be linearised: no point lands in it, "
+                "or several cannot land one after the other; hs.find_limit_cycle takes differences "
+                "instead"
             )
         return orders
 

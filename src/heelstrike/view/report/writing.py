@@ -26,7 +26,7 @@ from heelstrike.view.figures import FIGURES, plot
 from heelstrike.view.page.markup import data_block, document, escaped, grid, shipped, table
 from heelstrike.view.page.page import certificates, check_page, contents
 from heelstrike.view.page.provenance import provenance
-from heelstrike.view.page.verdict import Verdict, judge, told
+from heelstrike.view.page.verdict import NOTHING_TO_CHANGE, Verdict, judge, told
 from heelstrike.view.report.differences import differences
 from heelstrike.view.style import in_words, styled, view_errors
 from heelstrike.whole_file import write_whole
@@ -315,9 +315,9 @@ def _advice(verdicts: Mapping[str, Verdict]) -> Iterator[str]:
         label = f"<p>{escaped(name)}:</p>" if len(verdicts) > 1 else ""
         items = "".join(f"<li>{escaped(each)}</li>" for each in verdict.advice)
         nothing = (
-            "<p>Nothing has to change for this walk. What it withstands beyond it is below.</p>"
+            f"<p>{NOTHING_TO_CHANGE}. What the walk withstands is below.</p>"
             if verdict.good
-            else "<p>Nothing is known that would have to change.</p>"
+            else "<p>No change is known that would help.</p>"
         )
         yield label + (f"<ol>{items}</ol>" if items else nothing)
 
