@@ -44,7 +44,6 @@ class Case:
     """Phases of a motion; None for a gait on one flat foot."""
     asked: dict[str, Any] = field(default_factory=dict)
     law: Callable[..., Any] = hs.ComputedTorque
-    gains: dict[str, Any] = field(default_factory=dict)
 
 
 def rolling() -> list[Phase]:
@@ -65,6 +64,16 @@ def both_feet() -> list[Phase]:
     ]
 
 
+def whole_step() -> list[Phase]:
+    """Heel strike and rolling flat, both while the rear foot stands on its toe; flat; toe-off."""
+    return [
+        Phase("left_foot_toe", HEEL, duration=(0.04, 0.2), pieces=2),
+        Phase("left_foot_toe", FLAT, duration=(0.04, 0.2), pieces=2),
+        Phase(FLAT, duration=(0.2, 0.6), pieces=4),
+        Phase(TOE, duration=(0.05, 0.3), pieces=3),
+    ]
+
+
 def running(stance: str, least: tuple[float, float]) -> Callable[[], list[Phase]]:
     """Stance on a point, then flight, each of a least duration."""
     return lambda: [
@@ -73,13 +82,23 @@ def running(stance: str, least: tuple[float, float]) -> Callable[[], list[Phase]
     ]
 
 
+LONG_TREADS = {"step_length": 0.35, "step_duration": 0.80, "clearance": 0.02}
 STEP = {"step_length": 0.30, "step_duration": 0.70}
 TOE_STEP = {"distance": 0.30, "duration": 0.70}
+WHOLE_STEP = {"distance": 0.30, "duration": 0.80, "clearance": 0.02, "starts": 1}
 CASES = {
     "flat": Case("bravo7", lambda: [Phase(FLAT, duration=0.7)], {"distance": 0.30}),
     "toe": Case("bravo7", lambda: rolling()[1:], TOE_STEP),
     "heel, flat, toe": Case("bravo7", rolling, TOE_STEP | {"clearance": 0.02}),
     "double support": Case("bravo7", both_feet, {"distance": 0.30, "duration": 0.80}),
+    "heel, flat, toe, faster": Case(
+        "bravo7", rolling, TOE_STEP | {"clearance": 0.02, "landing_speed": 0.1}, hs.MotionLQR
+    ),
+    "heel, flat, toe, human7": Case(
+        "human7", rolling, {"distance": 0.40, "duration": 0.70, "clearance": 0.02}
+    ),
+    "whole step": Case("bravo7", whole_step, WHOLE_STEP),
+    "whole step, human7": Case("human7", whole_step, WHOLE_STEP | {"distance": 0.40}),
     "run": Case("rabbit", running("right_tibia", (0.05, 0.05)), {"speed": 2.0}, hs.MotionLQR),
     "run fast": Case("bravo7", running(TOE, (0.15, 0.1)), {"speed": 2.2}, hs.MotionLQR),
     "run, walker2d": Case("walker2d", running(TOE, (0.05, 0.05)), {"speed": 2.0}, hs.MotionLQR),
@@ -101,7 +120,7 @@ CASES = {
         "up 8 degrees": {"slope": np.deg2rad(8.0)},
         "down 8 degrees": {"slope": np.deg2rad(-8.0)},
         "upstairs": {"rise": 0.10},
-        "downstairs": {"rise": -0.10},
+        "downstairs": {"rise": -0.10, **LONG_TREADS},
     }.items()
 }
 
@@ -176,7 +195,10 @@ def row(name: str, steps: int, film: Path | None) -> str:
     case = CASES[name]
     robot_of(case.robot)
     begin = time.process_time()
-    walk = designed(case)
+    try:
+        walk = designed(case)
+    except hs.GaitError as error:
+        return f"| {name} | {case.robot} | not found: {str(error)[:300]} |"
     spent = time.process_time() - begin
     law = case.law(robot_of(case.robot), walk)
     largest = abs(law.multipliers[0]) if isinstance(law, hs.MotionLQR) else float("nan")

@@ -23,7 +23,7 @@ from heelstrike.sim.controller.interface import Contacts
 EARLIEST = 0.5
 """Share of a phase before which a touchdown does not end it: the foot scuffs."""
 SLOWLY = 0.02
-"""A foot that rolls onto other points of its own more slowly than this (m/s) may be late."""
+"""What comes down more slowly than this (m/s) does so earlier or later by any small error."""
 LATEST = 1.1
 """Share of a phase until which its polynomials go on if no touchdown ends it."""
 

@@ -10,6 +10,7 @@ import pytest
 import walking
 
 import heelstrike as hs
+from heelstrike import dynamics
 
 SPEED = 2.0
 
@@ -109,6 +110,38 @@ def test_on_flat_feet_it_is_the_regulator_of_the_joints() -> None:
     np.testing.assert_allclose(
         np.abs(whole.multipliers[:4]), np.abs(joints.multipliers[:4]), atol=2e-3
     )
+
+
+def crouched(depth: float) -> hs.State:
+    """Standing still on both feet, the hip lower by so much (m)."""
+    robot = walking.bravo7()
+    q = robot.reference_state().q.copy()
+    q[1] -= depth
+    for foot in robot.feet:
+        q = dynamics.inverse_kinematics(robot, q, foot.name, (0.0, 0.0, 0.0)).q
+    return hs.State(q, np.zeros(robot.nv))
+
+
+@pytest.mark.slow
+def test_it_stands_up_on_two_feet_though_pushed() -> None:
+    """A motion that never repeats has gains until its end, and both feet bear the robot."""
+    robot = walking.bravo7()
+    both = hs.ContactPhase("right_foot", "left_foot", duration=0.6, pieces=4)
+    rising = hs.optimize_motion(
+        robot, [both], repeat="never", start=crouched(0.15), end=crouched(0.05), starts=1
+    )
+    law = hs.MotionLQR(robot, rising)
+    assert law.multipliers.size == 0
+    push = hs.Push("trunk", force=(20.0, 0.0), start=0.05, duration=0.1)  # 2 N s
+    ended = [
+        hs.simulate(
+            robot, law, state=rising.initial_state, duration=0.6, method=hs.EventDriven(),
+            pushes=pushes,
+        ).final_state.vector
+        for pushes in ((), push)
+    ]  # fmt: skip
+    np.testing.assert_allclose(ended[0], crouched(0.05).vector, atol=1e-4)
+    np.testing.assert_allclose(ended[1], ended[0], atol=5e-3)
 
 
 def test_what_it_refuses() -> None:

@@ -24,7 +24,12 @@ import numpy as np
 from heelstrike.contact import ActiveContacts, Ground, linearize_contact
 from heelstrike.contact.linearized.slopes import contact_slopes, exchanged
 from heelstrike.contact.linearized.strikes import strikes
-from heelstrike.control.followed_motion import arrival_speeds, mirrored_phase, points_of_phase
+from heelstrike.control.followed_motion import (
+    SLOWLY,
+    arrival_speeds,
+    mirrored_phase,
+    points_of_phase,
+)
 from heelstrike.control.gait_lqr.riccati import over_all_steps, swept_back
 from heelstrike.control.zero_order_hold import over_an_interval
 from heelstrike.dynamics import contact_jacobian, inverse_dynamics, passive_force
@@ -39,9 +44,6 @@ INSTANTS = 24
 WIDTH, FEWEST = 1e-3, 16
 """Longest interval (s) in which gains stay, for the Riccati equation, and how many a phase has at
 the least."""
-TOUCHES = 0.02
-"""A point must come down at this speed (m/s) at the least: of what comes down slowly errors decide
-when, and the linear equations say nothing of it."""
 TOGETHER = 3
 """Contact points that may come down in one instant, in any order."""
 
@@ -164,10 +166,10 @@ class PhasedOrbit:
         return np.asarray(np.mean(found, axis=0))
 
     def _check_touchdown(self, p: int, fresh: list[int]) -> None:
-        """Refuse touchdowns that errors have no derivative at."""
+        """Refuse touchdowns at which errors have no derivative: they decide when it happens."""
         speeds = arrival_speeds(self.robot, self.motion.slope, self.motion.phases[p])
         slowest = min(fresh, key=lambda i: float(speeds[i]))
-        if speeds[slowest] < TOUCHES:
+        if speeds[slowest] < SLOWLY:
             raise ControllerError(
                 f"{self.robot.contact_names[slowest]!r} comes down at {speeds[slowest]:.2g} m/s at "
                 f"the end of phase {p + 1}: of what comes down slowly small errors decide when. "

@@ -21,6 +21,7 @@ from heelstrike.errors import GaitError
 from heelstrike.gait.gait import Footing, Gait, fingerprint
 from heelstrike.gait.motion.motion import Motion, MotionPhase
 from heelstrike.gait.motion.phases import Standing, standing
+from heelstrike.gait.motion.program import STAGES
 from heelstrike.gait.motion.request import Repeat
 from heelstrike.gait.polynomials import gauss
 from heelstrike.gait.sole import Sole, sole
@@ -32,8 +33,6 @@ DEGREE = 7
 """Degree of the polynomials."""
 SHORT = 0.03
 """Longest piece (s)."""
-STAGES = 4
-"""Gauss points of a piece at which forces are found."""
 
 
 def motion_of_gait(robot: Robot, gait: Gait) -> Motion:

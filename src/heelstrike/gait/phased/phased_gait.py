@@ -188,8 +188,10 @@ class PhasedGait:
                     "from_gait(robot, gait)"
                 )
         check_robot(robot)
-        course = _course_of_motion if isinstance(gait, Motion) else _course_of_gait
-        stance_foot, duration, at = course(robot, gait)
+        if isinstance(gait, Motion):
+            stance_foot, duration, at = _course_of_motion(robot, gait)
+        else:
+            stance_foot, duration, at = _course_of_gait(robot, gait)
         if not (isinstance(degree, (int, np.integer)) and degree >= 3):
             raise GaitError(
                 f"degree must be a whole number, 3 or more to meet both ends of a step; got "
