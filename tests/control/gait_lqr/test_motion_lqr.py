@@ -112,6 +112,19 @@ def test_on_flat_feet_it_is_the_regulator_of_the_joints() -> None:
     )
 
 
+@pytest.mark.slow
+def test_it_runs_on_after_a_step_up() -> None:
+    """Heights count from where it came down last."""
+    step_up = hs.Ground(
+        friction=running().friction, profile=[(-2.0, 0.0), (3.0, 0.0), (3.0, 0.004), (50.0, 0.004)]
+    )
+    found = run(25.0, ground=step_up)
+    assert found.completed, found.message
+    higher = landed(found) - landed(run(25.0))
+    np.testing.assert_allclose(higher[0], 0.004, atol=1e-4)
+    np.testing.assert_allclose(higher[1:], 0.0, atol=1e-3)
+
+
 def crouched(depth: float) -> hs.State:
     """Standing still on both feet, the hip lower by so much (m)."""
     robot = walking.bravo7()
