@@ -29,7 +29,7 @@ def must_be(kind: type, name: str, value: object) -> None:
         raise ControllerError(refusal(name, value, (kind.__name__,)))
 
 
-def check_gait(robot: Robot, gait: object) -> None:
+def check_gait(robot: Robot, gait: Gait | Motion) -> None:
     """Refuse a gait of another robot.
 
     A robot with other numbers than the gait was designed for will do, as long as it is called the

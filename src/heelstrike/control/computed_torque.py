@@ -234,6 +234,8 @@ class ComputedTorque(Law):
     ------
     ControllerError
         If the robot cannot be controlled this way, or gait or gains do not fit it.
+    GaitError
+        If a motion was designed for another robot.
     """
 
     def __init__(
