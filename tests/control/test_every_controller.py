@@ -41,10 +41,8 @@ def on_points(make: Callable[..., Law]) -> tuple[hs.Robot, hs.State, Law]:
 
 
 def in_phases(make: Callable[..., Law]) -> tuple[hs.Robot, hs.State, Law]:
-    robot = phased().robot
-    run = [hs.ContactPhase("right_tibia", duration=0.2, pieces=4), hs.ContactPhase(duration=0.15)]
-    motion = hs.optimize_motion(robot, run, speed=2.0, starts=1)
-    return robot, motion.initial_state, make(robot, motion)
+    robot, gait = walking.bravo7(), walking.gait()
+    return robot, gait.initial_state, make(robot, gait.motion(robot))
 
 
 def standing(make: Callable[..., Law]) -> tuple[hs.Robot, hs.State, Law]:
