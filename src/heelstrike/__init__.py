@@ -82,6 +82,7 @@ if TYPE_CHECKING:
     from heelstrike.control import GaitLQR as GaitLQR
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
+    from heelstrike.control import MotionLQR as MotionLQR
     from heelstrike.control import MotionTracking as MotionTracking
     from heelstrike.control import Policy as Policy
     from heelstrike.control import Sensed as Sensed
@@ -224,6 +225,7 @@ _HOME = {
     "ModeChange": "heelstrike.sim.linearized.mode_changes",
     "Monodromy": "heelstrike.analysis.stability.monodromy",
     "Motion": "heelstrike.gait",
+    "MotionLQR": "heelstrike.control",
     "MotionTracking": "heelstrike.control",
     "PhasedGait": "heelstrike.gait",
     "Planner": "heelstrike.gait",

@@ -129,7 +129,7 @@ def margins_of(program: Program, unknowns: Floats) -> Margins:
         np.array(part).ravel() for part in transcription.landing(*end[:3], ground)
     )
     touchdown = np.array(transcription.touchdown(*end, ground)).ravel()
-    groups = np.array([row.group for row in transcription.touchdown_rows])
+    groups = np.array([row.kind for row in transcription.touchdown_rows])
     placed = (groups == Group.TOUCHDOWN_PLACE) | (groups == Group.TOUCHDOWN_ANGLE)
     periodic = (groups == Group.IMPACT) | (groups == Group.PERIODIC)
     return Margins(

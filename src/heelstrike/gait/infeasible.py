@@ -61,12 +61,12 @@ def _worst_violations(program: Program, unknowns: Floats) -> dict[Group, str]:
     violations = np.abs(program.violations(unknowns))
     worst: dict[Group, tuple[float, str]] = {}
     for (row, phase), violation in zip(program.labelled_rows(), violations, strict=True):
-        if violation <= FEASIBLE or violation <= worst.get(row.group, (0.0, ""))[0]:
+        if violation <= FEASIBLE or violation <= worst.get(row.kind, (0.0, ""))[0]:
             continue
         subject = f" ({row.subject})" if row.subject else ""
         when = "" if phase is None else f" at {100.0 * phase:.0f} % of the step"
-        amount = f"{violation * row.scale:.3g} {row.group.unit}"
-        worst[row.group] = (violation, f"{row.group.text}{subject} by {amount}{when}")
+        amount = f"{violation * row.unit:.3g} {row.kind.unit}"
+        worst[row.kind] = (violation, f"{row.kind.text}{subject} by {amount}{when}")
     ordered = sorted(worst.items(), key=lambda item: -item[1][0])
     return {group: text for group, (_, text) in ordered}
 
@@ -77,7 +77,7 @@ def _binding_groups(program: Program, nearest: Solution, violated: set[Group]) -
     rows = program.labelled_rows()
     for (row, _), multiplier in zip(rows, nearest.multipliers[-len(rows) :], strict=True):
         if row.lower < row.upper:
-            strength[row.group] = max(strength.get(row.group, 0.0), abs(float(multiplier)))
+            strength[row.kind] = max(strength.get(row.kind, 0.0), abs(float(multiplier)))
     ordered = sorted(strength, key=lambda group: -strength[group])
     return [
         group.text for group in ordered if strength[group] > TAKES_PART and group not in violated

@@ -16,8 +16,9 @@ from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.polynomials import Instants, coefficients, gauss, lobatto
 from heelstrike.gait.request import Request
+from heelstrike.gait.rows import Row
 from heelstrike.gait.starts import Start, typical_step
-from heelstrike.gait.transcription import Group, Row, Transcription
+from heelstrike.gait.transcription import Group, Transcription
 from heelstrike.interruption import deferred_interrupts
 from heelstrike.robot.model import Floats
 
@@ -153,7 +154,7 @@ class Program:
         lower = np.array([[row.lower] for row in rows]).repeat(instants.share.size, axis=1)
         upper = np.array([[row.upper] for row in rows]).repeat(instants.share.size, axis=1)
         for k, row in enumerate(rows):
-            if row.group is Group.CLEARANCE:
+            if row.kind is Group.CLEARANCE:
                 lower[k] = self.clearance(instants)
             if row.lower == row.upper:
                 lower[k, instants.weight == 0.0] = -np.inf
