@@ -3,12 +3,12 @@
 Run, from the top folder::
 
     python benchmarks/motion_kinds.py                # all of them
-    python benchmarks/motion_kinds.py running limp   # some of them
+    python benchmarks/motion_kinds.py toe limp       # some of them
 
 Each is designed by `hs.optimize_motion` and written to `tests/gait/motion/kinds`, where the tests
-look at it with MuJoCo's equations of motion. It closes if its torques over time, from its initial
-state, bring the robot to where the motion goes on, to 1e-8 (m, rad, m/s, rad/s): pieces are doubled
-until then. The table has the time of the processor for the first design and for all of it.
+look at it with MuJoCo's equations of motion. It closes if computed torque, from its initial state,
+brings the robot to where the motion goes on, to 3e-9 (m, rad, m/s, rad/s): pieces are doubled until
+then. The table has the time of the processor for the first design and for all of it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ from heelstrike import ContactPhase as Phase
 from heelstrike import dynamics
 
 FOLDER = Path(__file__).parents[1] / "tests" / "gait" / "motion" / "kinds"
-CLOSED = 1e-8
+CLOSED = 3e-9
+"""A third of what the tests allow: another processor rounds otherwise."""
 MOST_PIECES = 48
 STEP = {"distance": 0.30, "duration": 0.70}
 
@@ -75,54 +76,24 @@ def geared() -> hs.Robot:
 
 
 def round_feet() -> hs.Robot:
-    """rabbit on discs of 5 cm, which roll."""
+    """Return rabbit on discs of 5 cm, which roll."""
     robot = hs.load_robot("rabbit")
     return replace(robot, model=robot.model.replaced(contact_radius=np.full(robot.nc, 0.05)))
 
 
-def crouched(robot: hs.Robot, knee: float, feet: tuple[float, float] = (0.0, 0.0)) -> hs.State:
-    """bravo7 at rest on flat feet with soles at places along the ground, on bent knees."""
+def crouched(robot: hs.Robot, knee: float) -> hs.State:
+    """bravo7 at rest on both flat feet, on bent knees."""
     q = robot.reference_state().q.copy()
     for side in ("right", "left"):
         for name, angle in (("hip", -0.5 * knee), ("knee", knee), ("ankle", -0.5 * knee)):
             q[robot.joint_names.index(f"{side}_{name}")] += angle
     q[:2] -= dynamics.contact_positions(robot, q).mean(axis=0)
-    q[0] += np.mean(feet)
-    for foot, place in enumerate(feet):
-        q = dynamics.inverse_kinematics(robot, q, foot, (place, 0.0, 0.0)).q
     return hs.State(q, np.zeros(robot.nv))
 
 
-def flat_walk(robot: hs.Robot) -> hs.Motion:
-    """Return the walk on flat feet, which starts lead to and stops begin with."""
-    return hs.optimize_motion(robot, KINDS["single support"].phases, **STEP)
-
-
-def starting(robot: hs.Robot) -> dict[str, Any]:
-    """From standing to the end of the first step of the walk."""
-    walk = flat_walk(robot)
-    q, v = (walk.phases[-1].coordinates(walk.duration, order=order) for order in range(2))
-    stands = dynamics.contact_positions(robot, q)[list(robot.feet[0].contacts), 0].mean()
-    start = crouched(robot, 0.5, (stands, stands))
-    return {"repeat": "never", "start": start, "end": hs.State(q, v)}
-
-
-def stopping(robot: hs.Robot) -> dict[str, Any]:
-    """From the beginning of a step of the walk to standing."""
-    begin = flat_walk(robot).initial_state
-    at = dynamics.contact_positions(robot, begin.q)[list(robot.feet[0].contacts), 0].mean()
-    return {"repeat": "never", "start": begin, "end": crouched(robot, 0.5, (at, at))}
-
-
 def rising(robot: hs.Robot) -> dict[str, Any]:
-    """From deeply bent knees to nearly straight ones."""
-    return {"repeat": "never", "start": crouched(robot, 1.6), "end": crouched(robot, 0.3)}
-
-
-def stepping_over(robot: hs.Robot) -> dict[str, Any]:
-    """From standing, with one foot over what is 0.15 m high."""
-    end = crouched(robot, 0.8, (0.0, 0.4))
-    return {"repeat": "never", "start": crouched(robot, 0.8), "end": end, "clearance": 0.15}
+    """From deeply bent knees to less bent ones: on straight legs, two feet are singular."""
+    return {"repeat": "never", "start": crouched(robot, 1.6), "end": crouched(robot, 0.5)}
 
 
 def of_user(now: hs.gait.Instant) -> Any:
@@ -133,46 +104,11 @@ def of_user(now: hs.gait.Instant) -> Any:
 BRAVO7, RABBIT = of_library("bravo7"), of_library("rabbit")
 FLAT = (Phase("right_foot", duration=0.7),)
 TOE = Phase("right_foot_toe", duration=(0.05, 0.3), pieces=3)
-BOTH = Phase("right_foot", "left_foot", duration=(0.3, 1.0), pieces=4)
 KINDS = {
     "single support": Kind(BRAVO7, FLAT, STEP),
     "uphill": Kind(BRAVO7, FLAT, {**STEP, "slope": np.deg2rad(8.0)}),
     "downhill": Kind(BRAVO7, FLAT, {**STEP, "slope": np.deg2rad(-8.0)}),
     "toe": Kind(BRAVO7, (Phase("right_foot", duration=(0.3, 0.6)), TOE), STEP),
-    "heel, flat, toe": Kind(
-        BRAVO7,
-        (
-            Phase("right_foot_heel", duration=(0.03, 0.2), pieces=2),
-            Phase("right_foot", duration=(0.2, 0.6), pieces=4),
-            TOE,
-        ),
-        {**STEP, "clearance": 0.02},
-    ),
-    "double support": Kind(
-        BRAVO7,
-        (
-            Phase("left_foot_toe", "right_foot", duration=(0.08, 0.3), pieces=3),
-            Phase("right_foot", duration=(0.2, 0.6)),
-            TOE,
-        ),
-        {"distance": 0.30, "duration": 0.80},
-    ),
-    "running": Kind(
-        RABBIT,
-        (
-            Phase("right_tibia", duration=(0.05, 0.3), pieces=4),
-            Phase(duration=(0.05, 0.3), pieces=3),
-        ),
-        {"speed": 2.0},
-    ),
-    "running on flat feet": Kind(
-        BRAVO7,
-        (
-            Phase("right_foot", duration=(0.05, 0.3), pieces=4),
-            Phase(duration=(0.08, 0.3), pieces=3),
-        ),
-        {"speed": 2.0},
-    ),
     "rolling": Kind(round_feet, (Phase("right_tibia", duration=0.6),), {"distance": 0.25}),
     "limp": Kind(
         RABBIT,
@@ -182,16 +118,11 @@ KINDS = {
         ),
         {"distance": 0.5, "duration": 1.0, "repeat": "same"},
     ),
-    "standing up": Kind(BRAVO7, (BOTH,), rising),
-    "starting": Kind(BRAVO7, (BOTH, Phase("right_foot", duration=(0.3, 0.9))), starting),
-    "stopping": Kind(BRAVO7, (Phase("right_foot", duration=(0.3, 0.9)), BOTH), stopping),
-    "stepping over": Kind(
-        BRAVO7, (BOTH, Phase("right_foot", duration=(0.4, 1.2)), BOTH), stepping_over
+    "standing up": Kind(
+        BRAVO7, (Phase("right_foot", "left_foot", duration=0.6, pieces=4),), rising
     ),
     "springs": Kind(sprung, FLAT, STEP),
-    "mechanical energy": Kind(BRAVO7, FLAT, {**STEP, "cost": "mechanical_energy"}),
     "electrical energy": Kind(geared, FLAT, {**STEP, "cost": "electrical_energy"}),
-    "weighted": Kind(BRAVO7, FLAT, {**STEP, "cost": {"torque": 1.0, "mechanical_energy": 10.0}}),
     "user's cost": Kind(BRAVO7, FLAT, {**STEP, "cost": of_user}),
 }
 
@@ -238,7 +169,7 @@ def designed(name: str) -> str:
             Phase(*each.contacts, duration=each.duration, pieces=count)
             for each, count in zip(kind.phases, pieces, strict=True)
         ]
-        motion = hs.optimize_motion(robot, finer, **asked, warm_start=motion)
+        motion = hs.optimize_motion(robot, finer, **asked, warm_start=motion, refine=False)
     keep(motion, file_of(name))
     spent = time.process_time() - begin
     counts = " + ".join(str(len(each.pieces)) for each in motion.phases)

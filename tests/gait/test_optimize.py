@@ -346,7 +346,7 @@ SMOOTH = {"step_length": 0.3, "step_duration": 0.70, "clearance_profile": "smoot
 def test_infeasible_requests_name_the_constraints_in_conflict(
     bravo7: hs.Robot, request_: dict[str, Any], named: list[str]
 ) -> None:
-    with pytest.raises(hs.GaitNotFoundError, match="not prove .* violates") as caught:
+    with pytest.raises(hs.GaitNotFoundError, match=r"not prove .* violates") as caught:
         hs.optimize_gait(bravo7, **request_, starts=1)
     message = str(caught.value)
     assert "bravo7" in message

@@ -50,8 +50,8 @@ def _message(program: Program, nearest: Solution) -> str:
         duration, length = nearest.unknowns[-2:]
         step = f", with steps of {length:.3g} m in {duration:.3g} s,"
     return (
-        f"robot {request.robot.name!r}: no gait with {request} was found, which does not prove that "
-        f"there is none. The nearest to one{step} violates: "
+        f"robot {request.robot.name!r}: no gait with {request} was found, which does not prove "
+        f"that there is none. The nearest to one{step} violates: "
         f"{some_of(list(violated.values()), NAMED, '; ')}.{against} Ask for a shorter or slower "
         "step, or relax one of these constraints."
     )
