@@ -97,6 +97,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
     from heelstrike.errors import GaitError as GaitError
+    from heelstrike.errors import GaitNotFoundError as GaitNotFoundError
     from heelstrike.errors import HeelstrikeError as HeelstrikeError
     from heelstrike.errors import InfeasibleGaitError as InfeasibleGaitError
     from heelstrike.errors import LimitCycleError as LimitCycleError
@@ -207,6 +208,7 @@ _HOME = {
     "GaitError": "heelstrike.errors",
     "GaitFamily": "heelstrike.gait",
     "GaitLQR": "heelstrike.control",
+    "GaitNotFoundError": "heelstrike.errors",
     "Gradient": "heelstrike.sim.linearized.derivatives",
     "Ground": "heelstrike.contact",
     "GroundShape": "heelstrike.contact",

@@ -1,4 +1,4 @@
-"""Why there is no gait: the constraints in conflict, and by how much."""
+"""Why no gait was found: the constraints in conflict, and by how much."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from itertools import islice
 
 import numpy as np
 
-from heelstrike.errors import InfeasibleGaitError
+from heelstrike.errors import GaitNotFoundError
 from heelstrike.gait.program import FEASIBLE, Program, Solution
 from heelstrike.gait.starts import starts
 from heelstrike.gait.transcription import Group
@@ -27,8 +27,8 @@ def nearest_to_feasible(program: Program) -> Floats:
 
     Raises
     ------
-    InfeasibleGaitError
-        If some violation always remains; the message names the constraints in conflict.
+    GaitNotFoundError
+        If some violation remains; the message names the constraints in conflict.
     """
     elastic = replace(program, elastic=True, near=False)
     found = []
@@ -37,7 +37,7 @@ def nearest_to_feasible(program: Program) -> Floats:
         if np.abs(program.violations(found[-1].unknowns)).max() <= FEASIBLE:
             return found[-1].unknowns
     nearest = min(found, key=lambda solution: solution.objective)
-    raise InfeasibleGaitError(_message(program, nearest))
+    raise GaitNotFoundError(_message(program, nearest))
 
 
 def _message(program: Program, nearest: Solution) -> str:
@@ -50,9 +50,10 @@ def _message(program: Program, nearest: Solution) -> str:
         duration, length = nearest.unknowns[-2:]
         step = f", with steps of {length:.3g} m in {duration:.3g} s,"
     return (
-        f"robot {request.robot.name!r}: no gait with {request} was found. The nearest to one{step} "
-        f"violates: {some_of(list(violated.values()), NAMED, '; ')}.{against} Ask for a shorter or "
-        "slower step, or relax one of these constraints."
+        f"robot {request.robot.name!r}: no gait with {request} was found, which does not prove "
+        f"that there is none. The nearest to one{step} violates: "
+        f"{some_of(list(violated.values()), NAMED, '; ')}.{against} Ask for a shorter or slower "
+        "step, or relax one of these constraints."
     )
 
 

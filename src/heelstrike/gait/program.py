@@ -60,6 +60,9 @@ NEAR = SETTINGS | {
     },
 }  # fmt: skip
 """Settings of IPOPT, and those for a start that is nearly an optimum."""
+INSIDE = SETTINGS | {"mu_strategy": "adaptive", "max_iter": 2 * MOST_ITERATIONS}
+"""Those for a start that satisfies all constraints where others led nowhere. The barrier follows
+the problem: an optimum that 100 iterations with a falling one missed takes 20."""
 
 
 def first_instants(request: Request) -> tuple[int, Instants]:
@@ -127,6 +130,8 @@ class Program:
     weight; the others only carry inequalities."""
     near: bool = False
     """Whether guesses are nearly optima."""
+    inside: bool = False
+    """Whether guesses satisfy all constraints."""
     elastic: bool = False
     """Let every constraint be violated and minimise the sum of the scaled violations instead of the
     effort: shows which constraints are in conflict when there is no solution."""
@@ -269,7 +274,7 @@ class Program:
             x = casadi.vertcat(x, excess)
         self._solver = Ipopt(
             x, f, g, gradient=slope, jacobian=slopes, hessian=(price, prices, bend),
-            settings=NEAR if self.near else SETTINGS,
+            settings=NEAR if self.near else INSIDE if self.inside else SETTINGS,
         )  # fmt: skip
 
     def _of_blocks(self, x: Any) -> BlockProgram:

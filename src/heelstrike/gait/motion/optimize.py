@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.arguments import are_numbers, shown, takes
 from heelstrike.dynamics import contact_jacobian, contact_positions
-from heelstrike.errors import GaitError, InfeasibleGaitError
+from heelstrike.errors import GaitError, GaitNotFoundError
 from heelstrike.gait.cost import Cost, OwnCost, costs_of
 from heelstrike.gait.gait import fingerprint
 from heelstrike.gait.motion.guess import guess_of
@@ -137,7 +137,7 @@ def optimize_motion(
     ------
     GaitError
         If the robot cannot move this way or an argument makes no sense.
-    InfeasibleGaitError
+    GaitNotFoundError
         If no motion was found; the message names the constraints that are violated most.
 
     Examples
@@ -350,7 +350,7 @@ def _solved(
         report(0.1 + 0.6 * (k + 1) / starts)
     if feasible is not None:
         return feasible, False
-    raise InfeasibleGaitError(_not_found(program, nearest))
+    raise GaitNotFoundError(_not_found(program, nearest))
 
 
 def _not_found(program: MotionProgram, unknowns: Floats) -> str:
@@ -390,7 +390,7 @@ def _refined(
         )  # fmt: skip
         found, _, told = finer.solve(_resampled(program, unknowns, finer))
         if np.abs(finer.violations(found)).max() > FEASIBLE:
-            raise InfeasibleGaitError(_not_found(finer, found))
+            raise GaitNotFoundError(_not_found(finer, found))
         program, unknowns, optimal = finer, found, told["return_status"] == "Solve_Succeeded"
 
 
@@ -486,7 +486,7 @@ def _held_between(
         program = replace(program, grids=tuple(grids), near=True)
         found, _, told = program.solve(unknowns)
         if np.abs(program.violations(found)).max() > FEASIBLE:
-            raise InfeasibleGaitError(_not_found(program, found))
+            raise GaitNotFoundError(_not_found(program, found))
         unknowns, optimal = found, told["return_status"] == "Solve_Succeeded"
     return program, unknowns, optimal
 

@@ -32,9 +32,9 @@ EQUATIONS = {
 }  # fmt: skip
 """Kinds of constraint along the path that are equations."""
 MORE_ITERATIONS = {"max_iter": 300}
-BEGIN = {"mu_init": 1e-2}
-"""Settings of IPOPT: phases of free duration take more iterations than a step, and fewer from this
-barrier parameter than from IPOPT's own 0.1."""
+ADAPTIVE = {"mu_strategy": "adaptive"}
+"""Settings of IPOPT: phases of free duration take more iterations than a step. With a barrier that
+follows the problem, least energies are found, too; one that only falls misses them."""
 FROM_STOPS = 1e-3
 """Distance (rad, m) that joints keep from their stops: a robot that follows a motion nearly is not
 to hit them."""
@@ -294,7 +294,7 @@ class MotionProgram:
         self._solver = Ipopt(
             x, f, g[rows], gradient=blocks.gradient(x), jacobian=slopes,
             hessian=(price, prices, blocks.hessian(x, price, all_prices)),
-            settings=NEAR | MORE_ITERATIONS if self.near else SETTINGS | MORE_ITERATIONS | BEGIN,
+            settings=NEAR | MORE_ITERATIONS if self.near else SETTINGS | MORE_ITERATIONS | ADAPTIVE,
         )  # fmt: skip
 
     def _gaps(self, phases: list[PhaseUnknowns]) -> list[Any]:
