@@ -137,7 +137,7 @@ class Fitting:
                 part *= 0.5  # too far: a shorter step from where it began
             else:
                 least, part = away, 1.0
-                covariance = np.linalg.inv(matrix)
+                covariance = np.asarray(np.linalg.inv(matrix), np.float64)
                 step = -covariance @ right
                 deviation = np.sqrt(np.diag(covariance))
                 if np.all(np.abs(step) <= SETTLED_FIT * deviation):
@@ -351,7 +351,8 @@ class _System:
 
     def eliminated(self) -> tuple[Floats, Floats, Floats, Floats]:
         """Return how coefficients follow, and normal equations of the parameters alone."""
-        found = np.linalg.solve(self._inner, np.column_stack([self._lacks, self._outer]))
+        right = np.column_stack([self._lacks, self._outer])
+        found = np.asarray(np.linalg.solve(self._inner, right), np.float64)
         answer, coupling = found[:, 0], found[:, 1:]
         return (
             answer, coupling, self._corner - self._outer.T @ coupling,

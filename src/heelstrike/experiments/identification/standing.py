@@ -99,12 +99,14 @@ def heights(equations: Equations, joints: Floats, foot: int) -> Floats:
     return found - lowest[:, None]
 
 
-def _stands(equations: Equations, log: RobotLog, foot: int, force_noise: float) -> Floats:
+def _stands(
+    equations: Equations, log: RobotLog, foot: int, force_noise: float
+) -> NDArray[np.bool_]:
     """When the robot stands flat on one foot alone."""
     robot = equations.robot
     above = heights(equations, log.joints, foot)
     others = [i for i in range(robot.nc) if i not in equations.soles[foot].contacts]
-    alone: Floats = above[:, others].min(axis=1) > LIFTED
+    alone: NDArray[np.bool_] = above[:, others].min(axis=1) > LIFTED
     if log.force is not None:
         own = list(robot.feet[foot].contacts)
         least = PRESSED * force_noise
@@ -114,7 +116,7 @@ def _stands(equations: Equations, log: RobotLog, foot: int, force_noise: float) 
     return alone
 
 
-def _runs(time: Floats, stands: Floats, foot: int) -> Iterator[Piece]:
+def _runs(time: Floats, stands: NDArray[np.bool_], foot: int) -> Iterator[Piece]:
     """Yield pieces that are long enough, without their edges."""
     changes = np.flatnonzero(np.diff(stands.astype(int))) + 1
     for rows in np.split(np.arange(len(time)), changes):
