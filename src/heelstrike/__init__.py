@@ -110,6 +110,7 @@ if TYPE_CHECKING:
     from heelstrike.experiments.campaigns import CampaignResults as CampaignResults
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.experiments.engine_comparison import compare_engines as compare_engines
+    from heelstrike.experiments.identification import identify as identify
     from heelstrike.experiments.people import mimic as mimic
     from heelstrike.experiments.planners import PlannerComparison as PlannerComparison
     from heelstrike.experiments.planners import compare_planners as compare_planners
@@ -282,6 +283,7 @@ _HOME = {
     "gait_family": "heelstrike.gait",
     "gait_sensitivity_norm": "heelstrike.analysis.stability.sensitivity",
     "human": "heelstrike.robot.human",
+    "identify": "heelstrike.experiments.identification",
     "inspect_robot": "heelstrike.robot",
     "largest_ground_step": "heelstrike.analysis.stability.largest",
     "largest_push": "heelstrike.analysis.stability.largest",
