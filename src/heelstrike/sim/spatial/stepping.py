@@ -75,7 +75,7 @@ BEARABLE = 1e-6
 LAST_EFFORT = 20000
 """Iterations of a contact problem that no part of a step could be certified without."""
 
-NO_PART = 1e-9
+NO_SHARE = 1e-9
 """Part of a step up to which a push that ends, or begins, within it does so where it ends: what is
 left is the rounding of times."""
 
@@ -105,7 +105,7 @@ def add_spatial_pushes(
     """Add the generalised force Jᵀf of the pushes to `force`."""
     for i in range(pushes.link.shape[0]):
         share = pushes.share[i]
-        if share <= NO_PART:
+        if share <= NO_SHARE:
             continue
         f = share * pushes.force[i, 0], share * pushes.force[i, 1], share * pushes.force[i, 2]
         at = pushes.point[i, 0], pushes.point[i, 1], pushes.point[i, 2]
