@@ -49,7 +49,7 @@ def outcome(source: str, place: str, names: dict[str, Any]) -> Any:
 def test_there_are_lessons_in_the_navigation_without_results() -> None:
     """Pictures come from the build of the pages, so that they are of this version."""
     navigation = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
-    assert len(LESSONS) == 6
+    assert len(LESSONS) == 7
     for lesson in (*LESSONS, GALLERY):
         assert f"- {lesson.relative_to(ROOT / 'docs').as_posix()}\n" in navigation
         cells = json.loads(lesson.read_text(encoding="utf-8"))["cells"]

@@ -228,7 +228,9 @@ def friction_that_does_not_oppose(
 ) -> Array:
     """How far friction differs from μ λ_n against the sliding, or sliding from zero: the less.
 
-    `force` (..., d) has the normal first; `slide` is (..., d − 1), or (...) in the plane.
+    `force` (..., d) has the normal first; `slide` is (..., d − 1), or (...) in the plane. In space
+    a force may be aslant to the sliding, which counts by how fast that is: a solver of the natural
+    map knows the way of what hardly slides as little as its friction does.
     """
     normal = np.maximum(force[..., 0], 0.0)
     velocity = slide[..., None] if slide.ndim < force.ndim else slide
@@ -236,6 +238,8 @@ def friction_that_does_not_oppose(
     way = velocity / np.where(speed > 0.0, speed, 1.0)[..., None]
     opposing = -np.einsum("...i,...i->...", way, force[..., 1:])
     across = np.linalg.norm(force[..., 1:] + opposing[..., None] * way, axis=-1)
-    across = np.where(speed > 0.0, across, 0.0)
-    lacks = np.maximum(np.maximum(low * normal - opposing, opposing - high * normal), 0.0) + across
-    return np.minimum(speed / speed_unit, lacks / force_unit)
+    whole = np.linalg.norm(force[..., 1:], axis=-1)
+    slant = across / np.where(whole > 0.0, whole, 1.0)
+    lacks = np.maximum(np.maximum(low * normal - opposing, opposing - high * normal), 0.0)
+    aslant = np.minimum(slant * speed / speed_unit, across / force_unit)
+    return np.minimum(speed / speed_unit, lacks / force_unit) + aslant

@@ -8,7 +8,7 @@ One row a step is needed (``record_every=1``). With the recorded state (q, v), t
   including the gains of the controller.
 - motion: ``q⁺ = q + h v⁺``; the explicit scheme moves with v, Moreau-Jean with the mean of the two.
   The one that resolves impacts may move with another velocity u than v⁺ where a contact arrives,
-  or is in the ground; then ``J_n u ≥ −gap/h``.
+  or is in the ground, and not where nothing is near; then ``J_n u ≥ −gap/h``.
 - contact: ``w_n ≥ b ⟂ λ_n ≥ 0`` with w = J v⁺ and b = −gap/h (gap linearised), b = 0 where
   gap ≤ activation (the paper's), b = −e w_n of before where the gap is foreseen to close
   (Moreau-Jean); b = −e w_n of before, where u is not v⁺, for the contacts that u brings to the
@@ -54,6 +54,8 @@ BOUND = (Scheme.GAP_LINEARISED, Scheme.LINEARLY_IMPLICIT, Scheme.IMPACT_RESOLVED
 IN_CORNER, DEEP_IN_CORNER = 1e-3, 5e-2
 """A point that comes this near (m) to a second face of a concave corner may be pushed by both;
 schemes that do not bound the gap sink."""
+ALONE = 1e-2
+"""What is farther (m, rad) than this from everything has nothing to split its step."""
 UNDECIDED = 1e-12
 """A gap (m) this near the edge of a scheme's activation may count either way."""
 
@@ -160,7 +162,7 @@ class _Steps:
     def motion(self, found: Findings) -> None:
         velocity = self.after
         if self.scheme is Scheme.IMPACT_RESOLVED:
-            velocity = np.where(self.split[:, None], self.moved, self.after)
+            velocity = np.where((self.split & ~self.alone())[:, None], self.moved, self.after)
         if self.scheme is Scheme.PAPER_EXPLICIT:
             velocity = self.before
         elif self.scheme is Scheme.MOREAU_JEAN:
@@ -169,6 +171,18 @@ class _Steps:
         found.look("teleport", left, MOTION, self.time, self.rows.joints)
         dt = np.abs(np.diff(self.rows.time) - self.h)
         found.look("length of a step", dt, 1e-9, self.time)
+
+    def alone(self) -> Array:
+        """Steps (T,) in which nothing acts, and nothing is near the ground or a stop."""
+        rows = self.rows
+        ways = [self.gap, rows.coordinate[:-1] - rows.lower, rows.upper - rows.coordinate[:-1]]
+        ways += [gap[:-1, None] for _, _, gap, _ in rows.stops_of_balls()]
+        alone = np.ones(len(self.time), dtype=bool)
+        for way in ways:
+            alone &= way.min(axis=1, initial=np.inf) > ALONE
+        for each in (self.impulse, self.stop, self.dry, self.tied):
+            alone &= ~each.reshape(len(self.time), -1).any(axis=1)
+        return alone
 
     def arrives(self, found: Findings, law: str, gap: Array, speed: Array, free: Array) -> Array:
         """Judge where the positions go in split steps; tell whose impact each of them is."""

@@ -11,6 +11,7 @@ from urllib.request import urlopen
 
 import pytest
 import walking
+from live_humanoid import humanoid
 from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
@@ -115,6 +116,31 @@ def test_what_cannot_be_is_refused_before_anything_is_served(
     result = asked(*options, "--no-browser")
     assert result.exit_code == 2, result.output
     assert words in " ".join(result.output.replace("│", " ").split())
+
+
+def test_a_file_in_space_is_watched_in_space(made: dict[str, Any], tmp_path: Path) -> None:
+    """Planar robots are lifted on request; what is of the plane only is refused."""
+    humanoid(tmp_path)
+    file = str(tmp_path / "small.xml")
+    result = asked(file, "--friction", "0.6", "--ground", "slope:2", "--controller", "hold-posture")
+    assert isinstance(result.exception, MadeError), result.output
+    assert made["stage"].dimension.name == "space"
+    values = made["stage"].fitted({})
+    assert (values["robot"], values["controller"]) == (file, "HoldPosture")
+    assert (values["friction"], values["slope"]) == (0.6, pytest.approx(2.0))
+    asked("bravo7", "--dimension", "3", "--floating")
+    assert made["stage"].dimension.name == "space"
+    asked(file, "--dimension", "2", "--floating", "--forward", "x")
+    assert made["stage"].dimension.name == "plane"
+    for options, words in (
+        (["--gait", file], "gaits are of robots in the plane"),
+        (["--method", "event-driven"], "simulates robots in the plane only"),
+        (["--ground", "stairs:0.02x0.3"], "SpatialGround has planes and boxes"),
+        (["--controller", "WholeBody"], "There is HoldPosture"),
+    ):
+        result = asked(file, *options, "--no-browser")
+        assert result.exit_code == 2, result.output
+        assert words in " ".join(result.output.replace("│", " ").split())
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signal for one process")

@@ -183,10 +183,8 @@ class SpatialRows:
             one = slice(row, row + 1)
             poses = SpatialPoses(self.tree, self.q[one])
             here = poses.jacobian(link, self.foot[one][:, some])
-            others = [
-                poses.jacobian(link, self.points[f][one][:, some]) - here
-                for f in range(len(self.gaps))
-            ]
+            feet = self.points - self.gaps[..., None] * self.ways
+            others = [poses.jacobian(link, feet[f][one][:, some]) - here for f in range(len(feet))]
             arms = np.concatenate([each.reshape(-1, self.tree.nv) for each in others])
             left[row] -= arms.T @ np.linalg.lstsq(arms.T, left[row], rcond=1e-9)[0]
         return left

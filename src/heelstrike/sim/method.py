@@ -46,7 +46,7 @@ class Method(ABC):
     - :attr:`step_length`, if all its steps are of one length;
     - whatever else below is not so with it.
 
-    The frame sees to the controller, the limits of torques, closed loops as a run begins, the record
+    The frame handles the controller, torque limits, closed loops as a run begins, the record
     and when to stop. The kernels of the method see to
 
     - ``begin``: what else has to be ready for the first instant; None if nothing has;

@@ -14,6 +14,9 @@ from heelstrike.sim.run import Run
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
+    from heelstrike.sim.spatial.run import SpatialRun
+
+    AnyRun = Run | SpatialRun
 
 RECOVERED = 1.5
 """Steps without a symptom after which a robot has recovered from what was before."""
@@ -88,11 +91,31 @@ def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
     walk = Walk(run, gait)
     if run.completed and not _sinks(walk):
         return None
-    end = float(run.time[-1])
     found = find_symptoms(walk)
     if gait is None and any(each.cause is not Cause.JOINT_STOP for each in found):
         found = tuple(each for each in found if each.cause is not Cause.JOINT_STOP)
-    chain = _unrecovered(found, end, RECOVERED * walk.step_duration)
+    return fall_of(run, found, walk.step_duration)
+
+
+def fall_of(run: AnyRun, found: tuple[Symptom, ...], step_duration: float) -> Fall | None:
+    """Say what of some symptoms led to the end of a run that did not go well.
+
+    Parameters
+    ----------
+    run : Run or SpatialRun
+        The run, of at least one row.
+    found : tuple of Symptom
+        In the order of time.
+    step_duration : float
+        How long a step takes (s): without a symptom for longer the robot has recovered.
+
+    Returns
+    -------
+    Fall or None
+        Nothing if no symptom lasted, and nothing but its controller or its time ended the run.
+    """
+    end = float(run.time[-1])
+    chain = _unrecovered(found, end, RECOVERED * step_duration)
     if not chain and run.status in (RunStatus.COMPLETED, RunStatus.STOPPED):  # squats; is done
         return None
     if not chain:
@@ -102,19 +125,19 @@ def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
     for each in chain:
         if each is first or each.cause is not Cause.CONTROLLER:  # in a fall motors do what they can
             kinds.setdefault(each.cause, each)
-    since = first.time - walk.step_duration
+    since = first.time - step_duration
     pushes = tuple(p for p in run.pushes if p.start <= first.time and p.end >= since)
     return Fall(
         first.cause, first.time, first.where, first.evidence, tuple(kinds.values()), pushes, end
     )
 
 
-def walked_on(run: Run, fall: Fall | None) -> bool:
+def walked_on(run: AnyRun, fall: Fall | None) -> bool:
     """Whether a run lasted as long as it was asked to, and its robot did not go down.
 
     Parameters
     ----------
-    run : Run
+    run : Run or SpatialRun
         The run.
     fall : Fall or None
         What :func:`first_cause` says of it: a method can sink a robot into the ground, and end.

@@ -74,7 +74,7 @@ def _of_feet(run: Run, shown: Rows) -> Iterator[Limit]:
     zmp = zero_moment_point(run)
     alone = np.where(zmp.single_support[:, None], zmp.foot_margin, np.nan)
     for i, (foot, sole) in enumerate(zip(run.robot.feet, soles(run.robot), strict=True)):
-        if (found := _largest(run, use[:, i], shown)) is not None:
+        if (found := largest(run.time, use[:, i], shown)) is not None:
             k, used, reached = found
             time = float(run.time[k])
             there = float(friction[k, foot.contacts[0]])
@@ -84,7 +84,7 @@ def _of_feet(run: Run, shown: Rows) -> Iterator[Limit]:
         half = 0.5 * (sole.toe - sole.heel)
         if (
             has_length(run.robot, sole)
-            and (found := _largest(run, 1.0 - alone[:, i] / half, shown)) is not None
+            and (found := largest(run.time, 1.0 - alone[:, i] / half, shown)) is not None
         ):
             k, used, reached = found
             time = float(run.time[k])
@@ -98,53 +98,76 @@ def _of_motors(run: Run, shown: Rows) -> Iterator[Limit]:
     model = run.robot.model
     lower, upper, _ = torque_bounds(run)
     for i, name in enumerate(run.robot.actuator_names):
-        torque = run.torque[:, i]
-        ends = np.where(torque < 0.0, lower[:, i], upper[:, i])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(torque == 0.0, 0.0, torque / ends)
-        if np.isfinite(ends).any() and (found := _largest(run, share, shown)) is not None:
-            k, used, reached = found
-            unit = "N m" if model.axis[model.actuator_joint[i], 0] != 0.0 else "N"
-            time = float(run.time[k])
-            detail = f"{torque[k]:.3g} of {ends[k]:.3g} {unit} at {time:.3g} s".replace("-", "−")
-            yield Limit(f"torque of {_in_words(name)}", "torque", used, time, reached, detail)
         joint = model.actuator_joint[i]
-        fastest = float(model.no_load_speed[joint])
-        speed = np.abs(run.velocity[:, joint])
-        if np.isfinite(fastest) and (found := _largest(run, speed / fastest, shown)) is not None:
-            k, used, reached = found
-            unit = "rad/s" if model.axis[joint, 0] != 0.0 else "m/s"
-            time = float(run.time[k])
-            detail = f"{speed[k]:.3g} of {fastest:.3g} {unit} at {time:.3g} s"
-            yield Limit(f"speed of {_in_words(name)}", "speed", used, time, reached, detail)
+        hinge = bool(model.axis[joint, 0] != 0.0)
+        ends = lower[:, i], upper[:, i]
+        yield from limit_of_torque(run.time, name, run.torque[:, i], ends, shown, hinge=hinge)
+        fastest, speed = float(model.no_load_speed[joint]), run.velocity[:, joint]
+        yield from limit_of_speed(run.time, name, speed, fastest, shown, hinge=hinge)
+
+
+def limit_of_torque(
+    time: Floats,
+    name: str,
+    torque: Floats,
+    ends: tuple[Floats, Floats],
+    shown: Rows,
+    *,
+    hinge: bool,
+) -> Iterator[Limit]:
+    """Yield how close a torque (nt,) comes to its ends, if it has any."""
+    reached = np.where(torque < 0.0, *ends)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(torque == 0.0, 0.0, torque / reached)
+    if np.isfinite(reached).any() and (found := largest(time, share, shown)) is not None:
+        k, used, first = found
+        unit = "N m" if hinge else "N"
+        detail = f"{torque[k]:.3g} of {reached[k]:.3g} {unit} at {time[k]:.3g} s".replace("-", "−")
+        yield Limit(f"torque of {_in_words(name)}", "torque", used, float(time[k]), first, detail)
+
+
+def limit_of_speed(
+    time: Floats, name: str, speed: Floats, fastest: float, shown: Rows, *, hinge: bool
+) -> Iterator[Limit]:
+    """Yield how close the speed (nt,) of a motor comes to that without load, if that is known."""
+    speed = np.abs(speed)
+    if np.isfinite(fastest) and (found := largest(time, speed / fastest, shown)) is not None:
+        k, used, first = found
+        detail = f"{speed[k]:.3g} of {fastest:.3g} {'rad/s' if hinge else 'm/s'} at {time[k]:.3g} s"
+        yield Limit(f"speed of {_in_words(name)}", "speed", used, float(time[k]), first, detail)
 
 
 def _of_joints(run: Run, shown: Rows) -> Iterator[Limit]:
     model = run.robot.model
     for joint, name in enumerate(run.robot.joint_names):
-        low, high = float(model.lower[joint]), float(model.upper[joint])
-        if not (np.isfinite(low) and np.isfinite(high) and high > low):
-            continue
-        angle = run.position[:, joint]
-        found = _largest(run, np.abs(angle - 0.5 * (low + high)) / (0.5 * (high - low)), shown)
-        if found is None:
-            continue
-        k, used, reached = found
-        unit = "rad" if model.axis[joint, 0] != 0.0 else "m"
-        time = float(run.time[k])
+        ends = float(model.lower[joint]), float(model.upper[joint])
+        hinge = bool(model.axis[joint, 0] != 0.0)
+        yield from limit_of_range(run.time, name, run.position[:, joint], ends, shown, hinge=hinge)
+
+
+def limit_of_range(
+    time: Floats, name: str, angle: Floats, ends: tuple[float, float], shown: Rows, *, hinge: bool
+) -> Iterator[Limit]:
+    """Yield how close a joint (nt,) comes to the ends of its range, if it has two."""
+    low, high = ends
+    if not (np.isfinite(low) and np.isfinite(high) and high > low):
+        return
+    share = np.abs(angle - 0.5 * (low + high)) / (0.5 * (high - low))
+    if (found := largest(time, share, shown)) is not None:
+        k, used, first = found
         away = max(min(float(angle[k]) - low, high - float(angle[k])), 0.0)
-        detail = f"{away:.3g} {unit} from its stop at {time:.3g} s"
-        yield Limit(f"range of {_in_words(name)}", "joint", used, time, reached, detail)
+        detail = f"{away:.3g} {'rad' if hinge else 'm'} from its stop at {time[k]:.3g} s"
+        yield Limit(f"range of {_in_words(name)}", "joint", used, float(time[k]), first, detail)
 
 
-def _largest(run: Run, share: Floats, shown: Rows) -> tuple[int, float, float] | None:
+def largest(time: Floats, share: Floats, shown: Rows) -> tuple[int, float, float] | None:
     """Row of the largest share (nt,), the share, and when it first reached 1 (s)."""
-    share = np.where(shown, share, np.nan)
-    if not np.isfinite(share).any():
+    share = np.where(shown & np.isfinite(share), share, np.nan)
+    if np.isnan(share).all():
         return None
-    k = int(np.nanargmax(np.where(np.isfinite(share), share, np.nan)))
+    k = int(np.nanargmax(share))
     there = np.flatnonzero(share >= REACHED)
-    return k, float(share[k]), float(run.time[there[0]]) if len(there) else math.inf
+    return k, float(share[k]), float(time[there[0]]) if len(there) else math.inf
 
 
 def _in_words(name: str) -> str:

@@ -91,6 +91,8 @@ class Cause(enum.Enum):
     ``TIPPED_FORWARD``, ``TIPPED_BACK``
         The robot tipped over the toes, or the heels, of all feet that carried it; on point feet
         faster, or slower, than its gait.
+    ``TIPPED_SIDEWAYS``
+        A robot in space tipped over the outer edge of its support polygon.
     ``SCUFFED``
         The swing foot hit the ground in mid-swing.
     ``LATE_TOUCHDOWN``
@@ -112,6 +114,7 @@ class Cause(enum.Enum):
     SLIPPED = "slipped"
     TIPPED_FORWARD = "tipped forward"
     TIPPED_BACK = "tipped back"
+    TIPPED_SIDEWAYS = "tipped sideways"
     SCUFFED = "scuffed"
     LATE_TOUCHDOWN = "late touchdown"
     TORQUE_LIMIT = "torque limit"

@@ -48,6 +48,9 @@ CLOSING_TURN = 20.0
 PARALLEL = 1.0 - 1e-9
 """Cosine of the angle below which two faces are one."""
 
+KERB = 0.95
+"""Cosine of the angle to the face below from which on a ball meets an edge as a wall."""
+
 NO_ANGLE = 1e-12
 """Turn (rad) of a ball joint that has no axis."""
 
@@ -83,9 +86,11 @@ def faces_of(
 ) -> tuple[int, int]:
     """Return the face that a contact meets, and the wall beside it; -1 if there is none.
 
-    In a corner the first is the one that points more upwards.
+    In a corner the first is the one that points more upwards. A ball that lies on one face may meet
+    the edge of another box, too, as of a kerb; rolling from box to box of one height it does not.
     """
     best, distance, normal = 0, math.inf, (0.0, 0.0, 1.0)
+    is_ball = model.contact_radius[contact] > 0.0 and model.contact_rim[contact] == 0.0
     for face in range(ground.half.shape[0] + 1):
         _, gap, away = meet_face(model, ground, tree, contact, face)
         if gap < distance:
@@ -94,7 +99,8 @@ def faces_of(
     for face in range(ground.half.shape[0] + 1):
         point, gap, away = meet_face(model, ground, tree, contact, face)
         probe = point if model.contact_rim[contact] > 0.0 else contact_center(model, tree, contact)
-        if face == best or (face > 0 and not is_beside(ground, face - 1, probe)):
+        at_edge = is_ball and dot(away, normal) < KERB
+        if face == best or (face > 0 and not (at_edge or is_beside(ground, face - 1, probe))):
             continue
         if gap < least and dot(away, normal) < PARALLEL:
             wall, least, across = face, gap, away

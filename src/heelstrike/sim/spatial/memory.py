@@ -49,7 +49,7 @@ class SpatialTally(CommonTally):
     halved: int = cell(int)
     relaxed: int = cell(int)
     """uncertified, halved, relaxed: Steps that went on with a residual above the tolerance; that
-    were halved; that were not asked to leave the ground."""
+    were halved; that were not asked to leave the ground, or left their impact to the next."""
     energy_gain: float = cell(float)
     """Kinetic energy that restitution made (J)."""
 

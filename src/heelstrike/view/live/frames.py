@@ -28,9 +28,8 @@ from heelstrike.view.live.layout import (
     acting_pushes,
     slider,
 )
-from heelstrike.view.page.curves import DASHED, SIDES, Plot, Trace, alike, limits_in_words
+from heelstrike.view.page.curves import DASHED, Plot, Trace, alike, limits_in_words, side_of
 from heelstrike.view.page.motion import frames as drawn
-from heelstrike.view.style import in_words
 
 ROOM = 0.15
 """Share of a sole's length that its plot shows beyond either end."""
@@ -157,7 +156,7 @@ class Layout(FrameLayout):
                 units = ("rad", "m") if ends is None else ("N m", "N")
                 traces = [
                     Trace(
-                        None, _side(names[i]), int(leg[i]), DASHED if leg[i] > 0 else 0,
+                        None, side_of(names[i]), int(leg[i]), DASHED if leg[i] > 0 else 0,
                         at=self.begin[field] + i,
                     )
                     for i in which
@@ -167,11 +166,6 @@ class Layout(FrameLayout):
                     steps=ends is not None, note=limits_in_words(limits),
                     group="joints" if ends is None else "torques",
                 )  # fmt: skip
-
-
-def _side(name: str) -> str:
-    """The side of a joint; its name if it has none."""
-    return " ".join(w for w in in_words(name).split() if w.lower() in SIDES) or in_words(name)
 
 
 def movable(robot: Robot) -> Integers:

@@ -12,7 +12,7 @@ from heelstrike.robot.model import Floats
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
 from heelstrike.tolerances import SAME_ROW
-from heelstrike.view.page.curves import DASHED, Plot, Trace
+from heelstrike.view.page.curves import DASHED, Plot, Trace, side_of
 from heelstrike.view.style import in_words
 
 MOST_PUSHES = 4
@@ -104,7 +104,7 @@ class FrameLayout(ABC):
         """One panel with a curve for each foot."""
         traces = [
             Trace(
-                None, in_words(foot.name).removesuffix(" foot"), i, DASHED if i else 0,
+                None, side_of(foot.name).removesuffix(" foot"), i, DASHED if i else 0,
                 at=self.begin[field] + i,
             )
             for i, foot in enumerate(self.robot.feet)
@@ -139,8 +139,8 @@ def slider(name: str, *, hinge: bool, ends: tuple[float, float], at: int) -> dic
     farthest = np.pi if hinge else FARTHEST
     low, high = (float(np.clip(end, -farthest, farthest)) for end in ends)
     return {
-        "name": name, "label": in_words(name), "unit": "rad" if hinge else "m", "low": low,
-        "high": high, "at": at,
+        "name": name, "label": in_words(name).removesuffix(" joint"),
+        "unit": "rad" if hinge else "m", "low": low, "high": high, "at": at,
     }  # fmt: skip
 
 

@@ -41,7 +41,7 @@ DENSEST = 1.0 / 60.0
 IDLE = 0.25
 """Seconds between two looks whether there is something to do, when there was not."""
 SLOW = 0.03
-"""Seconds that one update may take; what takes longer simulates less at a time."""
+"""Seconds that one update may simulate; what takes longer simulates less at a time."""
 MOST_COMMANDS = 1000
 """Commands that may wait, while a gait is designed or viewers send more than can be done."""
 WORDS_LAST = 0.5
@@ -408,10 +408,10 @@ class Session:
     def _simulate(self, elapsed: float) -> None:
         """Simulate up to the goal, or as much of it as leaves time for viewers."""
         assert self.live is not None
-        before, began = self.live.time, clock_time.perf_counter()
+        before = self.live.time
         step = self.live.simulation.method.row_period[1]
-        self._advance(min(self._goal, before + max(self._span, step)))
-        gained, took = self.live.time - before, clock_time.perf_counter() - began
+        took = self._advance(min(self._goal, before + max(self._span, step)))
+        gained = self.live.time - before
         self._span = gained * SLOW / took if took > SLOW else min(2.0 * self._span, 1e3)
         self._goal = min(self._goal, self.live.time + max(self.rate * LONGEST_LAG, step))
         self._gained, self._elapsed = self._gained + gained, self._elapsed + elapsed
@@ -419,12 +419,19 @@ class Session:
             self._reached = self._gained / self._elapsed
             self._gained = self._elapsed = 0.0
 
-    def _advance(self, until: float | None) -> None:
-        """Simulate until a time (s), or one step, and show it."""
+    def _advance(self, until: float | None) -> float:
+        """Simulate until a time (s), or one step, and show it; return what simulating took (s)."""
         assert self.live is not None
+        began = clock_time.perf_counter()
         run = self.live.advance(until)
-        if run is None:
-            return
+        took = clock_time.perf_counter() - began
+        if run is not None:
+            self._take(run)
+        return took
+
+    def _take(self, run: AnyRun) -> None:
+        """Show a piece of the record that follows on what there is."""
+        assert self.live is not None
         known = len(self.history)
         events = self.history.take(run)
         last = len(self.history) - 1

@@ -173,6 +173,11 @@ def limits_in_words(limits: Sequence[float], unit: str = "") -> str:
     return f"limits {text} {unit}".rstrip() if limits else ""
 
 
+def side_of(name: str) -> str:
+    """The side of a joint; its name if it has none."""
+    return " ".join(w for w in in_words(name).split() if w.lower() in SIDES) or in_words(name)
+
+
 def alike(names: Sequence[str], which: Integers) -> dict[str, list[int]]:
     """Group indices of names that differ by their side only: one panel for both knees."""
     groups: dict[str, list[int]] = {}

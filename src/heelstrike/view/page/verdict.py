@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from heelstrike.analysis.actuation import distance_travelled
 from heelstrike.analysis.diagnosis.changes import Change, Lever, Tried, changes
@@ -20,6 +21,12 @@ from heelstrike.sim.push import Push
 from heelstrike.sim.run import Run
 from heelstrike.view.style import in_words
 from heelstrike.wording import counted
+
+if TYPE_CHECKING:
+    from heelstrike.robot.spatial.robot import SpatialRobot
+    from heelstrike.sim.spatial.run import SpatialRun
+
+    AnyRun = Run | SpatialRun
 
 SHOWN = 4
 """Links of the chain of a fall that its sentence has."""
@@ -67,16 +74,49 @@ def judge(run: Run, gait: Gait | None = None, *, tried: Sequence[Tried] = ()) ->
     fall = first_cause(run, gait)
     found = limits(run, until=math.inf if fall is None else fall.time)
     asked = () if fall is None else changes(run, fall, gait)
-    advice = tuple(_advice(run, fall, asked, gait, tried))
-    if fall is None and found and math.isfinite(found[0].reached):
-        advice += (_no_reserve(found[0]),)
-    good = (
-        walked_on(run, fall)
-        and not run.solver.failures
-        and not run.doubt
-        and not run.certificates.energy_gain > 0.0
+    doubts = tuple(_doubts(run))
+    advice = (*doubts, *advice_of(asked, tried))
+    if fall is not None and not asked:
+        advice += (_without_a_change(run, fall, gait),)
+    return verdict_of(
+        run, fall, found, advice, asked, tried, does=_does(run, fall), sound=not doubts
     )
-    parts = [_does(run, fall)]
+
+
+def verdict_of(
+    run: AnyRun, fall: Fall | None, found: tuple[Limit, ...], advice: tuple[str, ...],
+    asked: Sequence[Change], tried: Sequence[Tried], *, does: str, sound: bool,
+) -> Verdict:  # fmt: skip
+    """Put a verdict together.
+
+    Parameters
+    ----------
+    run : Run or SpatialRun
+        The run.
+    fall : Fall or None
+        Why it fell.
+    found : tuple of Limit
+        How close it came to its limits.
+    advice : tuple of str
+        What to change.
+    asked : sequence of Change
+        The same as data.
+    tried : sequence of Tried
+        What was tried beside it.
+    does : str
+        Whether the robot does what it is to do, in a sentence.
+    sound : bool
+        Whether nothing puts its numbers in doubt.
+
+    Returns
+    -------
+    Verdict
+        In words and numbers.
+    """
+    if fall is None and found and math.isfinite(found[0].reached) and isinstance(run, Run):
+        advice += (_no_reserve(found[0]),)
+    good = walked_on(run, fall) and sound
+    parts = [does]
     if fall is not None:
         parts.append(_why(run, fall))
     elif found and math.isfinite(found[0].reached):
@@ -88,9 +128,9 @@ def judge(run: Run, gait: Gait | None = None, *, tried: Sequence[Tried] = ()) ->
         parts.append(f"To change: {advice[0]}")
     elif good:
         parts.append(f"{NOTHING_TO_CHANGE}.")
-    if good:
+    if good and (tried or isinstance(run, Run)):
         parts.append(f"{_what_was_tried(tried)}.")
-    return Verdict(good, " ".join(parts), found, advice, fall, asked, tuple(tried))
+    return Verdict(good, " ".join(parts), found, advice, fall, tuple(asked), tuple(tried))
 
 
 def _does(run: Run, fall: Fall | None) -> str:
@@ -113,7 +153,7 @@ def _does(run: Run, fall: Fall | None) -> str:
     return f"{name} does not get to the end ({run.message}), after {went}."
 
 
-def _why(run: Run, fall: Fall) -> str:
+def _why(run: AnyRun, fall: Fall) -> str:
     """First cause, what pushed before it, and what followed, in sentences."""
     first = fall.chain[0]
     sentence = f"First cause: {told(first, run.robot)}"
@@ -134,6 +174,7 @@ FOLLOWS = {
     Cause.SLIPPED: "a foot slides",
     Cause.TIPPED_FORWARD: "it tips forward",
     Cause.TIPPED_BACK: "it tips back",
+    Cause.TIPPED_SIDEWAYS: "it tips to its side",
     Cause.SCUFFED: "a foot hits the ground in mid-swing",
     Cause.LATE_TOUCHDOWN: "the next foot is late",
     Cause.TORQUE_LIMIT: "torques reach their limits",
@@ -147,7 +188,7 @@ FOLLOWS = {
 """What follows from a first cause, in short."""
 
 
-def told(symptom: Symptom, robot: Robot, *, when: bool = True) -> str:
+def told(symptom: Symptom, robot: Robot | SpatialRobot, *, when: bool = True) -> str:
     """Say what went wrong, where and, unless that is told already, when, with its numbers."""
     given: dict[str, str] = {name: f"{value:.3g}" for name, value in symptom.evidence.items()}
     where = in_words(symptom.where)
@@ -156,13 +197,19 @@ def told(symptom: Symptom, robot: Robot, *, when: bool = True) -> str:
     def number(name: str, scale: float) -> float:
         return scale * symptom.evidence.get(name, 0.0)
 
-    on_soles = any(has_length(robot, sole) for sole in soles(robot))
+    in_space = not isinstance(robot, Robot)
+    on_soles = isinstance(robot, Robot) and any(has_length(robot, sole) for sole in soles(robot))
     match symptom.cause:
         case Cause.SLIPPED:
             return (
                 f"the {where} slides{at} by "
                 f"{number('distance_m', 1e3):.3g} mm, on a ground of friction {given['friction']}"
             )
+        case Cause.TIPPED_FORWARD | Cause.TIPPED_BACK | Cause.TIPPED_SIDEWAYS if in_space:
+            side = "left" if number("left_m", 1.0) > 0.0 else "right"
+            ways = {Cause.TIPPED_FORWARD: "forwards", Cause.TIPPED_BACK: "backwards"}
+            way = ways.get(symptom.cause, f"to its {side}")
+            return f"it tips {way} over the edge of its support polygon{at}"
         case Cause.TIPPED_FORWARD:
             over = f"the {where} tips over its toe" if on_soles else "it tips forward too fast"
             return f"{over}{at}"
@@ -210,10 +257,8 @@ def _what_was_tried(tried: Sequence[Tried]) -> str:
     return "Tried beside it: " + "; ".join(f"{each.what}: {each.outcome}" for each in tried)
 
 
-def _advice(
-    run: Run, fall: Fall | None, asked: Sequence[Change], gait: Gait | None, tried: Sequence[Tried]
-) -> Iterator[str]:
-    """What to change, the change that was seen to work first."""
+def _doubts(run: Run) -> Iterator[str]:
+    """What puts the numbers of a run in doubt, and what to do about it."""
     if run.solver.failures:
         yield (
             f"{counted(run.solver.failures, 'contact problem has', 'contact problems have')} no "
@@ -227,14 +272,16 @@ def _advice(
             "(Kane's paradox; events ENERGY_GAIN): less restitution or friction, or "
             "TimeStepping(bounded_restitution=True), which scales restitution back there."
         )
+
+
+def advice_of(asked: Sequence[Change], tried: Sequence[Tried]) -> Iterator[str]:
+    """What to change, the change that was seen to work first."""
     outcome = {each.change: each for each in tried if each.change is not None}
     ranked = sorted(asked, key=lambda each: each in outcome and outcome[each].lasted is not True)
     for each in ranked:
         seen = _seen(outcome.get(each))
         reason = f": {each.reason}" if each.reason else ""
         yield f"{_in_words(each)}{reason}.{seen}"
-    if fall is not None and not asked:
-        yield _without_a_change(run, fall, gait)
 
 
 def on_points(run: Run) -> str:

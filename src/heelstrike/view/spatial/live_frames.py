@@ -107,6 +107,7 @@ class SpatialLayout(FrameLayout):
             self.robot,
             lambda place: {"at": begin["position"] + place},
             lambda motor: {"at": begin["torque"] + motor},
+            limited=True,
         )
         if self.robot.feet:
             yield self.pressing()

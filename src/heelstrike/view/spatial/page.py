@@ -13,14 +13,18 @@ import numpy as np
 from heelstrike.analysis.spatial.summary import summarize_in_space
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
-from heelstrike.sim.spatial import SpatialEvent, SpatialEventKind, SpatialRun
+from heelstrike.sim.push import Push
+from heelstrike.sim.spatial.record import SpatialEventKind
+from heelstrike.sim.spatial.run import SpatialEvent, SpatialRun
 from heelstrike.view.page.columns import TOLERANCE, packed
 from heelstrike.view.page.markup import data_block, document, escaped, shipped, table
 from heelstrike.view.page.page import MOST_EVENTS, MOST_PHASES, check_page
 from heelstrike.view.page.provenance import versions
 from heelstrike.view.page.rows import MOST_ROWS, Rows, rows_about
+from heelstrike.view.page.verdict import Verdict, told
 from heelstrike.view.spatial.events import OF_POINTS, kind_in_space, place_in_space
 from heelstrike.view.spatial.scene import moving_columns, scene_in_space, spatial_plots
+from heelstrike.view.spatial.verdict import judge_in_space
 from heelstrike.view.style import view_errors
 from heelstrike.whole_file import write_whole
 
@@ -28,6 +32,9 @@ LARGEST = 1_400_000
 """Bytes of a page above which it has fewer rows."""
 
 FEWEST_ROWS = 100
+
+MOST_LIMITS = 12
+"""Limits that a page lists."""
 
 IMPACTS = (SpatialEventKind.TOUCHDOWN, SpatialEventKind.JOINT_STOP)
 
@@ -74,11 +81,17 @@ def page_in_space(run: SpatialRun, *, command: str = "") -> str:
     """Write the page of a run; see :func:`save_html`."""
     if not len(run.time):
         raise ViewError(f"there is nothing to show: the run has no rows ({run.message})")
-    summary = summarize_in_space(run)
+    summary, verdict = summarize_in_space(run), judge_in_space(run)
     parts = {
         "title": escaped(run.robot.name),
-        "headline": escaped(run.message),
-        "summary": table(dict(summary.lines()), "Summary"),
+        "headline": escaped(verdict.headline),
+        "summary": "".join(
+            (
+                _what_happened(verdict, run),
+                _limits(verdict),
+                table(dict(summary.lines()), "Summary"),
+            )
+        ),
         "certificates": table(_certificates(run), "Certificates: worst values over all steps"),
         "provenance": table(_provenance(run, command), "Where this comes from"),
         "camera": escaped(CAMERA),
@@ -97,6 +110,33 @@ def page_in_space(run: SpatialRun, *, command: str = "") -> str:
             break
         most = max(FEWEST_ROWS, int(0.6 * most))
     return document(title, body + block, style=shipped("page.css"), script=script)
+
+
+def _what_happened(verdict: Verdict, run: SpatialRun) -> str:
+    """What went wrong, causes before consequences; nothing of a run in which nothing did."""
+    if verdict.fall is None:
+        return ""
+    robot = run.robot
+    rows = {f"{push.start:.3f} s": _push(push) for push in verdict.fall.pushes}
+    for each in verdict.fall.chain:
+        rows[f"{each.time:.3f} s"] = told(each, robot, when=False)
+    rows[f"{verdict.fall.end:.3f} s"] = run.message
+    return table(rows, "What happened, causes before consequences")
+
+
+def _push(push: Push) -> str:
+    newtons = float(np.linalg.norm(push.force))
+    return f"a push of {newtons:.3g} N on {push.link}, for {push.duration:.3g} s"
+
+
+def _limits(verdict: Verdict) -> str:
+    """How close the run came to each limit, the closest first."""
+    rows = {
+        limit.name: f"{100.0 * limit.used:.3g} % used; {limit.detail}"
+        for limit in verdict.limits[:MOST_LIMITS]
+    }
+    before = " before the first cause" if verdict.fall is not None else ""
+    return table(rows, f"How close to each limit{before}") if rows else ""
 
 
 def contents(run: SpatialRun, *, most: int = MOST_ROWS) -> dict[str, Any]:

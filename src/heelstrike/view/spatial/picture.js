@@ -15,6 +15,7 @@ var HeelstrikePicture = (view) => {
   const threes = (numbers) =>
     Array.from({ length: numbers.length / 3 }, (_, k) => Array.from(numbers.subarray(3 * k, 3 * k + 3)));
 
+  view.names = { support: "support polygon", traces: "path of the zero moment point" };
   let stage = null, of = null, pull = null, wished = null;
 
   /** What draws the scene that there is; the camera stays as it was in the one before. */

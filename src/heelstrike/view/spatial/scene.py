@@ -14,7 +14,7 @@ from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import HINGE, SLIDE
 from heelstrike.robot.spatial.robot import SpatialRobot, quaternion_places
 from heelstrike.sim.spatial.run import SpatialRun
-from heelstrike.view.page.curves import DASHED, Plot, Trace, alike
+from heelstrike.view.page.curves import DASHED, Plot, Trace, alike, limits_in_words, side_of
 from heelstrike.view.page.rows import Rows
 from heelstrike.view.page.scene import DIGITS
 from heelstrike.view.spatial.body import SpatialBody, body_in_space, legs_in_space
@@ -213,7 +213,9 @@ def _joints(run: SpatialRun, rows: Rows) -> list[Plot]:
 Numbers = Callable[[int], dict[str, Any]]
 
 
-def joint_plots(robot: SpatialRobot, position: Numbers, torque: Numbers) -> list[Plot]:
+def joint_plots(
+    robot: SpatialRobot, position: Numbers, torque: Numbers, *, limited: bool = False
+) -> list[Plot]:
     """Make the panels of what motors drive, left and right together.
 
     Parameters
@@ -222,26 +224,38 @@ def joint_plots(robot: SpatialRobot, position: Numbers, torque: Numbers) -> list
         The robot.
     position, torque : callable
         Return the numbers of a position and of a motor, as a `Trace` has them, by their indices.
+    limited : bool
+        Whether limits of the torques are drawn.
     """
     model = robot.model
     if not robot.nu:
         return []
     joint = model.velocity_joint[model.actuator_velocity]
     leg = legs_in_space(robot)[joint]
-    names = [robot.velocity_names[k] for k in model.actuator_velocity.tolist()]
+    names = [
+        in_words(robot.velocity_names[k]).removesuffix(" joint")
+        for k in model.actuator_velocity.tolist()
+    ]
     place = model.first_position[joint].tolist()
     kind = model.joint_kind[joint]
     found = []
     for name, several in alike(names, np.arange(robot.nu)).items():
         look: dict[int, dict[str, Any]] = {
-            i: {"label": in_words(names[i]), "foot": int(leg[i]), "dash": n}
+            i: {"label": side_of(names[i]), "foot": int(leg[i]), "dash": n}
             for n, i in enumerate(several)
         }
+        if len(several) == 1:
+            look[several[0]]["label"] = ""  # the title says it
         if all(kind[several] >= SLIDE):
             unit = "rad" if kind[several[0]] == HINGE else "m"
             traces = [Trace(**{"values": None} | position(place[i]) | look[i]) for i in several]
             found.append(Plot(name, unit, traces, group="joints"))
         unit = "N" if kind[several[0]] == SLIDE else "N m"
         traces = [Trace(**{"values": None} | torque(i) | look[i]) for i in several]
-        found.append(Plot(f"{name} torque", unit, traces, steps=True, group="torques"))
+        ends = np.array([(model.torque_lower[i], model.torque_upper[i]) for i in several])
+        levels = [float(level) for level in np.unique(ends[np.isfinite(ends)])] if limited else []
+        found.append(Plot(
+            f"{name} torque", unit, traces, [("limit", level) for level in levels], steps=True,
+            note=limits_in_words(levels), group="torques",
+        ))  # fmt: skip
     return found

@@ -119,7 +119,8 @@ var HeelstrikeSettings = (view) => {
       view.redraw();
     };
     const sign = element("i", { textContent: mark, ariaHidden: "true" });
-    at("boxes").append(element("label", {}, box, element("span", {}, sign, text)));
+    const called = view.names?.[name] || text; // what the picture draws there
+    at("boxes").append(element("label", {}, box, element("span", {}, sign, called)));
     return { name, box, sign, color };
   });
   /** The signs have the colours of what they stand for. */

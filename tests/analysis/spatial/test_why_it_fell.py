@@ -1,0 +1,78 @@
+"""Why a robot in space fell, and how close it came to its limits, where both are known."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live_humanoid import humanoid
+
+import heelstrike as hs
+from heelstrike.analysis.diagnosis.symptoms import Cause
+from heelstrike.analysis.spatial.diagnosis import first_cause_in_space, spatial_limits
+from heelstrike.experiments.space import hold
+from heelstrike.sim.spatial.run import SpatialRun
+from heelstrike.view.spatial.verdict import judge_in_space
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> hs.SpatialRobot:
+    return humanoid(tmp_path_factory.mktemp("robot"))
+
+
+def run_of(
+    robot: hs.SpatialRobot, force: tuple[float, float, float], friction: float = 0.75
+) -> SpatialRun:
+    run = hs.simulate(
+        robot, hold(robot, 1e-3, kp=800.0, kd=10.0), state=robot.reference_state(),
+        duration=1.5, ground=hs.SpatialGround(friction=friction),
+        pushes=hs.Push("trunk", force=force, start=0.3, duration=0.1),
+    )  # fmt: skip
+    assert isinstance(run, SpatialRun)
+    return run
+
+
+@pytest.mark.parametrize(
+    ("force", "cause", "words"),
+    [
+        ((260.0, 0.0, 0.0), Cause.TIPPED_FORWARD, "tips forwards"),
+        ((-260.0, 0.0, 0.0), Cause.TIPPED_BACK, "tips backwards"),
+        ((0.0, 400.0, 0.0), Cause.TIPPED_SIDEWAYS, "tips to its left"),
+        ((0.0, -400.0, 0.0), Cause.TIPPED_SIDEWAYS, "tips to its right"),
+    ],
+)
+def test_a_robot_that_is_pushed_over_tips_that_way(
+    robot: hs.SpatialRobot, force: tuple[float, float, float], cause: Cause, words: str
+) -> None:
+    run = run_of(robot, force, friction=2.0)
+    fall = first_cause_in_space(run)
+    assert fall is not None
+    assert fall.cause is cause
+    assert 0.299 < fall.time < 0.7  # after the push began, long before it lies
+    assert fall.pushes == run.pushes
+    verdict = judge_in_space(run)
+    assert not verdict.good
+    assert words in verdict.headline
+    assert f"after a push of {np.linalg.norm(force):.3g} N began" in verdict.headline
+
+
+def test_one_that_stands_has_limits_and_no_cause(robot: hs.SpatialRobot, tmp_path: Path) -> None:
+    """Friction used by a push F along the ground: about F over μ times the weight."""
+    run = run_of(robot, (0.0, 30.0, 0.0))
+    assert first_cause_in_space(run) is None
+    found = {limit.name: limit for limit in spatial_limits(run)}
+    friction = max(limit.used for limit in found.values() if limit.kind == "friction")
+    assert 0.5 * 30.0 / (0.75 * robot.weight) < friction < 4.0 * 30.0 / (0.75 * robot.weight)
+    hip = found["torque of left hip joint"]
+    largest = float(np.abs(run.torque[:, robot.actuator_index("left_hip_joint")]).max())
+    assert hip.used == pytest.approx(largest / 80.0)
+    assert 0.0 < found["zero moment point"].used < 1.0
+    assert found["range of neck"].used == pytest.approx(0.0, abs=1e-2)
+    verdict = judge_in_space(run)
+    assert verdict.good
+    assert "stays up for 1.5 s" in verdict.headline
+    page = run.save_html(tmp_path / "run.html").read_text()
+    assert verdict.headline in re.sub(r"&#x27;|&#39;", "'", page)
+    assert "How close to each limit" in page

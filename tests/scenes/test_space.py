@@ -1,0 +1,155 @@
+"""Random scenes in space: their judge is right, sees what is wrong, and finds nothing in a few."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+from random_spatial_trees import random_spatial_tree
+from scenes.space.ground import Block, Terrain
+from scenes.space.mechanics import SpatialPoses, SpatialTree
+from scenes.space.running import SpaceSetting, compare_twins, run_space_scene
+from scenes.space.scene import mirrored, random_space_scene, renumbered
+from spatial_cases import in_space, random_position
+
+import heelstrike as hs
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_mechanics_are_those_of_lagrange(seed: int) -> None:
+    """By differences: H is what d/dt(∂T/∂v) and the potential leave, M what T is made of.
+
+    With the quasi-velocities of quaternions Lagrange's equations have other terms; the power
+    balance, d/dt(T + V) = v·(M v̇ + H + ∂V/∂q), has not, and neither has Ṁ v along a motion.
+    """
+    robot = in_space(random_spatial_tree(seed))
+    draw = np.random.default_rng(seed)
+    tree = SpatialTree(robot.model)
+    q, v, a = random_position(robot, draw)[None], draw.normal(size=(1, robot.nv)), draw.normal(
+        size=(1, robot.nv)
+    )  # fmt: skip
+    h = 1e-5
+
+    def energy(time: float) -> float:
+        there = tree.moved(q, v + 0.5 * time * a, time)
+        speed = v + time * a
+        poses = SpatialPoses(tree, there)
+        matrix = poses.mass_matrix()[0]
+        return float(0.5 * speed[0] @ matrix @ speed[0] + poses.potential_energy(there)[0])
+
+    poses = SpatialPoses(tree, q)
+    power = v[0] @ (poses.mass_matrix()[0] @ a[0] + poses.bias_force(v)[0] - tree.springs(q)[0][0])
+    rate = (energy(h) - energy(-h)) / (2.0 * h)
+    size = abs(energy(0.0)) + abs(power)
+    assert rate == pytest.approx(power, abs=1e-6 * size)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_mechanics_agree_with_those_of_the_kernels(seed: int) -> None:
+    """Two ways to the same numbers: centres of mass here, bodies along the tree there."""
+    robot = in_space(random_spatial_tree(seed))
+    draw = np.random.default_rng(100 + seed)
+    q, v = random_position(robot, draw), draw.normal(size=robot.nv)
+    poses = SpatialPoses(SpatialTree(robot.model), q[None])
+    matrix, bias = hs.dynamics.spatial.mass_matrix(robot, q), hs.dynamics.spatial.bias_force(
+        robot, q, v
+    )  # fmt: skip
+    np.testing.assert_allclose(poses.mass_matrix()[0], matrix, atol=1e-11 * np.abs(matrix).max())
+    np.testing.assert_allclose(poses.bias_force(v[None])[0], bias, atol=1e-10 * np.abs(bias).max())
+
+
+def test_distances_to_a_box_and_a_plane() -> None:
+    block = Block(np.array([1.0, 0.0, 0.5]), np.eye(3), np.array([0.5, 0.5, 0.5]))
+    terrain = Terrain(np.array([0.0, 0.0, 2.0]), 0.0, (block,))
+    gaps, ways = terrain.distances(np.array([[1.0, 0.0, 1.3], [1.9, 0.0, 1.3], [1.0, 0.4, 0.5]]))
+    np.testing.assert_allclose(gaps[1], [0.3, 0.5, -0.1])
+    np.testing.assert_allclose(ways[1], [[0, 0, 1], [0.8, 0, 0.6], [0, 1, 0]], atol=1e-15)
+    np.testing.assert_allclose(gaps[0], [1.3, 1.3, 0.5])
+
+
+def quiet(setting: SpaceSetting) -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return setting.run("impact_resolved", duration=0.4)
+
+
+@pytest.fixture(scope="module")
+def sliding() -> tuple[SpaceSetting, Any]:
+    """A scene in which something presses and slides, with its run, which is clean."""
+    for seed in range(1, 200):
+        setting = SpaceSetting.of(random_space_scene(seed))
+        run = quiet(setting)
+        pressed = run.contact_force[..., 0] > 1.0
+        slides = np.linalg.norm(run.slip, axis=-1) > 1e-2
+        rough, flat = setting.scene.friction > 0.2, not setting.scene.boxes
+        if run.completed and rough and flat and (pressed & slides).sum() > 50:
+            assert not setting.judge(run).objections
+            return setting, run
+    raise AssertionError("no such scene")
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "law"),
+    [
+        ("velocity", lambda x: x * (1.0 + 1e-6), "balance"),
+        ("contact_force", lambda x: x * [1.0, -1.0, -1.0], "friction opposes"),
+        ("contact_force", lambda x: x * [0.1, 1.0, 1.0], "friction cone"),
+        ("contact_force", lambda x: -x, "contact: pull"),
+        ("gap", lambda x: x + 1e-6, "recorded gap"),
+        ("contact_normal", lambda x: np.roll(x, 1, axis=-1), "recorded normal"),
+        ("slip", lambda x: 1.1 * x, "recorded slip"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_objected_to(
+    sliding: tuple[SpaceSetting, Any], name: str, change: Any, law: str
+) -> None:
+    setting, run = sliding
+    wrong = dataclasses.replace(run, **{name: change(getattr(run, name))})
+    assert law in setting.judge(wrong).broken()
+
+
+def test_a_jump_in_free_flight_is_seen() -> None:
+    """Where nothing is near, positions go where the velocity leads; by 1e-7 m elsewhere is seen."""
+    for seed in range(200):
+        scene = random_space_scene(seed)
+        if scene.kind != "flat fall":
+            continue
+        setting = SpaceSetting.of(scene)
+        run = quiet(setting)
+        high = np.flatnonzero(run.gap.min(axis=1) > 0.02)
+        if len(high) > 10 and high[-1] == len(high) - 1:
+            break
+    assert not setting.judge(run).objections
+    position = run.position.copy()
+    position[high[5] :, :3] += 1e-7
+    assert "teleport" in setting.judge(dataclasses.replace(run, position=position)).broken()
+
+
+def test_mirror_images_are_mirrored_back_and_orders_are_orders() -> None:
+    scene = random_space_scene(9)
+    assert mirrored(mirrored(scene)) == scene
+    other = renumbered(scene)
+    assert sorted(body.name for body in other.bodies) == sorted(body.name for body in scene.bodies)
+
+
+def test_twins_take_the_same_steps_and_a_false_one_is_seen(
+    sliding: tuple[SpaceSetting, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    setting, run = sliding
+    found = compare_twins(setting, "impact_resolved", run)
+    assert found.figures["twins compared"] >= 6
+    assert not found.objections
+    assert not found.figures["twins with another solution"]
+    monkeypatch.setattr("scenes.space.scene.FLIPPED", ("_y",))
+    false = compare_twins(setting, "impact_resolved", run)
+    assert false.figures["twins with another solution"] >= 3
+
+
+@pytest.mark.parametrize("seed", [2, 4, 9, 15])
+def test_a_few_scenes_have_no_objection(seed: int) -> None:
+    result = run_space_scene("impact_resolved", seed, twins=False)
+    assert result["status"] == "completed"
+    assert result["objections"] == []
