@@ -168,8 +168,8 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
             [*theirs, *absent],
         )
         + "\nheelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
-        "its angle of friction, at defaults and a step of 1 ms. The last columns have the step sizes, "
-        "in ms, at which bravo7 takes all its steps under a controller.\n\n"
+        "its angle of friction, at defaults and a step of 1 ms. The last columns have the step "
+        "sizes, in ms, at which bravo7 takes all its steps under a controller.\n\n"
         + _table(headings, ours)
     )  # fmt: skip
 
