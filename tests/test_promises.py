@@ -145,8 +145,8 @@ def test_precision_is_that_of_the_page() -> None:
     assert sides["MuJoCo"][1].startswith("not reached")
     assert min(dart, drake) > bullet
     assert promise("1 s of walking to 1e-4 rad") == (
-        f"{ours:.0f} ms; Bullet takes {round(bullet, -2):.0f} × as long, DART and Drake more, "
-        "MuJoCo does not get there"
+        f"{ours:.0f} ms; Bullet takes {round(bullet, -2):.0f} × as long, DART and Drake longer; "
+        "MuJoCo does not reach this precision"
     )
 
 
@@ -158,7 +158,7 @@ def test_growth_is_that_of_the_page() -> None:
         for sizes in [[cells[0] for cells in table if cells[0].isdigit()]]
     ]
     assert promise(f"a chain of {ranges[0]} joints, {ranges[1]} contact points") == (
-        "cheaper than each of them at every size"
+        "faster than each of them at every size"
     )
     for table in tables:
         for cells in table:

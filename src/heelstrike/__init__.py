@@ -1,4 +1,4 @@
-"""Planar biped robots that walk on exact hard contact.
+"""Walking robots on exact hard contact.
 
 Load a robot, design a gait, simulate it under a controller, look at what the feet did::
 

@@ -26,7 +26,7 @@ from heelstrike.cli.zoo import zoo
 
 app = typer.Typer(
     name="heelstrike",
-    help="Planar biped robots that walk on exact hard contact.",
+    help="Walking robots on exact hard contact.",
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode="markdown",
@@ -66,7 +66,7 @@ def heelstrike(
         typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    """Planar biped robots that walk on exact hard contact."""
+    """Walking robots on exact hard contact."""
 
 
 if __name__ == "__main__":

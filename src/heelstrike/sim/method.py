@@ -61,7 +61,7 @@ class Method(ABC):
 
     Everything that they remember from one instant to the next is in memory or work: that is what a
     snapshot keeps. `heelstrike.sim` has the kernels that the methods of this package are made of;
-    ``docs/methods.md`` shows where to begin.
+    ``docs/own-method.md`` shows where to begin.
     """
 
     kernels: ClassVar[Kernels]

@@ -79,11 +79,17 @@ def test_every_simulator_of_the_paper_has_its_row(page: str) -> None:
 
 
 def test_it_says_at_which_steps_a_robot_walks_and_how_it_creeps(page: str) -> None:
-    cells = row(page, "Our columns", "MuJoCo")
+    cells = row(page, "heelstrike's columns", "MuJoCo")
     assert cells[5] == "12"  # mm/s: 12.3 mm in a second
     assert cells[6] == "1"  # ms, at defaults under the first law; at 2 ms it falls
-    assert row(page, "Our columns", "Bullet")[6] == "none"
-    assert row(page, "Our columns", "heelstrike")[6] == "2, 1"
+    assert row(page, "heelstrike's columns", "Bullet")[6] == "none"
+    assert row(page, "heelstrike's columns", "heelstrike")[6] == "2, 1"
+
+
+def test_it_begins_with_who_walks(page: str) -> None:
+    short = page[page.index("## In short") : page.index("## Table 1")]
+    assert "- ComputedTorque, steps of 1 ms: heelstrike, MuJoCo take all 3 steps." in short
+    assert "Bullet" not in short
 
 
 def test_it_shows_figures_of_walks_and_why_others_fell(page: str) -> None:

@@ -58,6 +58,7 @@ def engines_page(folder: Path, figure: str) -> str:
     scenes = json.loads(scenes_file.read_text(encoding="utf-8"))
     parts = [
         _INTRODUCTION,
+        _in_short(walks),
         _table_1(walks, scenes),
         _best(),
         *(_walks(law, found) for law, found in walks.items()),
@@ -73,16 +74,19 @@ def engines_page(folder: Path, figure: str) -> str:
 _INTRODUCTION = """# Other engines
 
 The paper's Table 1 compares simulators by their own descriptions. On this page the same robot walks
-the same gait under the same control law in each engine. The reference is an event-driven run at a
-tolerance of 1e-9. `heelstrike compare bravo7 --engines all` makes the tables; with `--scenes --page
-docs/engines.md` it writes this page. For one engine use `--engines mujoco`, for a trial `--quick`;
-`--films` shows the walks that fall. CONTRIBUTING says how to add an engine.
+the same gait under the same controller in each engine. The reference is an event-driven run at a
+tolerance of 1e-9.
 
-Each engine gets the robot link by link, with our contact points. It runs in its own process, takes
-torques, and returns its state and contact forces. The law is heelstrike's compiled one, called
-every 2 ms with the engine's state and forces. Times are those of the engine's steps, with the calls
-from Python that a step needs; ours include the law. Other work ran at the same time, so a factor of
-two means little. The tables may come from several runs; each states its steps, law and step size.
+Each engine gets the robot link by link, with heelstrike's contact points. It runs in its own
+process, takes torques, and returns its state and contact forces. The controller is heelstrike's
+compiled one, called with the engine's state and forces every 2 ms, or as often as the table says.
+Times cover the engine's steps and the Python calls that they need; heelstrike's include the
+controller. Other work ran at the same time: ignore differences below a factor of two. The tables
+may come from several runs; each states its steps, controller and step size.
+
+`heelstrike compare bravo7 --engines all` makes the tables; with `--scenes --page docs/engines.md`
+it writes this page. For one engine use `--engines mujoco`, for a quick trial `--quick`. `--films`
+shows the walks that fall. CONTRIBUTING says how to add an engine.
 
 The columns of the walks:
 
@@ -104,6 +108,29 @@ def _table(headings: Sequence[str], rows: Rows) -> str:
 
 def _title(name: str) -> str:
     return "heelstrike" if name == "heelstrike" else ENTRIES[name].title
+
+
+def _in_short(walks: Mapping[str, Any]) -> str:
+    lines = []
+    for law, found in walks.items():
+        shown = _shown(found)
+        able = dict.fromkeys(
+            _title(row["engine"])
+            for row in found["rows"]
+            if row["step_s"] == shown and row["settings"] == "defaults"
+            and row["figures"] and row["figures"]["walks"]
+        )  # fmt: skip
+        lines.append(
+            f"- {law}, steps of {1e3 * shown:g} ms: {', '.join(able) or 'none'} "
+            f"take all {found['steps']} steps."
+        )
+    return "## In short\n\nAt their default settings:\n\n" + "\n".join(lines) + "\n"
+
+
+def _shown(found: Mapping[str, Any]) -> float:
+    """Step (s) whose walks are shown in full."""
+    sizes = {row["step_s"] for row in found["rows"]}
+    return SHOWN if SHOWN in sizes else max(sizes)
 
 
 def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
@@ -140,9 +167,9 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
              "open source", "documented"],
             [*theirs, *absent],
         )
-        + "\nOur columns follow. Creep is the speed of a cube on a slope 0.05 rad below its angle "
-        "of friction, at defaults and a step of 1 ms. The last columns have the step sizes, in ms, "
-        "at which bravo7 takes all its steps under a law.\n\n"
+        + "\nheelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
+        "its angle of friction, at defaults and a step of 1 ms. The last columns have the step "
+        "sizes, in ms, at which bravo7 takes all its steps under a controller.\n\n"
         + _table(headings, ours)
     )  # fmt: skip
 
@@ -214,8 +241,7 @@ def _walks(law: str, found: Mapping[str, Any]) -> str:
     columns = {**WALKING, **BY_ITSELF}
     rows = []
     reasons = []
-    sizes = {row["step_s"] for row in found["rows"]}
-    shown = SHOWN if SHOWN in sizes else max(sizes)
+    shown = _shown(found)
     name, *_ = law.partition(" ")
     period = found["control_period_s"]
     often = "" if period == CONTROL_PERIOD else f" --period {period:g}"
@@ -283,9 +309,10 @@ def _pushes(file: Path) -> str:
         cells[row["direction"]] = row["reason"] or _largest(row["largest"])
     return (
         f"## Largest push under {law}\n\nOn the trunk, in the middle of the third step, for 0.1 s, "
-        "in N s: the largest that is stood, as are all smaller ones that were tried, and in "
-        "brackets the smallest that is not. Each engine takes over when the push ends, with the "
-        "state of our event-driven run and a law that remembers what came before. Steps of 1 ms. "
+        "in N s: the largest that the robot survives, with all smaller ones that were tried, and "
+        "in brackets the smallest that it does not. Each engine takes over when the push ends, "
+        "with the state of heelstrike's event-driven run and a law that remembers what came "
+        "before. Steps of 1 ms. "
         f"`heelstrike compare {found['robot']} --controller {law} --engines NAME "
         "--largest-push`.\n\n"
         + _table(
@@ -350,7 +377,7 @@ def _guards(found: Mapping[str, Any]) -> str:
         )  # fmt: skip
     return (
         "## Guards\n\nTwo checks confirm that an engine has the same robot. In a flight of 0.1 s, "
-        "with all joints turning, the difference from ours at steps of 1, 0.5 and 0.25 ms is "
+        "with all joints turning, the difference from heelstrike at steps of 1, 0.5 and 0.25 ms is "
         "extrapolated to step zero (at most 1e-6, in single precision 1e-3). The forces on the "
         "robot at rest must equal its weight to 1 %.\n\n"
         + _table(
