@@ -312,7 +312,7 @@ def test_what_cannot_be_is_refused_in_words() -> None:
         ({"do": "seek", "time": "nan"}, "not a finite number"),
         ({"do": "rate", "value": [1]}, "cannot be read"),
         ({"do": "hold", "link": 99, "point": [0, 0], "force": [1, 0]}, "links 0 to"),
-        ({"do": "hold", "link": 2, "point": [0], "force": [1, 0]}, "cannot be read"),
+        ({"do": "hold", "link": 2, "point": [0], "force": [1, 0]}, "two numbers"),
         ({"do": "hold", "link": 2, "point": [0, 0], "force": [1e999, 0]}, "not a finite number"),
         ({"do": ["play"]}, "unknown command"),
     ):

@@ -1,6 +1,6 @@
 """What a robot is, from what it measured as it moved: masses, moments, friction, delay."""
 
-from heelstrike.experiments.identification.identify import (
+from heelstrike.experiments.identification.identifying import (
     Identified,
     IdentifiedNumber,
     identify,

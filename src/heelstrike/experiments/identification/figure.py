@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from heelstrike.experiments.identification.identify import COVERING, Identified
+from heelstrike.experiments.identification.identifying import COVERING, Identified
 from heelstrike.view.style import BLUE, GREY, INK, VERMILION, new_figure, styled
 
 WIDTH, ROW, LEAST, TORQUES = 9.0, 0.22, 2.0, 2.2

@@ -49,6 +49,12 @@ class RobotLog:
         ----------
         run : Run
             The simulation.
+
+        Returns
+        -------
+        RobotLog
+            Joints, torques, forces of the ground if there are contact points, and the trunk if
+            it floats; time begins at zero.
         """
         later = np.diff(run.time, append=np.inf) > SAME_ROW
         q, first = run.position[later], root_size(run.robot)
