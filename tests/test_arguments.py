@@ -88,6 +88,7 @@ def usual() -> dict[str, dict[str, Any]]:
         "gait_family": {"robot": robot, "speed": [0.4]},
         "gait_sensitivity_norm": dict.fromkeys("ABCD", 0.5 * ONE),
         "human": {},
+        "identify": {"robot": robot, "log": hs.simulate(**walked, duration=0.1)},
         "inspect_robot": {"robot": robot},
         "largest_ground_step": {"trial": trial, "up": True},
         "largest_push": {"trial": trial},
