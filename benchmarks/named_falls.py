@@ -8,6 +8,11 @@ those were is told. The twin, to which nothing is done, must walk on.
     python benchmarks/named_falls.py --each 20
 
 prints how often each cause was named, by the cause that was built.
+
+    python benchmarks/named_falls.py --random 220
+
+does two or three of these things at once, each as strong as it happens to be, and calls causes of a
+fall those without which the robot walks on; one that is told counts as right if it is one of them.
 """
 
 from __future__ import annotations
@@ -16,9 +21,10 @@ import argparse
 import dataclasses
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,10 +40,23 @@ from heelstrike.control.joint_feedback import JointFeedback
 from heelstrike.experiments.what_if import Case
 
 Rng = np.random.Generator
+Changes = Mapping[str, Any]
+"""What is done to a walk: its pushes, ground, numbers of the robot, law, method; or a load."""
 LEGS = ("left", "right")
 GAPS = (0.399, 0.698, 0.997, 1.296)
 """Where no foot comes to stand: from here on for 0.1 m."""
 EXPLICIT = hs.TimeStepping(step=1e-3, scheme=hs.Scheme.PAPER_EXPLICIT)
+QUICK = 12.0
+"""Speed (rad/s) of motors that are quick enough."""
+BEYOND = 0.6
+"""How far (rad) beyond the end of a joint that stops the gait an end is that lets it pass."""
+MILDEST = 0.3
+"""Least strength of what is done at random."""
+MOST_AT_ONCE = 3
+"""How much is done at once at random."""
+OF_THEIR_OWN = (Cause.LEG_GAVE_WAY, Cause.NUMERICAL)
+"""What is not done at random beside others: the one is no walk, and a spring that is mild enough
+for its steps is no numerical trouble but a spring."""
 MOST_DRAWS = 10
 """Draws for one fall before it is given up."""
 
@@ -56,82 +75,90 @@ def of_joint(name: str, joint: str, value: float) -> np.ndarray:
     return found
 
 
-def push(rng: Rng, forwards: float, upwards: float = 0.0) -> Case:
+def milder(value: float, usual: float, strength: float) -> float:
+    """Return a number of which less strength is left: all of it at 1, the usual one at 0."""
+    return usual * (value / usual) ** strength
+
+
+def push(rng: Rng, forwards: float) -> Changes:
     """Push the trunk, in N, at any time in the second and third step."""
     start = float(rng.uniform(0.75, 2.05))
-    return built.walk(
-        pushes=[hs.Push("trunk", force=(forwards, upwards), start=start, duration=0.1)]
-    )
+    return {"pushes": [hs.Push("trunk", force=(forwards, 0.0), start=start, duration=0.1)]}
 
 
-def slippery(rng: Rng) -> Case:
+def slippery(rng: Rng, strength: float) -> Changes:
     """Let friction be poor everywhere, or on a patch."""
-    friction = float(rng.uniform(0.03, 0.10))
+    friction = milder(float(rng.uniform(0.03, 0.10)), walking.FRICTION, strength)
     if rng.random() < 0.5:
-        return built.walk(ground=hs.Ground(friction=friction))
+        return {"ground": hs.Ground(friction=friction)}
     begin = float(rng.uniform(0.2, 0.7))
     corners = np.array([(-9.0, 0.0), (begin, 0.0), (begin + 9.0, 0.0), (99.0, 0.0)])
-    return built.walk(ground=hs.Ground(friction=[0.75, friction, 0.75], profile=corners))
+    return {"ground": hs.Ground(friction=[0.75, friction, 0.75], profile=corners)}
 
 
-def tipping_forward(rng: Rng) -> Case:
+def tipping_forward(rng: Rng, strength: float) -> Changes:
     """Push it forwards over the toes of its stance foot."""
-    return push(rng, float(rng.uniform(250.0, 400.0)))
+    return push(rng, strength * float(rng.uniform(250.0, 400.0)))
 
 
-def tipping_back(rng: Rng) -> Case:
+def tipping_back(rng: Rng, strength: float) -> Changes:
     """Push it backwards over the heel of its stance foot."""
-    return push(rng, -float(rng.uniform(250.0, 400.0)))
+    return push(rng, -strength * float(rng.uniform(250.0, 400.0)))
 
 
-def scuffing(rng: Rng) -> Case:
+def profiled(corners: list[tuple[float, float]]) -> Changes:
+    """Let the ground have corners."""
+    return {"ground": hs.Ground(friction=walking.FRICTION, profile=np.array(corners))}
+
+
+def scuffing(rng: Rng, strength: float) -> Changes:
     """Put a bar, or a step up, under the swing of a foot."""
-    height, wide = float(rng.uniform(0.045, 0.07)), float(rng.uniform(0.01, 0.04))
+    height, wide = strength * float(rng.uniform(0.045, 0.07)), float(rng.uniform(0.01, 0.04))
     edge = float(rng.choice(GAPS) + rng.uniform(0.005, 0.05))
     after = 0.0 if rng.random() < 0.5 else height
     corners = [(-9.0, 0.0), (edge, 0.0), (edge, height), (edge + wide, height)]
     corners += [(edge + wide, after), (99.0, after)] if after == 0.0 else [(99.0, height)]
-    return built.walk(ground=hs.Ground(friction=walking.FRICTION, profile=np.array(corners)))
+    return profiled(corners)
 
 
-def landing_late(rng: Rng) -> Case:
+def landing_late(rng: Rng, strength: float) -> Changes:
     """Let the ground step down, in mid-swing and for good."""
-    depth = float(rng.uniform(0.03, 0.08))
+    depth = strength * float(rng.uniform(0.03, 0.08))
     edge = float(rng.choice(GAPS) + rng.uniform(0.005, 0.09))
-    corners = [(-9.0, 0.0), (edge, 0.0), (edge, -depth), (99.0, -depth)]
-    return built.walk(ground=hs.Ground(friction=walking.FRICTION, profile=np.array(corners)))
+    return profiled([(-9.0, 0.0), (edge, 0.0), (edge, -depth), (99.0, -depth)])
 
 
-def weak(rng: Rng) -> Case:
+def weak(rng: Rng, strength: float) -> Changes:
     """Let all motors, or those of a joint of both legs, give little torque."""
     limit = np.full(6, 300.0)
     which = int(rng.integers(0, 3))
     most = {0: 14.0, 1: 9.0, 2: 10.0}[which]
     if rng.random() < 0.5:
-        limit[:] = rng.uniform(5.0, 10.0)
+        limit[:] = milder(float(rng.uniform(5.0, 10.0)), 300.0, strength)
     else:
-        limit[[which, which + 3]] = rng.uniform(0.3, 0.6) * most
-    return built.walk(robot=robot(torque_lower=-limit, torque_upper=limit))
+        few = milder(float(rng.uniform(0.3, 0.6)) * most, 300.0, strength)
+        limit[[which, which + 3]] = few
+    return {"numbers": {"torque_lower": -limit, "torque_upper": limit}}
 
 
-def slow(rng: Rng) -> Case:
+def slow(rng: Rng, strength: float) -> Changes:
     """Let motors be slower than the gait is."""
     hinges = np.arange(9) >= 3
-    fastest = float(rng.uniform(0.8, 2.2))
-    return built.walk(
-        robot=robot(
-            stall_torque=np.where(hinges, float(rng.uniform(80.0, 250.0)), np.inf),
-            no_load_speed=np.where(hinges, fastest, np.inf),
-        )
-    )
+    fastest = milder(float(rng.uniform(0.8, 2.2)), QUICK, strength)
+    return {
+        "numbers": {
+            "stall_torque": np.where(hinges, float(rng.uniform(80.0, 250.0)), np.inf),
+            "no_load_speed": np.where(hinges, fastest, np.inf),
+        }
+    }
 
 
-def stopped(rng: Rng) -> Case:
+def stopped(rng: Rng, strength: float) -> Changes:
     """Let a joint end before the gait is where it goes."""
     number, joint, low, high = STOPS[int(rng.integers(0, len(STOPS)))]
-    return built.walk(
-        robot=robot(**{number: of_joint(number, joint, float(rng.uniform(low, high)))})
-    )
+    end = float(rng.uniform(low, high))
+    end += (1.0 - strength) * (BEYOND if number == "upper" else -BEYOND)
+    return {"numbers": {number: of_joint(number, joint, end)}}
 
 
 STOPS = (
@@ -142,9 +169,9 @@ STOPS = (
 """Ends of joints that lie inside the gait and outside its beginning (rad)."""
 
 
-def folding(rng: Rng) -> Crouch:
+def folding(rng: Rng, strength: float) -> Changes:
     """Load it from above, suddenly, as it stands on bent legs of springs without limits."""
-    return Crouch(float(rng.uniform(4000.0, 9000.0)))
+    return {"load": strength * float(rng.uniform(4000.0, 9000.0))}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -167,27 +194,37 @@ class Crouch:
         )  # fmt: skip
 
 
-def faulty(rng: Rng) -> Case:
+def faulty(rng: Rng, strength: float) -> Changes:
     """Let the controller go wrong about one joint."""
     joint = f"{rng.choice(LEGS)}_{rng.choice(['hip', 'knee', 'ankle'])}"
-    steady = float(rng.choice([-1.0, 1.0]) * rng.uniform(60.0, 150.0))
+    steady = strength * float(rng.choice([-1.0, 1.0]) * rng.uniform(60.0, 150.0))
     fault: Callable[[float], float] = [
         lambda torque: -torque, lambda _: 0.0, lambda _: float("nan"),
         lambda _: steady,
     ][int(rng.integers(0, 4))]  # fmt: skip
-    return built.faulty(joint, fault)
+    return {"law": built.faulty_law(joint, fault)}
 
 
-def diverging(rng: Rng) -> Case:
+def diverging(rng: Rng, strength: float) -> Changes:
     """Give a joint a spring that is too stiff for explicit steps, and take such."""
     joint = f"{rng.choice(LEGS)}_{rng.choice(['hip', 'knee', 'ankle'])}"
-    return built.walk(
-        robot=robot(stiffness=of_joint("stiffness", joint, 10.0 ** float(rng.uniform(7.0, 12.0)))),
-        method=EXPLICIT,
-    )
+    stiff = 10.0 ** (strength * float(rng.uniform(7.0, 12.0)))
+    return {"numbers": {"stiffness": of_joint("stiffness", joint, stiff)}, "method": EXPLICIT}
 
 
-KINDS: dict[Cause, Callable[[Rng], Case | Crouch]] = {
+def case_of(*several: Changes) -> Case | Crouch:
+    """Return the walk to which several things are done, or the stand under a load."""
+    done: dict[str, Any] = {}
+    numbers: dict[str, np.ndarray] = {}
+    for changes in several:
+        if "load" in changes:
+            return Crouch(changes["load"])
+        numbers |= changes.get("numbers", {})
+        done |= {name: each for name, each in changes.items() if name != "numbers"}
+    return built.walk(**done, **({"robot": robot(**numbers)} if numbers else {}))
+
+
+KINDS: dict[Cause, Callable[[Rng, float], Changes]] = {
     Cause.SLIPPED: slippery,
     Cause.TIPPED_FORWARD: tipping_forward,
     Cause.TIPPED_BACK: tipping_back,
@@ -220,11 +257,65 @@ def told_cause(cause: Cause, seed: int) -> tuple[str, int]:
     """Build a fall; return what is told of it, and how often it had to be drawn."""
     rng = np.random.default_rng([seed, list(KINDS).index(cause)])
     for draws in range(1, MOST_DRAWS + 1):
-        run = KINDS[cause](rng).run(on_error="stop")
+        run = case_of(KINDS[cause](rng, 1.0)).run(on_error="stop")
         found = first_cause(run, gait_of(cause))
         if found is not None:
             return str(found), draws
     return "no fall", MOST_DRAWS
+
+
+def random_fall(seed: int) -> tuple[str, set[Cause], int]:
+    """Draw a fall at random; return what is told of it, its causes and how often it was drawn.
+
+    Two or three things at once are done to a walk, each as strong as it happens to be. Causes are
+    those without which the robot walks on. What falls in any case, or for nothing, is drawn again.
+    """
+    rng = np.random.default_rng([seed, len(KINDS)])
+    kinds = [cause for cause in KINDS if cause not in OF_THEIR_OWN]
+    draws = 0
+    while True:
+        draws += 1
+        chosen = rng.permutation(len(kinds))[: int(rng.integers(2, MOST_AT_ONCE + 1))]
+        done = {
+            kinds[k]: KINDS[kinds[k]](rng, float(rng.uniform(MILDEST, 1.0)))
+            for k in chosen.tolist()
+        }
+        touched = [name for each in done.values() for name in touches(each)]
+        if len(set(touched)) < len(touched):
+            continue  # two grounds, or two pushes: one would hide the other
+        told = told_of(list(done.values()))
+        if not told:
+            continue
+        causes = {
+            cause for cause in done
+            if not told_of([each for other, each in done.items() if other is not cause])
+        }  # fmt: skip
+        if causes:
+            return told, causes, draws
+
+
+def touches(changes: Changes) -> list[str]:
+    """Name what changes set."""
+    return [*(changes.keys() - {"numbers"}), *changes.get("numbers", {})]
+
+
+def told_of(done: list[Changes]) -> str:
+    """Tell why a walk falls to which something is done; nothing if it does not."""
+    found = first_cause(case_of(*done).run(on_error="stop"), walking.gait())
+    return "" if found is None else str(found)
+
+
+def at_random(count: int, seed: int, *, show: bool) -> None:
+    """Draw falls at random, and print how many are named rightly."""
+    right = draws = 0
+    for number in range(seed, seed + count):
+        told, causes, drawn = random_fall(number)
+        good = told.partition(" at ")[0] in {cause.value for cause in causes}
+        right, draws = right + good, draws + drawn
+        if show and not good:
+            print(f"    {number}: {told}; without {', '.join(c.value for c in causes)} it walks on",
+                  flush=True)  # fmt: skip
+    print(f"{right} of {count} named rightly, {100.0 * right / count:.1f} %, of {draws} drawn")
 
 
 def main() -> None:
@@ -235,7 +326,11 @@ def main() -> None:
     parser.add_argument("--each", type=int, default=20, help="falls of each kind")
     parser.add_argument("--seed", type=int, default=0, help="of the first")
     parser.add_argument("--wrong", action="store_true", help="show those that are named wrongly")
+    parser.add_argument("--random", type=int, default=0, help="falls drawn at random, instead")
     options = parser.parse_args()
+    if options.random:
+        at_random(options.random, options.seed, show=options.wrong)
+        return
     right = total = 0
     for cause in KINDS:
         named: Counter[str] = Counter()

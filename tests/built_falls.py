@@ -11,6 +11,7 @@ import walking
 
 import heelstrike as hs
 from heelstrike.analysis.diagnosis.symptoms import Cause
+from heelstrike.experiments.laws import Entry
 from heelstrike.experiments.laws import walking as walking_law
 from heelstrike.experiments.what_if import Case
 from heelstrike.sim.controller.interface import Contacts
@@ -58,9 +59,14 @@ def pushed(newtons: float, **others: object) -> Case:
     )
 
 
+def faulty_law(joint: str, fault: Callable[[float], float]) -> Entry:
+    """Return computed torque with a fault from `SINCE` on."""
+    return walking_law("Faulty", lambda _, __: Faulty(joint, fault))
+
+
 def faulty(joint: str, fault: Callable[[float], float]) -> Case:
     """Return the walk under a controller that has a fault from `SINCE` on."""
-    return walk(law=walking_law("Faulty", lambda _, __: Faulty(joint, fault)))
+    return walk(law=faulty_law(joint, fault))
 
 
 def weak(newton_metres: float) -> Case:

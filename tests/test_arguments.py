@@ -123,7 +123,7 @@ Gradient Largest
 LimitCycle ModeChange Monodromy Motion PhasedGait PlannerComparison Robot Run RunDerivatives
 Snapshot SpatialRobot StepDerivatives StepFamily ZeroDynamics"""
 """What functions return, or `from_gait` and the like make."""
-TOLD_APART = """Bundle Constraint ContactPhase EndOfRun GaitLQR GroundShape MotionTracking
+TOLD_APART = """Bundle Constraint ContactPhase EndOfRun GaitLQR GroundShape MotionLQR MotionTracking
 SteppingConstraints VirtualConstraints ZeroMomentPointRegulation array builtin_robots cell
 controller number part watch"""
 """Declarations of controllers, laws, classes to derive from, and the viewer, whose own tests have

@@ -8,18 +8,14 @@ same in bare calls of :func:`~heelstrike.simulate_batch`, in turn, and prints pr
 smallest of some rounds; where the machine is not quiet, that counts and not the time on the wall.
 
 `kills` begins a campaign of short trials in a process of its own, kills that with SIGKILL at random
-moments and begins it again, until it is through: every trial must be there, once, and be the one
-of a campaign that was left alone.
+moments and begins it again, until it is through; then the same with the workers of one. Every trial
+must be there, once, and be the one of a campaign that was left alone.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import resource
-import signal
-import sqlite3
-import subprocess
 import sys
 import tempfile
 import time
@@ -28,30 +24,14 @@ from pathlib import Path
 import numpy as np
 
 import heelstrike as hs
-from heelstrike.cli.options import method_called
-from heelstrike.experiments.campaigns.file import load_campaign
-from heelstrike.experiments.campaigns.store import DATABASE
 from heelstrike.experiments.campaigns.trials import laid_out
 
+# Run as a folder, its modules would be on the path and not the package.
+sys.path[0] = str(Path(__file__).resolve().parent.parent)
+
+from campaigns.killing import campaign_of, killed, short_campaign  # noqa: E402
+
 MIX = Path(__file__).parent / "mix.toml"
-SHORT = """
-controller = "JointFeedback"
-duration = 0.05
-trials = {trials}
-seed = 7
-[parameters]
-"ground.friction" = {{ uniform = [0.2, 0.9] }}
-"state.v.root_x" = {{ normal = [0.0, 0.2] }}
-"""
-FIRST, LAST = 0.0, 1.5
-"""Shortest and longest time (s) between the first outcome of a process and its end."""
-
-
-def campaign_of(text: str, folder: Path) -> hs.Campaign:
-    """Return the campaign that a text describes."""
-    file = folder / "campaign.toml"
-    file.write_text(text, encoding="utf-8")
-    return load_campaign(file, folder, method_called)[0]
 
 
 def bare(campaign: hs.Campaign, threads: int) -> hs.BatchResult:
@@ -104,50 +84,22 @@ def cost(trials: int, rounds: int, workers: int) -> None:
 
 
 def kills(count: int, trials: int, seed: int) -> None:
-    """Kill a campaign again and again; tell what was lost or done twice."""
-    rng, text = np.random.default_rng(seed), SHORT.format(trials=trials)
-    with tempfile.TemporaryDirectory() as folder:
-        home = Path(folder)
-        whole = campaign_of(text, home)
-        wanted = repr(whole.run().outcomes)
-        killed = rounds = 0
-        while killed < count:
-            kept = home / f"kept{rounds}"
+    """Kill campaigns and workers again and again, half of the times each; tell what was lost."""
+    for who, workers in (("campaigns", False), ("workers", True)):
+        deaths = lost = twice = rounds = 0
+        while deaths < count // 2:
+            with tempfile.TemporaryDirectory() as folder:
+                whole = short_campaign(Path(folder), trials)
+                found = killed(
+                    Path(folder), whole, workers=workers, most=count // 2 - deaths,
+                    seed=seed + rounds,
+                )  # fmt: skip
             rounds += 1
-            while True:
-                child = subprocess.Popen(
-                    [sys.executable, __file__, "run", str(home / "campaign.toml"), str(kept)]
-                )
-                before = rows(kept)
-                while child.poll() is None and rows(kept) <= before:
-                    time.sleep(0.005)
-                pause = float(rng.uniform(FIRST, LAST))
-                try:
-                    child.wait(pause if killed < count else None)
-                    break
-                except subprocess.TimeoutExpired:
-                    os.kill(child.pid, signal.SIGKILL)
-                    child.wait()
-                    killed += 1
-            results = whole.load(kept)
-            with sqlite3.connect(kept / DATABASE) as connection:
-                numbers = [n for (n,) in connection.execute("SELECT number FROM trials")]
-            lost, twice = trials - len(set(numbers)), len(numbers) - len(set(numbers))
-            same = repr(results.outcomes) == wanted
-            print(f"{killed} kills: {lost} lost, {twice} twice, outcomes the same: {same}",
-                  flush=True)  # fmt: skip
-            assert not lost, "trials were lost"
-            assert not twice, "trials are there twice"
-            assert same, "outcomes differ"
-
-
-def rows(folder: Path) -> int:
-    """Count the outcomes that are kept in a folder."""
-    try:
-        with sqlite3.connect(f"file:{folder / DATABASE}?mode=ro", uri=True) as connection:
-            return int(connection.execute("SELECT COUNT(*) FROM trials").fetchone()[0])
-    except sqlite3.OperationalError:  # not begun
-        return 0
+            deaths, lost, twice = deaths + found.kills, lost + found.lost, twice + found.twice
+            print(f"{deaths} {who} killed in {rounds} campaigns of {trials} trials: {lost} lost, "
+                  f"{twice} twice, outcomes the same: {found.same}", flush=True)  # fmt: skip
+            if found.lost or found.twice or not found.same:
+                raise SystemExit(1)
 
 
 def main() -> None:
@@ -164,17 +116,11 @@ def main() -> None:
     deaths.add_argument("--kills", type=int, default=200)
     deaths.add_argument("--trials", type=int, default=4000)
     deaths.add_argument("--seed", type=int, default=0)
-    one = commands.add_parser("run", help="run a campaign of a file")
-    one.add_argument("file", type=Path)
-    one.add_argument("folder", type=Path)
     options = parser.parse_args()
     if options.command == "cost":
         cost(options.trials, options.rounds, options.workers)
-    elif options.command == "kills":
-        kills(options.kills, options.trials, options.seed)
     else:
-        campaign, _ = load_campaign(options.file, options.file.parent, method_called)
-        campaign.run(options.folder, workers=1)
+        kills(options.kills, options.trials, options.seed)
 
 
 if __name__ == "__main__":

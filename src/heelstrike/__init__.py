@@ -82,6 +82,7 @@ if TYPE_CHECKING:
     from heelstrike.control import GaitLQR as GaitLQR
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
+    from heelstrike.control import MotionLQR as MotionLQR
     from heelstrike.control import MotionTracking as MotionTracking
     from heelstrike.control import Policy as Policy
     from heelstrike.control import Sensed as Sensed
@@ -96,6 +97,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
     from heelstrike.errors import GaitError as GaitError
+    from heelstrike.errors import GaitNotFoundError as GaitNotFoundError
     from heelstrike.errors import HeelstrikeError as HeelstrikeError
     from heelstrike.errors import InfeasibleGaitError as InfeasibleGaitError
     from heelstrike.errors import LimitCycleError as LimitCycleError
@@ -108,6 +110,7 @@ if TYPE_CHECKING:
     from heelstrike.experiments.campaigns import CampaignResults as CampaignResults
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.experiments.engine_comparison import compare_engines as compare_engines
+    from heelstrike.experiments.identification import identify as identify
     from heelstrike.experiments.people import mimic as mimic
     from heelstrike.experiments.planners import PlannerComparison as PlannerComparison
     from heelstrike.experiments.planners import compare_planners as compare_planners
@@ -206,6 +209,7 @@ _HOME = {
     "GaitError": "heelstrike.errors",
     "GaitFamily": "heelstrike.gait",
     "GaitLQR": "heelstrike.control",
+    "GaitNotFoundError": "heelstrike.errors",
     "Gradient": "heelstrike.sim.linearized.derivatives",
     "Ground": "heelstrike.contact",
     "GroundShape": "heelstrike.contact",
@@ -224,6 +228,7 @@ _HOME = {
     "ModeChange": "heelstrike.sim.linearized.mode_changes",
     "Monodromy": "heelstrike.analysis.stability.monodromy",
     "Motion": "heelstrike.gait",
+    "MotionLQR": "heelstrike.control",
     "MotionTracking": "heelstrike.control",
     "PhasedGait": "heelstrike.gait",
     "Planner": "heelstrike.gait",
@@ -278,6 +283,7 @@ _HOME = {
     "gait_family": "heelstrike.gait",
     "gait_sensitivity_norm": "heelstrike.analysis.stability.sensitivity",
     "human": "heelstrike.robot.human",
+    "identify": "heelstrike.experiments.identification",
     "inspect_robot": "heelstrike.robot",
     "largest_ground_step": "heelstrike.analysis.stability.largest",
     "largest_push": "heelstrike.analysis.stability.largest",

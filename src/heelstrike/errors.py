@@ -19,6 +19,13 @@ class InfeasibleGaitError(GaitError):
     """No gait satisfies the request; the message names the constraints in conflict."""
 
 
+class GaitNotFoundError(InfeasibleGaitError):
+    """No gait was found that satisfies the request, which does not prove that there is none.
+
+    The message names the constraints that were in conflict where the optimiser came nearest.
+    """
+
+
 class ControllerError(HeelstrikeError, ValueError):
     """A controller was set up wrongly or returned torques of the wrong shape."""
 

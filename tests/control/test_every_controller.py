@@ -40,6 +40,11 @@ def on_points(make: Callable[..., Law]) -> tuple[hs.Robot, hs.State, Law]:
     return phased().robot, hs.zero_dynamics(phased()).initial_state, make(phased())
 
 
+def in_phases(make: Callable[..., Law]) -> tuple[hs.Robot, hs.State, Law]:
+    robot, gait = walking.bravo7(), walking.gait()
+    return robot, gait.initial_state, make(robot, gait.motion(robot))
+
+
 def standing(make: Callable[..., Law]) -> tuple[hs.Robot, hs.State, Law]:
     robot = walking.bravo7()
     return robot, robot.reference_state(), make(robot)
@@ -54,6 +59,8 @@ LAWS: dict[str, Callable[[], tuple[hs.Robot, hs.State, Law]]] = {
         lambda robot: JointFeedback(robot, np.zeros(6), kp=3000.0, kd=30.0)
     ),
     "JointPD": lambda: on_flat_feet(lambda *given: hs.JointPD(*given, kp=1000.0, kd=20.0)),
+    "MotionLQR": lambda: in_phases(hs.MotionLQR),
+    "MotionTracking": lambda: in_phases(hs.MotionTracking),
     "StandingLQR": lambda: standing(hs.StandingLQR),
     "SteppingConstraints": lambda: on_points(
         lambda gait: hs.SteppingConstraints(hs.StepFamily.around(gait))

@@ -346,7 +346,7 @@ SMOOTH = {"step_length": 0.3, "step_duration": 0.70, "clearance_profile": "smoot
 def test_infeasible_requests_name_the_constraints_in_conflict(
     bravo7: hs.Robot, request_: dict[str, Any], named: list[str]
 ) -> None:
-    with pytest.raises(InfeasibleGaitError, match="violates") as caught:
+    with pytest.raises(hs.GaitNotFoundError, match=r"not prove .* violates") as caught:
         hs.optimize_gait(bravo7, **request_, starts=1)
     message = str(caught.value)
     assert "bravo7" in message
@@ -359,8 +359,22 @@ def test_infeasible_requests_name_the_constraints_in_conflict(
 
 
 def test_a_step_beyond_the_legs_tells_their_reach(bravo7: hs.Robot) -> None:
-    with pytest.raises(InfeasibleGaitError, match=r"less than 1\.768 m apart"):
+    with pytest.raises(InfeasibleGaitError, match=r"less than 1\.768 m apart") as caught:
         hs.optimize_gait(bravo7, step_length=2.0, step_duration=0.7)
+    assert not isinstance(caught.value, hs.GaitNotFoundError)  # it is proved
+
+
+@pytest.mark.slow
+def test_a_step_on_slippery_ground_is_found_from_a_point_that_satisfies_all(
+    spring_flamingo: hs.Robot,
+) -> None:
+    """The first starting point leads nowhere there, and a falling barrier misses the optimum."""
+    gait = hs.optimize_gait(
+        spring_flamingo, step_length=0.27, step_duration=0.67, clearance=0.027, friction=0.3
+    )
+    assert gait.optimal
+    assert gait.margins.impulse_friction_use == pytest.approx(1.0, abs=1e-4)
+    assert gait.margins.friction_use <= 1.0
 
 
 @pytest.mark.parametrize(

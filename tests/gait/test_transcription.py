@@ -118,12 +118,12 @@ def test_constraints_along_the_path(
     assert effort[0] == pytest.approx(now.torque @ now.torque, rel=1e-9)
     expected = path_values(robot, asked, now)
     rows = program.transcription.path_rows
-    assert {(row.group, row.subject) for row in rows} == expected.keys()
+    assert {(row.kind, row.subject) for row in rows} == expected.keys()
     assert len(rows) == len(expected)
     for row, value in zip(rows, values, strict=True):
-        told = np.array([value, row.lower, row.upper]) * row.scale
+        told = np.array([value, row.lower, row.upper]) * row.unit
         np.testing.assert_allclose(
-            told, expected[row.group, row.subject], rtol=1e-9, atol=1e-9, err_msg=str(row)
+            told, expected[row.kind, row.subject], rtol=1e-9, atol=1e-9, err_msg=str(row)
         )
 
 
@@ -158,11 +158,11 @@ def test_the_kind_of_foot_decides_about_the_moment_of_the_ground() -> None:
         )  # fmt: skip
         transcription = Transcription(request)
         rows[name] = [*transcription.path_rows, *transcription.touchdown_rows]
-    flat, point = ({row.group for row in rows[name]} for name in ("bravo7", "rabbit"))
+    flat, point = ({row.kind for row in rows[name]} for name in ("bravo7", "rabbit"))
     sole = {Group.ZERO_MOMENT_POINT, Group.IMPULSE_CENTER, Group.TOUCHDOWN_ANGLE}
     assert flat - point == sole
     assert point - flat == {Group.ANKLE}
-    (ankle,) = (row for row in rows["rabbit"] if row.group is Group.ANKLE)
+    (ankle,) = (row for row in rows["rabbit"] if row.kind is Group.ANKLE)
     assert ankle.lower == ankle.upper == 0.0
 
 

@@ -10,6 +10,7 @@ from heelstrike import __version__
 from heelstrike.cli.campaign import campaign
 from heelstrike.cli.check import check
 from heelstrike.cli.compare import compare
+from heelstrike.cli.identify import identify
 from heelstrike.cli.inspect import inspect
 from heelstrike.cli.mimic import mimic
 from heelstrike.cli.paper import paper
@@ -41,6 +42,7 @@ for command in (
     zoo,
     campaign,
     check,
+    identify,
     mimic,
     paper,
     compare,

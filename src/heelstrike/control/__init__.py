@@ -6,6 +6,7 @@ from heelstrike.control.computed_torque import ComputedTorque, Encoder
 from heelstrike.control.estimation import Estimated
 from heelstrike.control.gait_lqr.flat_law import FlatGaitLQR
 from heelstrike.control.gait_lqr.law import GaitLQR
+from heelstrike.control.gait_lqr.phases_law import MotionLQR
 from heelstrike.control.joint_pd import Feedforward, JointPD
 from heelstrike.control.motion_tracking import MotionTracking
 from heelstrike.control.noise import RandomNumbers
@@ -44,6 +45,7 @@ __all__ = [
     "Law",
     "Layer",
     "LinearEquations",
+    "MotionLQR",
     "MotionTracking",
     "Network",
     "Policy",

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from heelstrike.arguments import refusal, shown
 from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.gait import Gait
+from heelstrike.gait.motion.motion import Motion
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.law import REAL, per_actuator
@@ -28,7 +29,7 @@ def must_be(kind: type, name: str, value: object) -> None:
         raise ControllerError(refusal(name, value, (kind.__name__,)))
 
 
-def check_gait(robot: Robot, gait: Gait) -> None:
+def check_gait(robot: Robot, gait: Gait | Motion) -> None:
     """Refuse a gait of another robot.
 
     A robot with other numbers than the gait was designed for will do, as long as it is called the
@@ -40,6 +41,12 @@ def check_gait(robot: Robot, gait: Gait) -> None:
         That names the robots, or the joints.
     """
     must_be(Robot, "robot", robot)
+    if isinstance(gait, Motion):
+        raise ControllerError(
+            "this law stands on one foot at a time, all of a step, and follows a Gait of "
+            "optimize_gait. A Motion of any phases is followed by hs.ComputedTorque and by "
+            "hs.MotionLQR"
+        )
     must_be(Gait, "gait", gait)
     try:
         gait.check_joints(robot)

@@ -15,11 +15,13 @@ from heelstrike.compiler.bundle import array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import check_gait, gains_of, must_be
 from heelstrike.control.followed_gait import FollowedGait, followed
+from heelstrike.control.motion_tracking import motion_tracking, tracked
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.queries.loops import loop_jacobian
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
+from heelstrike.gait.motion.motion import Motion
 from heelstrike.gait.polynomials import motion_in_piece, place_in_step
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
@@ -222,8 +224,9 @@ class ComputedTorque(Law):
     robot : Robot
         A floating robot with two feet, mirror symmetric, all joints but the trunk's actuated, or
         driven by such through closed loops and couplings.
-    gait : Gait
-        The gait to follow.
+    gait : Gait or Motion
+        The gait to follow; or a motion of any phases, which is followed as by
+        :class:`~heelstrike.MotionTracking`.
     kp, kd : float or (nu,) array
         Gains of eq. 38, in 1/s² and 1/s.
     encoder : Encoder, optional
@@ -233,18 +236,30 @@ class ComputedTorque(Law):
     ------
     ControllerError
         If the robot cannot be controlled this way, or gait or gains do not fit it.
+    GaitError
+        If a motion was designed for another robot.
     """
 
     def __init__(
         self,
         robot: Robot,
-        gait: Gait,
+        gait: Gait | Motion,
         *,
         kp: ArrayLike = 400.0,
         kd: ArrayLike = 40.0,
         encoder: Encoder | None = None,
     ) -> None:
         must_be(Robot, "robot", robot)
+        self.gait, self.encoder = gait, encoder
+        if isinstance(gait, Motion):
+            if encoder is not None:
+                raise ControllerError(
+                    "joint encoders tell where the robot is only while a foot lies flat, which a "
+                    "motion of any phases need not let it do; leave encoder out"
+                )
+            tracks, sizes = tracked(robot, gait, kp, kd)
+            super().__init__(motion_tracking, tracks, memory=sizes, robot=robot)
+            return
         refuse_loops(robot, "computed torque", ControllerError, loops=False)
         pitch = pitch_of(robot)
         check_gait(robot, gait)
@@ -264,8 +279,6 @@ class ComputedTorque(Law):
         )
         start = {"stance": gait.stance_foot, "landed": 1}
         super().__init__(computed_torque, parameters, memory=start, robot=robot)
-        self.gait = gait
-        self.encoder = encoder
 
 
 def pitch_of(robot: Robot) -> int:

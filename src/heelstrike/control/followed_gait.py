@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.control.followed_motion import EARLIEST, LATEST
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.model import Floats
 
@@ -35,7 +36,7 @@ def followed(gait: Gait) -> dict[str, Any]:
     return {
         "breakpoints": gait.breakpoints,
         "coefficients": np.array(sides),
-        "earliest": 0.5 * duration,
-        "latest": 1.1 * duration,
+        "earliest": EARLIEST * duration,
+        "latest": LATEST * duration,
         "landing": 0.02 * duration,
     }

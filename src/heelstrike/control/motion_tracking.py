@@ -17,13 +17,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.compiler.bundle import array, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import gains_of, must_be
+from heelstrike.control.followed_motion import (
+    FollowedMotion,
+    PhaseClock,
+    advance_phase,
+    cycle_of,
+    followed_motion,
+    place_in_phase,
+)
 from heelstrike.dynamics.dense import solve_to_rank
-from heelstrike.gait.motion.motion import Motion, MotionPhase
-from heelstrike.gait.motion.phases import standing
-from heelstrike.gait.motion.request import Repeat
+from heelstrike.gait.motion.motion import Motion
 from heelstrike.gait.polynomials import motion_in_piece
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
@@ -33,52 +39,23 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
 PRICE_OF_FORCES = 1e-6
 """ε, in (m/s²)² for forces of the robot's weight: so small that forces give way before motion."""
-EARLIEST = 0.5
-"""Share of a phase before which a touchdown does not end it: the foot scuffs."""
-LATEST = 1.1
-"""Share of a phase until which its polynomials go on if no touchdown ends it."""
 
 
-class Parameters(Bundle):
-    """Numbers of the law: the phases of a motion, those of its mirror image after them."""
+class Parameters(FollowedMotion):
+    """Numbers of the law."""
 
-    duration: Floats = array("phases")
-    """Duration of each phase (s)."""
-    begins: Floats = array("pieces")
-    """When each piece begins in its phase (s)."""
-    first: Integers = array("phases + 1", of=int)
-    """First piece of each phase."""
-    pieces: Floats = array("pieces", "terms", "nv")
-    """Coefficients of all coordinates, lowest first."""
     force: Floats = array("pieces", "stages", "rows")
     """Coefficients of the contact forces (N), (normal, tangent) point by point."""
-    stands: Integers = array("phases", "rows", of=int)
-    """Whether the force along each row is one of those that hold the robot."""
-    fresh: Integers = array("phases", "nc", of=int)
-    """Whether the touchdown of a contact point ends a phase."""
-    rolls: Integers = array("phases", of=int)
-    """Whether all that comes down at the end of a phase is of links that stand already: a foot that
-    rolls flat may touch at no speed, and so late by any small error. Then time ends the phase, and
-    the torques of the next one press the foot down."""
-    following: Integers = array("phases", of=int)
-    """The phase after each; -1 after the last of a motion that never repeats."""
     kp: Floats = array("nu")
     kd: Floats = array("nu")
     """kp, kd: Gains (1/s², 1/s)."""
     weight: float = number(float)
     """Of the robot (N)."""
-    earliest: float = number(float)
-    latest: float = number(float)
-    """earliest, latest: Shares of a phase, see :data:`EARLIEST` and :data:`LATEST`."""
 
 
-class Memory(Bundle):
+class Memory(PhaseClock):
     """What the law remembers, and its scratch."""
 
-    phase: int = cell(int)
-    """The phase it is in."""
-    start: float = cell(float)
-    """When that began (s)."""
     mass: Floats = array("nv", "nv")
     bias: Floats = array("nv")
     passive: Floats = array("nv")
@@ -94,30 +71,6 @@ class Memory(Bundle):
     """system, unknown, order: The linear equations of the minimum."""
     held: Integers = array("rows", of=int)
     """Rows that hold the robot, one after the other."""
-
-
-@kernel
-def advance_phase(t: float, contacts: Contacts, parameters: Parameters, memory: Memory) -> None:
-    """Go on to the next phase: at the touchdown that ends one, or as it is over."""
-    phase = memory.phase
-    gone, duration = t - memory.start, parameters.duration[phase]
-    ends_by_touchdown, touched = False, False
-    for i in range(parameters.fresh.shape[1]):
-        if parameters.fresh[phase, i] == 1:
-            ends_by_touchdown = True
-            touched = touched or contacts.force[i, 0] > 0.0
-    if parameters.following[phase] < 0:
-        return
-    if ends_by_touchdown:
-        if touched and gone >= parameters.earliest * duration:
-            memory.start = t
-            memory.phase = parameters.following[phase]
-        elif parameters.rolls[phase] == 1 and gone >= duration:
-            memory.start += duration
-            memory.phase = parameters.following[phase]
-    elif gone >= duration:
-        memory.start += duration
-        memory.phase = parameters.following[phase]
 
 
 @kernel
@@ -165,18 +118,7 @@ def motion_tracking(
     """Torques that make the joints follow the motion."""
     advance_phase(t, contacts, parameters, memory)
     phase = memory.phase
-    duration = parameters.duration[phase]
-    gone, latest = t - memory.start, parameters.latest * duration
-    if parameters.following[phase] < 0:
-        latest = duration
-    moves = 0.0 if gone > latest else 1.0
-    gone = min(gone, latest)
-    first, last = parameters.first[phase], parameters.first[phase + 1]
-    piece = first
-    while piece < last - 1 and gone >= parameters.begins[piece + 1]:
-        piece += 1
-    inside = gone - parameters.begins[piece]
-
+    piece, inside, moves = place_in_phase(t, parameters, memory)
     for i in range(robot.nu):
         joint = robot.model.actuator_joint[i]
         position, velocity, acceleration = motion_in_piece(
@@ -222,7 +164,8 @@ class MotionTracking(Law):
     A phase ends when the points come down that stand in the next one, in its second half; one in
     which nothing comes down ends by time, and so at the latest does one in which a foot that stands
     rolls onto other points of its own. Nothing brings back what the joints do not reach, as the
-    pitch of a trunk on a point: motions may be unstable under this law.
+    pitch of a trunk on a point: motions may be unstable under this law, and
+    :class:`~heelstrike.MotionLQR` makes them stable.
 
     Parameters
     ----------
@@ -246,70 +189,22 @@ class MotionTracking(Law):
     ) -> None:
         must_be(Robot, "robot", robot)
         must_be(Motion, "motion", motion)
-        motion.check_robot(robot)
-        cycle = cycle_of(robot, motion)
-        free = robot.nv - robot.nu
-        unknowns = robot.nv + free + 4 * robot.nc
-        repeats = motion.repeat is not Repeat.NEVER
-        stands = [_rows_of(robot, phase) for phase in cycle]
-        starts = [*range(1, len(cycle)), 0 if repeats else -1]
-        points = [set(phase.contacts) for phase in cycle]
-        fresh = np.zeros((len(cycle), robot.nc), np.int64)
-        for p, following in enumerate(starts):
-            for name in points[following] - points[p] if following >= 0 else ():
-                fresh[p, robot.contact_names.index(name)] = 1
-        link = robot.model.contact_link
-        stood = [{int(link[robot.contact_names.index(n)]) for n in phase} for phase in points]
-        rolls = [
-            bool(row.any()) and set(link[row == 1].tolist()) <= links
-            for row, links in zip(fresh, stood, strict=True)
-        ]
-        parameters = Parameters(
-            duration=np.array([phase.duration for phase in cycle]),
-            begins=np.concatenate([phase.breakpoints[:-1] for phase in cycle]),
-            first=np.cumsum([0, *(len(phase.pieces) for phase in cycle)]),
-            pieces=np.concatenate([phase.pieces for phase in cycle]),
-            force=np.concatenate([phase.force_pieces for phase in cycle]),
-            stands=np.array(stands),
-            fresh=fresh,
-            rolls=np.array(rolls, np.int64),
-            following=np.array(starts),
-            kp=gains_of("kp", kp, robot),
-            kd=gains_of("kd", kd, robot),
-            weight=robot.weight,
-            earliest=EARLIEST,
-            latest=LATEST,
-        )
-        sizes = {"unknowns": unknowns, "rows": 2 * robot.nc}
+        parameters, sizes = tracked(robot, motion, kp, kd)
         super().__init__(motion_tracking, parameters, memory=sizes, robot=robot)
         self.motion = motion
 
 
-def _rows_of(robot: Robot, phase: MotionPhase) -> Integers:
-    """Whether a force along each row holds the robot in a phase, (2 nc,)."""
-    rows = np.zeros(2 * robot.nc, np.int64)
-    rows[standing(robot, [robot.contact_names.index(name) for name in phase.contacts]).forces] = 1
-    return rows
-
-
-def cycle_of(robot: Robot, motion: Motion) -> list[MotionPhase]:
-    """Return the phases of a motion, those of its mirror image after them if it has one."""
-    cycle = list(motion.phases)
-    if motion.repeat is Repeat.MIRRORED:
-        cycle += [mirrored_phase(robot, motion, phase) for phase in motion.phases]
-    return cycle
-
-
-def mirrored_phase(robot: Robot, motion: Motion, phase: MotionPhase) -> MotionPhase:
-    """Return the mirror image of a phase."""
-    pieces = motion.mirror_sign * phase.pieces[..., motion.mirror_joint]
-    pieces[:, 0] += motion.mirror_offset
-    names = robot.contact_names
-    points = sorted(int(motion.mirror_contact[names.index(name)]) for name in phase.contacts)
-    return MotionPhase(
-        contacts=tuple(names[i] for i in points),
-        breakpoints=phase.breakpoints,
-        pieces=pieces,
-        force=phase.force[:, :, motion.mirror_contact],
-        impulse=phase.impulse[motion.mirror_contact],
+def tracked(
+    robot: Robot, motion: Motion, kp: ArrayLike, kd: ArrayLike
+) -> tuple[Parameters, dict[str, int]]:
+    """Return the numbers of the law about a motion, and how much it remembers."""
+    motion.check_robot(robot)
+    parameters = Parameters(
+        **followed_motion(robot, motion),
+        force=np.concatenate([phase.force_pieces for phase in cycle_of(robot, motion)]),
+        kp=gains_of("kp", kp, robot),
+        kd=gains_of("kd", kd, robot),
+        weight=robot.weight,
     )
+    free = robot.nv - robot.nu
+    return parameters, {"unknowns": robot.nv + free + 4 * robot.nc, "rows": 2 * robot.nc}

@@ -52,14 +52,14 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
             return solution
     guesses = [program.sampled(start) for start in islice(starts(request), request.starts)]
     solutions: list[Solution] = []
-    while guesses:
-        solutions.append(program.solve(guesses.pop(0)))
+    for guess in guesses:
+        solutions.append(program.solve(guess))
         if len(solutions) == 1 and not solutions[0].converged:
             # Perhaps no start can succeed, which ends here in an error that tells why. Otherwise
             # a point that satisfies all constraints is as good a start as can be.
             feasible = nearest_to_feasible(program)
-            guesses.insert(0, feasible)
-        report(0.05 + 0.75 * len(solutions) / (len(solutions) + len(guesses)))
+            solutions.append(replace(program, inside=True).solve(feasible))
+        report(0.05 + 0.75 * len(solutions) / (len(guesses) + 1))
     good = [solution for solution in solutions if solution.converged]
     # Without an optimum, the best of the points that satisfy all constraints is better than none.
     good = good or [program.at(feasible), *filter(program.satisfied_by, solutions)]
@@ -129,7 +129,7 @@ def margins_of(program: Program, unknowns: Floats) -> Margins:
         np.array(part).ravel() for part in transcription.landing(*end[:3], ground)
     )
     touchdown = np.array(transcription.touchdown(*end, ground)).ravel()
-    groups = np.array([row.group for row in transcription.touchdown_rows])
+    groups = np.array([row.kind for row in transcription.touchdown_rows])
     placed = (groups == Group.TOUCHDOWN_PLACE) | (groups == Group.TOUCHDOWN_ANGLE)
     periodic = (groups == Group.IMPACT) | (groups == Group.PERIODIC)
     return Margins(

@@ -7,6 +7,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from os import PathLike
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +22,9 @@ from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.model import NUMBERS, Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+
+if TYPE_CHECKING:
+    from heelstrike.gait.motion.motion import Motion
 
 
 class Footing(enum.Enum):
@@ -380,6 +384,29 @@ class Gait(ShownInNotebooks):
         """
         image: Floats = self.mirror_sign * joints[..., self.mirror_joint]
         return image + self.mirror_offset if order == 0 else image
+
+    def motion(self, robot: Robot) -> Motion:
+        """Return the same walk as a motion of all coordinates, with the forces of the ground.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot that the gait was designed for.
+
+        Returns
+        -------
+        Motion
+            One step that repeats with its mirror image: what laws about motions of any phases, as
+            :class:`~heelstrike.MotionLQR`, follow.
+
+        Raises
+        ------
+        GaitError
+            If the gait is of another robot, or stands on both feet.
+        """
+        from heelstrike.gait.motion.from_gait import motion_of_gait
+
+        return motion_of_gait(robot, self)
 
     def _walk(self, t: ArrayLike, order: int) -> Floats:
         time = np.asarray(t, dtype=np.float64)

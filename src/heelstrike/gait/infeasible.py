@@ -1,4 +1,4 @@
-"""Why there is no gait: the constraints in conflict, and by how much."""
+"""Why no gait was found: the constraints in conflict, and by how much."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from itertools import islice
 
 import numpy as np
 
-from heelstrike.errors import InfeasibleGaitError
+from heelstrike.errors import GaitNotFoundError
 from heelstrike.gait.program import FEASIBLE, Program, Solution
 from heelstrike.gait.starts import starts
 from heelstrike.gait.transcription import Group
@@ -27,8 +27,8 @@ def nearest_to_feasible(program: Program) -> Floats:
 
     Raises
     ------
-    InfeasibleGaitError
-        If some violation always remains; the message names the constraints in conflict.
+    GaitNotFoundError
+        If some violation remains; the message names the constraints in conflict.
     """
     elastic = replace(program, elastic=True, near=False)
     found = []
@@ -37,7 +37,7 @@ def nearest_to_feasible(program: Program) -> Floats:
         if np.abs(program.violations(found[-1].unknowns)).max() <= FEASIBLE:
             return found[-1].unknowns
     nearest = min(found, key=lambda solution: solution.objective)
-    raise InfeasibleGaitError(_message(program, nearest))
+    raise GaitNotFoundError(_message(program, nearest))
 
 
 def _message(program: Program, nearest: Solution) -> str:
@@ -50,9 +50,10 @@ def _message(program: Program, nearest: Solution) -> str:
         duration, length = nearest.unknowns[-2:]
         step = f", with steps of {length:.3g} m in {duration:.3g} s,"
     return (
-        f"robot {request.robot.name!r}: no gait with {request} was found. The nearest to one{step} "
-        f"violates: {some_of(list(violated.values()), NAMED, '; ')}.{against} Ask for a shorter or "
-        "slower step, or relax one of these constraints."
+        f"robot {request.robot.name!r}: no gait with {request} was found, which does not prove "
+        f"that there is none. The nearest to one{step} violates: "
+        f"{some_of(list(violated.values()), NAMED, '; ')}.{against} Ask for a shorter or slower "
+        "step, or relax one of these constraints."
     )
 
 
@@ -61,12 +62,12 @@ def _worst_violations(program: Program, unknowns: Floats) -> dict[Group, str]:
     violations = np.abs(program.violations(unknowns))
     worst: dict[Group, tuple[float, str]] = {}
     for (row, phase), violation in zip(program.labelled_rows(), violations, strict=True):
-        if violation <= FEASIBLE or violation <= worst.get(row.group, (0.0, ""))[0]:
+        if violation <= FEASIBLE or violation <= worst.get(row.kind, (0.0, ""))[0]:
             continue
         subject = f" ({row.subject})" if row.subject else ""
         when = "" if phase is None else f" at {100.0 * phase:.0f} % of the step"
-        amount = f"{violation * row.scale:.3g} {row.group.unit}"
-        worst[row.group] = (violation, f"{row.group.text}{subject} by {amount}{when}")
+        amount = f"{violation * row.unit:.3g} {row.kind.unit}"
+        worst[row.kind] = (violation, f"{row.kind.text}{subject} by {amount}{when}")
     ordered = sorted(worst.items(), key=lambda item: -item[1][0])
     return {group: text for group, (_, text) in ordered}
 
@@ -77,7 +78,7 @@ def _binding_groups(program: Program, nearest: Solution, violated: set[Group]) -
     rows = program.labelled_rows()
     for (row, _), multiplier in zip(rows, nearest.multipliers[-len(rows) :], strict=True):
         if row.lower < row.upper:
-            strength[row.group] = max(strength.get(row.group, 0.0), abs(float(multiplier)))
+            strength[row.kind] = max(strength.get(row.kind, 0.0), abs(float(multiplier)))
     ordered = sorted(strength, key=lambda group: -strength[group])
     return [
         group.text for group in ordered if strength[group] > TAKES_PART and group not in violated

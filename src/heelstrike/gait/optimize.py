@@ -131,8 +131,10 @@ def optimize_gait(
     GaitError
         If the robot cannot walk this way or an argument makes no sense.
     InfeasibleGaitError
-        If no gait meets the request; the message names the constraints in conflict and by how much
-        they are violated at the least.
+        If no gait can meet the request: a step longer than the legs, or out of all time.
+    GaitNotFoundError
+        If none was found, which does not prove that there is none; the message names the
+        constraints in conflict and by how much they are violated at the least.
 
     Examples
     --------

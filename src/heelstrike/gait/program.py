@@ -16,8 +16,9 @@ from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.polynomials import Instants, coefficients, gauss, lobatto
 from heelstrike.gait.request import Request
+from heelstrike.gait.rows import Row
 from heelstrike.gait.starts import Start, typical_step
-from heelstrike.gait.transcription import Group, Row, Transcription
+from heelstrike.gait.transcription import Group, Transcription
 from heelstrike.interruption import deferred_interrupts
 from heelstrike.robot.model import Floats
 
@@ -59,6 +60,9 @@ NEAR = SETTINGS | {
     },
 }  # fmt: skip
 """Settings of IPOPT, and those for a start that is nearly an optimum."""
+INSIDE = SETTINGS | {"mu_strategy": "adaptive", "max_iter": 2 * MOST_ITERATIONS}
+"""Those for a start that satisfies all constraints where others led nowhere. The barrier follows
+the problem: an optimum that 100 iterations with a falling one missed takes 20."""
 
 
 def first_instants(request: Request) -> tuple[int, Instants]:
@@ -126,6 +130,8 @@ class Program:
     weight; the others only carry inequalities."""
     near: bool = False
     """Whether guesses are nearly optima."""
+    inside: bool = False
+    """Whether guesses satisfy all constraints."""
     elastic: bool = False
     """Let every constraint be violated and minimise the sum of the scaled violations instead of the
     effort: shows which constraints are in conflict when there is no solution."""
@@ -153,7 +159,7 @@ class Program:
         lower = np.array([[row.lower] for row in rows]).repeat(instants.share.size, axis=1)
         upper = np.array([[row.upper] for row in rows]).repeat(instants.share.size, axis=1)
         for k, row in enumerate(rows):
-            if row.group is Group.CLEARANCE:
+            if row.kind is Group.CLEARANCE:
                 lower[k] = self.clearance(instants)
             if row.lower == row.upper:
                 lower[k, instants.weight == 0.0] = -np.inf
@@ -268,7 +274,7 @@ class Program:
             x = casadi.vertcat(x, excess)
         self._solver = Ipopt(
             x, f, g, gradient=slope, jacobian=slopes, hessian=(price, prices, bend),
-            settings=NEAR if self.near else SETTINGS,
+            settings=NEAR if self.near else INSIDE if self.inside else SETTINGS,
         )  # fmt: skip
 
     def _of_blocks(self, x: Any) -> BlockProgram:

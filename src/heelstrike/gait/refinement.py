@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from heelstrike.errors import InfeasibleGaitError
+from heelstrike.errors import GaitNotFoundError
 from heelstrike.gait.infeasible import nearest_to_feasible
 from heelstrike.gait.polynomials import Instants
 from heelstrike.gait.program import Program, Solution
@@ -41,8 +41,8 @@ def held_between_nodes(program: Program, solution: Solution) -> tuple[Floats, bo
 
     Raises
     ------
-    InfeasibleGaitError
-        If there is none.
+    GaitNotFoundError
+        If none is found.
     """
     fine = checked_instants(program)
     for _ in range(ROUNDS):
@@ -54,11 +54,11 @@ def held_between_nodes(program: Program, solution: Solution) -> tuple[Floats, bo
         solution = program.solve(unknowns, solution.multipliers)
         if not solution.converged:
             feasible = nearest_to_feasible(program)
-            solution = replace(program, near=False).solve(feasible)
+            solution = replace(program, near=False, inside=True).solve(feasible)
             if not program.satisfied_by(solution):
                 solution = program.at(feasible)
     request = program.request
-    raise InfeasibleGaitError(
+    raise GaitNotFoundError(
         f"robot {request.robot.name!r}: a gait with {request} satisfies the constraints at "
         f"{np.count_nonzero(program.instants.weight)} phases of a step but not between them. Try "
         "more intervals, or a slower step."

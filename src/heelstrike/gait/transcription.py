@@ -6,7 +6,6 @@ inside; on a point there is none, which is an equation along the path.
 
 from __future__ import annotations
 
-import enum
 from functools import cache
 from itertools import product
 from typing import Any
@@ -15,11 +14,11 @@ import casadi
 import numpy as np
 
 from heelstrike.dynamics.queries.symbolic import expression, symbols
-from heelstrike.field_texts import dataclass
 from heelstrike.gait.blocks import Block
 from heelstrike.gait.cost_rate import heat_of, instant_of, rate_of
 from heelstrike.gait.request import Request
 from heelstrike.gait.request_digest import digest_of
+from heelstrike.gait.rows import Kind, Limit, Rows, joint_limits
 from heelstrike.gait.stairs import Stairs
 from heelstrike.gait.support import Impact, Support, Symbols
 
@@ -29,7 +28,7 @@ driven down by whatever lifts its ankle can only leave from rest: without a tole
 would be isolated points."""
 
 
-class Group(enum.Enum):
+class Group(Kind):
     """What a constraint is about, and its unit."""
 
     NORMAL_FORCE = ("normal force on the stance foot", "N")
@@ -51,48 +50,6 @@ class Group(enum.Enum):
     IMPULSE_CENTER = ("landing impulse inside the sole", "m")
     LIFT = ("rear foot free to lift", "m/s")
     SPEED = ("walking speed", "m/s")
-
-    def __init__(self, text: str, unit: str) -> None:
-        self.text = text
-        self.unit = unit
-
-
-@dataclass(frozen=True)
-class Row:
-    """One scaled constraint, ``lower <= expression <= upper``."""
-
-    group: Group
-    """What it is about."""
-    subject: str
-    """Joint or contact point concerned, if any."""
-    lower: float
-    upper: float
-    """lower, upper: Bounds in scaled units."""
-    scale: float
-    """Size of the scaled unit in the unit of the group."""
-
-
-class Constraints:
-    """Expressions and their meaning, collected one by one."""
-
-    def __init__(self) -> None:
-        self.rows: list[Row] = []
-        self.expressions: list[Any] = []
-
-    def add(
-        self,
-        group: Group,
-        value: Any,
-        *,
-        subject: str = "",
-        lower: float = 0.0,
-        upper: float = np.inf,
-        unit: float = 1.0,
-        scale: float = 1.0,
-    ) -> None:
-        """Add ``lower <= value <= upper``, in units of `unit`; `scale` converts to the group's."""
-        self.rows.append(Row(group, subject, lower / unit, upper / unit, scale * unit))
-        self.expressions.append(value / unit)
 
 
 class Transcription:
@@ -186,7 +143,7 @@ class Transcription:
         stairs = Stairs(length, self.ground[1])
         heights = [stairs.height(*support.place_of(i)) for i in request.swing.contacts]
         weight = robot.weight
-        constraints = Constraints()
+        constraints = Rows()
         for moment in support.missing:
             constraints.add(Group.ANKLE, moment, upper=0.0, unit=weight * request.height)
         constraints.add(Group.NORMAL_FORCE, pressure[1], lower=request.force_margin, unit=weight)
@@ -218,7 +175,7 @@ class Transcription:
 
     def _add_cone(
         self,
-        constraints: Constraints,
+        constraints: Rows,
         wrench: Symbols,
         groups: tuple[Group, Group],
         unit: float,
@@ -264,7 +221,7 @@ class Transcription:
             [*moving, ground],
             [expression(impulse), casadi.vertcat(*landing), casadi.vertcat(*lift)],
         )
-        constraints = Constraints()
+        constraints = Rows()
         place = end.place(request.swing)
         ahead = end.ahead @ place + end.rolled - start.rolled - length
         constraints.add(Group.TOUCHDOWN_PLACE, ahead, subject="x", upper=0.0)
@@ -289,7 +246,7 @@ class Transcription:
         self.touchdown = casadi.Function("touchdown", [*moving, *step], [values])
 
     def _add_impact(
-        self, constraints: Constraints, rest: Symbols, impulse: Symbols, landing: list[Any],
+        self, constraints: Rows, rest: Symbols, impulse: Symbols, landing: list[Any],
         lift: list[Any],
     ) -> None:  # fmt: skip
         """Momentum balanced, impulse inside cone and sole, one foot coming down, one let go."""
@@ -331,28 +288,15 @@ def transcribed(request: Request) -> Transcription:
     return _transcribed[key]
 
 
-def _add_joint_limits(constraints: Constraints, request: Request, support: Support) -> None:
+def _add_joint_limits(constraints: Rows, request: Request, support: Support) -> None:
     """Add ranges, speeds, torques and motors of the joints, where robot or request have limits."""
-    robot, model = request.robot, request.robot.model
-    torques = dict(zip(request.drive.driven, support.torque, strict=True))
-    actuators = {joint: i for i, joint in enumerate(model.actuator_joint.tolist())}
-    speeds = np.minimum(request.joint_speed_limit, model.speed_limit)
-    for j, name in enumerate(robot.joint_names):
-        if j < 3:
-            continue
-        position, velocity, speed = support.q[j], support.v[j], speeds[j]
-        limits = [(Group.JOINT_RANGE, position, request.lower[j], request.upper[j], 1.0)]
-        if j in torques:
-            low, high = (ends[actuators[j]] for ends in (model.torque_lower, model.torque_upper))
-            largest = max((abs(limit) for limit in (low, high) if np.isfinite(limit)), default=0)
-            stall, free = model.stall_torque[j], model.no_load_speed[j]
-            drag = stall / free * velocity if np.isfinite(stall) else 0.0  # of the motor's winding
-            limits += [
-                (Group.TORQUE, torques[j], low, high, largest or 1.0),
-                (Group.TORQUE, torques[j] + drag, -stall, stall, stall),
-            ]
-        limits.append((Group.JOINT_SPEED, velocity, -speed, speed, speed))
-        for group, value, least, most, unit in limits:
-            if np.isfinite([least, most]).any():
-                ends = {"lower": float(least), "upper": float(most), "unit": float(unit)}
-                constraints.add(group, value, subject=name, **ends)
+    groups = {
+        Limit.RANGE: Group.JOINT_RANGE, Limit.SPEED: Group.JOINT_SPEED, Limit.TORQUE: Group.TORQUE
+    }  # fmt: skip
+    for limit, value, bounds in joint_limits(
+        request.robot, support.q, support.v,
+        dict(zip(request.drive.driven, support.torque, strict=True)),
+        (request.lower, request.upper),
+        np.minimum(request.joint_speed_limit, request.robot.model.speed_limit),
+    ):  # fmt: skip
+        constraints.add(groups[limit], value, **bounds)

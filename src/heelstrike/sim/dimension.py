@@ -70,6 +70,8 @@ class Dimension(ABC):
     """Class of its records."""
     certificates: ClassVar[type]
     """Worst values of a run, all of them in the tally of its memory."""
+    compiles_meanwhile: ClassVar[bool]
+    """Whether another process may compile a stock law while the loop is compiled."""
     solved: ClassVar[tuple[str, ...]]
     """What is counted of the contact problems of a run, in the tally of its solver."""
 

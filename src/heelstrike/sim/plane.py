@@ -43,6 +43,7 @@ class Plane(Dimension):
     quantities = QUANTITIES
     record = Record
     certificates = Certificates
+    compiles_meanwhile = True
     solved = SOLVED
 
     def way(self, method: Method | None) -> Method:

@@ -183,7 +183,7 @@ class Simulation:
             stop_when_fallen=stop_when_fallen, pushes=pushes, latched=latched, braked=braked,
             checked=checked, on_error=on_error,
         )  # fmt: skip
-        law_of(controller, begin=True)
+        law_of(controller, begin=self._dimension.compiles_meanwhile)
         self._begin(setting, self._dimension.way(method))
         self._control_with(controller)
         if isinstance(state, Snapshot):

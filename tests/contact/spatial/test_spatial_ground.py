@@ -51,3 +51,16 @@ def test_depth_counts_to_faces_that_can_be_left_by() -> None:
     depth, normal = distance_to_box(ground.model(), 0, (0.501, 0.0, 0.0))
     assert depth == pytest.approx(-1e-3, abs=1e-15)
     assert normal == pytest.approx((-1.0, 0.0, 0.0))
+
+
+def test_a_ground_is_made_of_its_numbers_again_to_the_last_bit() -> None:
+    """Files and snapshots hold it: normals that are unit already are not made unit again."""
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        x, y = rng.normal(size=2)
+        box = Box(center=rng.normal(size=3), size=rng.uniform(0.1, 1.0, 3), yaw=x, friction=0.4)
+        ground = SpatialGround(normal=(x, y, 1.0), height=y, boxes=(box, Box((0, 0, 1), (1, 1, 1))))
+        again = SpatialGround.of_numbers(ground.numbers())
+        assert again.boxes == ground.boxes
+        for name, values in ground.model().members().items():
+            assert np.array_equal(values, getattr(again.model(), name)), name

@@ -420,7 +420,7 @@ def test_pushes_and_another_friction_while_it_goes_on(made: Maker) -> None:
     assert simulation.record.pushes == (push,)
     simulation.advance(0.08)
     simulation.forget()
-    assert not len(simulation.record.time)
+    assert simulation.record.time == pytest.approx([0.08])
     assert simulation.record.pushes == ()
     simulation.ground = dataclasses.replace(simulation.ground, friction=0.0)
     before = simulation.state.v[1]
@@ -430,10 +430,8 @@ def test_pushes_and_another_friction_while_it_goes_on(made: Maker) -> None:
     assert simulation.ground.friction == 0.75
     simulation.advance(0.07)
     assert np.array_equal(simulation.state.v, there.v)
-    with pytest.raises(SimulationError, match="the shape of the ground stays"):
-        simulation.ground = hs.SpatialGround(height=-1.0)
     simulation.advance(0.08)
-    with pytest.raises(SimulationError, match="would be over since"):
+    with pytest.raises(SimulationError, match="before the present time"):
         simulation.apply(push)
     with pytest.raises(SimulationError, match="three numbers"):
         simulation.apply(hs.Push("block", force=(1.0, 0.0), start=1.0, duration=0.1))

@@ -82,3 +82,15 @@ def test_points_slide_from_box_to_box_of_one_height(made: Maker) -> None:
         robot, state=hs.State(q, np.r_[1.0, np.zeros(5)]), duration=0.6, ground=ground
     )
     assert run.velocity[-1] == pytest.approx(np.r_[1.0, np.zeros(5)], abs=1e-9)
+
+
+def test_what_is_in_the_floor_meets_the_wall_that_stands_on_it(made: Maker) -> None:
+    """Corners 50 µm in the floor do not pass below the wall half a millimetre ahead of them."""
+    robot = made(FEELER)
+    box = hs.Box(center=(0.7, 0.0, 0.1), size=(0.4, 2.0, 0.2))
+    q = robot.reference_state().q.copy()
+    q[0], q[2] = 0.3 - 5e-4, 0.1 - 5e-5
+    state = hs.State(q, np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    ground = hs.SpatialGround(friction=0.0, boxes=(box,))
+    run = hs.simulate(robot, state=state, duration=0.05, ground=ground)
+    assert np.max(run.position[:, 0]) <= 0.3 + 1e-6

@@ -103,6 +103,29 @@ class Partials(Bundle):
     """By numbers of the robot."""
 
 
+class PartialsAlong(Bundle):
+    """Motions under forces at many instants, and what is found of them, as of one of them."""
+
+    q: Floats = array("samples", "nq")
+    v: Floats = array("samples", "nv")
+    acceleration: Floats = array("samples", "nv")
+    push: Floats = array("samples", "nc", "components")
+    """q, v, acceleration, push: The motions, whose points are looked at as they accelerate."""
+    along: Floats = array("samples", "2 nc")
+    along_by_q: Floats = array("samples", "2 nc", "nq")
+    along_by_v: Floats = array("samples", "2 nc", "nv")
+    """along, along_by_q, along_by_v: Accelerations of the contact points (normal, tangent), and
+    their derivatives."""
+    rows: Floats = array("samples", "2 nc", "nv")
+    """Jacobians of the contact points."""
+    matrix: Floats = array("samples", "nv", "nv")
+    """Mass matrices."""
+    lacking_by_q: Floats = array("samples", "nv", "nq")
+    lacking_by_v: Floats = array("samples", "nv", "nv")
+    lacking_by_numbers: Floats = array("samples", "nv", "numbers")
+    """Derivatives of the lacking forces."""
+
+
 @kernel
 def find_balance(
     model: Model, dated: Integers, tree: Workspace, loops: LoopRows, balance: Balance
@@ -163,6 +186,13 @@ def allocate_balance(model: Model, numbers: Sequence[str] = ()) -> tuple[Balance
         "numbers": sum(getattr(model, name).size for name in numbers),
     }  # fmt: skip
     return Balance.allocate(extents), Partials.allocate(extents)
+
+
+def allocate_along(model: Model, samples: int, numbers: Sequence[str] = ()) -> PartialsAlong:
+    """Allocate motions at many instants, and what is found of them."""
+    size = sum(getattr(model, name).size for name in numbers)
+    extents = {**model.extents, "components": 2, "numbers": size, "samples": samples}
+    return PartialsAlong.allocate(extents)
 
 
 _known: WeakKeyDictionary[Model, dict[tuple[bool, tuple[str, ...]], int]] = WeakKeyDictionary()
@@ -227,6 +257,41 @@ def find_partials(
     play(program, (model, dated, tree, loops, balance, partials))
 
 
+@kernel
+def find_partials_along(
+    model: Model, program: int, dated: Integers, tree: Workspace, loops: LoopRows,
+    balance: Balance, partials: Partials, found: PartialsAlong,
+) -> None:  # fmt: skip
+    """Find partial derivatives at many instants."""
+    numbers = partials.lacking_by_numbers.shape[1]
+    for i in range(found.q.shape[0]):
+        for j in range(model.nq):
+            balance.q[j] = found.q[i, j]
+        for j in range(model.nv):
+            balance.v[j] = found.v[i, j]
+            balance.acceleration[j] = found.acceleration[i, j]
+            balance.going[j] = found.acceleration[i, j]
+        for point in range(model.nc):
+            for k in range(2):
+                balance.push[point, k] = found.push[i, point, k]
+        find_partials(model, program, dated, tree, loops, balance, partials)
+        for row in range(2 * model.nc):
+            found.along[i, row] = balance.along[row]
+            for j in range(model.nv):
+                found.rows[i, row, j] = balance.rows[row, j]
+                found.along_by_v[i, row, j] = partials.along_by_v[row, j]
+            for j in range(model.nq):
+                found.along_by_q[i, row, j] = partials.along_by_q[row, j]
+        for row in range(model.nv):
+            for j in range(model.nv):
+                found.matrix[i, row, j] = balance.matrix[row, j]
+                found.lacking_by_v[i, row, j] = partials.lacking_by_v[row, j]
+            for j in range(model.nq):
+                found.lacking_by_q[i, row, j] = partials.lacking_by_q[row, j]
+            for j in range(numbers):
+                found.lacking_by_numbers[i, row, j] = partials.lacking_by_numbers[row, j]
+
+
 class Differentiated:
     """The equations of a robot, differentiated wherever they are looked at.
 
@@ -262,6 +327,15 @@ class Differentiated:
         find_partials(
             model, self._program, self._dated, self._tree, self.loops, balance,
             self.partials,
+        )  # fmt: skip
+
+    def look_along(self, found: PartialsAlong, normal: Any) -> None:
+        """Find derivatives at many instants, with one normal (2,) of the ground; see there."""
+        self.balance.normal[:], self.balance.ahead[:], self.balance.pull[:] = normal, 1.0, 0.0
+        model: Any = self._model()
+        find_partials_along(
+            model, self._program, self._dated, self._tree, self.loops, self.balance,
+            self.partials, found,
         )  # fmt: skip
 
 

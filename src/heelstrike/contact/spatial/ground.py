@@ -29,6 +29,10 @@ ON_THE_FACE = 1e-12
 COVERED = 1e-9
 """Distance (m) up to which a face that touches something lies on it."""
 
+DOWNWARDS, UNDER = -0.5, 1e-3
+"""Vertical part of the normal of a face on which a box stands, and how far (m) below that a point
+in the floor still meets the walls of the box."""
+
 BESIDE = 1e-6
 """Depth (m) below the rim of a face from which on a point meets it as a wall."""
 
@@ -405,7 +409,8 @@ def is_beside(ground: SpatialGroundModel, box: int, point: Triple) -> bool:
         own = r[box, 3 * k] * x + r[box, 3 * k + 1] * y + r[box, 3 * k + 2] * z
         beyond = abs(own) - ground.half[box, k]
         seen = ground.exposed[box, k if own >= 0.0 else 3 + k] > 0.0
-        if not seen and beyond > BESIDE:
+        below = (1.0 if own >= 0.0 else -1.0) * r[box, 3 * k + 2] < DOWNWARDS
+        if not seen and beyond > (UNDER if below else BESIDE):
             return False
         shallow += seen and beyond > -BESIDE
     return shallow == 1

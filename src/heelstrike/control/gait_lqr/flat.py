@@ -27,7 +27,7 @@ from heelstrike.contact import (
 from heelstrike.contact.linearized.slopes import both, contact_slopes, exchanged, following
 from heelstrike.contact.linearized.strikes import strikes
 from heelstrike.control.computed_torque import pitch_of
-from heelstrike.control.gait_lqr.riccati import over_all_steps
+from heelstrike.control.gait_lqr.riccati import over_all_steps, swept_back
 from heelstrike.control.zero_order_hold import over_an_interval
 from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.held import HeldRobot
@@ -145,26 +145,18 @@ class FlatOrbit:
         """
         from scipy.linalg import block_diag
 
-        number, nx = FINE if count is None else count, len(cost)
+        number = FINE if count is None else count
         both, width = block_diag(cost, effort), self.gait.step_duration / number
-        moves = [
-            (*over_an_interval(A, B, width), width * both)
-            if count is None
-            else _sampled(A, B, both, width)
-            for A, B in self.between(number)
-        ]
-        gains = np.zeros((number, len(effort), nx))
-
-        def sweep(value: Floats) -> tuple[Floats, Floats]:
-            for k in range(number - 1, -1, -1):
-                A, B, price = moves[k]
-                answered = B.T @ value @ A + price[nx:, :nx]
-                gains[k] = np.linalg.solve(price[nx:, nx:] + B.T @ value @ B, answered)
-                left, chosen = A - B @ gains[k], np.vstack([np.eye(nx), -gains[k]])
-                value = chosen.T @ price @ chosen + left.T @ value @ left
-            return value, gains
-
-        return over_all_steps(self.jump, sweep)
+        moves, prices = [], []
+        for A, B in self.between(number):
+            if count is None:
+                moves.append(over_an_interval(A, B, width))
+                prices.append(width * both)
+            else:
+                *move, price = _sampled(A, B, both, width)
+                moves.append((move[0], move[1]))
+                prices.append(price)
+        return over_all_steps(self.jump, lambda value: swept_back(moves, prices, value))
 
     def over_a_step(self, gains: Floats, *, held: bool = False) -> Floats:
         """What a step makes of errors under gains (intervals, nu, 2 nu), to before its impact.

@@ -16,6 +16,7 @@ from heelstrike.control.arguments import check_gait, positive, weights_of
 from heelstrike.control.computed_torque import pitch_of
 from heelstrike.control.followed_gait import FollowedGait, followed
 from heelstrike.control.gait_lqr.flat import FINE, KEPT, FlatOrbit
+from heelstrike.control.gait_lqr.table import interpolated
 from heelstrike.control.gait_lqr.transverse import multipliers_of
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Footing, Gait
@@ -189,8 +190,10 @@ class FlatGaitLQR(Law):
         found = orbit.regulator(cost, np.diag(effort), count)
         # What the table makes of the gains is what is predicted.
         places = (np.arange(len(found)) + (0.5 if count is None else 0.0)) / len(found)
-        gains = _table(found, places)
-        step = orbit.over_a_step(_at(gains, places), held=count is not None)
+        even = np.linspace(0.0, 1.0, KEPT + 1)
+        gains = interpolated(found, places, even)
+        kept = interpolated(gains, even, places)
+        step = orbit.over_a_step(kept, held=count is not None)
         self.multipliers: NDArray[np.complex128] = multipliers_of(orbit.jump @ step)
         self.either = tuple(float(abs(multipliers_of(each @ step)[0])) for each in orbit.jumps)
         if not np.all(np.abs(self.multipliers) < 1.0):
@@ -236,19 +239,3 @@ def _calls(period: float, duration: float) -> int:
             f"called {FEWEST} times a step at the least"
         )
     return min(calls, FINE)
-
-
-def _table(gains: Floats, known: Floats) -> Floats:
-    """Gains at even places of the step, of those that are known at other places."""
-    places = np.linspace(0.0, 1.0, KEPT + 1)
-    flat = gains.reshape(len(gains), -1)
-    found = np.array([np.interp(places, known, each) for each in flat.T]).T
-    return found.reshape(KEPT + 1, *gains.shape[1:])
-
-
-def _at(table: Floats, places: Floats) -> Floats:
-    """Entries of a table, as the law reads it."""
-    even = np.linspace(0.0, 1.0, len(table))
-    flat = table.reshape(len(table), -1)
-    found = np.array([np.interp(places, even, each) for each in flat.T]).T
-    return found.reshape(len(places), *table.shape[1:])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,7 +15,35 @@ SETTLED = 1e-10
 """Steps until gains are those of all further ones, to this part of the largest cost."""
 
 
-def over_all_steps(jump: Floats, sweep: Callable[[Floats], tuple[Floats, Floats]]) -> Floats:
+Kept = TypeVar("Kept")
+
+
+def swept_back(
+    moves: Sequence[tuple[Floats, Floats]], prices: Sequence[Floats], value: Floats
+) -> tuple[Floats, Floats]:
+    """Go back over intervals: the cost of errors at the beginning, and gains (intervals, nu, n).
+
+    Parameters
+    ----------
+    moves : sequence of ((n, n) float, (n, nu) float)
+        What each interval makes of errors at its beginning and of torques that are held over it.
+    prices : sequence of (n + nu, n + nu) float
+        What errors at its beginning and torques cost meanwhile.
+    value : (n, n) float
+        Cost xᵀ V x of errors at the end.
+    """
+    found = []
+    for (A, B), price in zip(reversed(moves), reversed(prices), strict=True):
+        nx = len(A)
+        answered = B.T @ value @ A + price[nx:, :nx]
+        gain = np.linalg.solve(price[nx:, nx:] + B.T @ value @ B, answered)
+        left, chosen = A - B @ gain, np.vstack([np.eye(nx), -gain])
+        value = chosen.T @ price @ chosen + left.T @ value @ left
+        found.append(gain)
+    return value, np.array(found[::-1])
+
+
+def over_all_steps(jump: Floats, sweep: Callable[[Floats], tuple[Floats, Kept]]) -> Kept:
     """Go back from step to step until costs repeat, and return what is kept of such a step.
 
     Parameters

@@ -39,6 +39,7 @@ from heelstrike.experiments.campaigns.trials import (
     run_block,
     trial_digest,
 )
+from heelstrike.experiments.campaigns.workers import is_death
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.sim.run import Run
@@ -201,8 +202,9 @@ class Campaign:
             on from there.
         executor : optional
             Who works: anything with ``submit(function, argument)`` that returns what has a
-            ``result()``, such as a `ProcessPoolExecutor` or a `distributed.Client`. A function that
-            makes one is asked for another when a worker dies. By default own threads.
+            ``result()``, such as a `ProcessPoolExecutor`, a `distributed.Client` or an executor of
+            submitit. A function that makes one is asked for another when it breaks because a
+            worker died; clusters go on by themselves. By default own threads.
         workers : int, optional
             Number of own threads; one a processor by default.
         limit : float, optional
@@ -456,9 +458,18 @@ def _by_others(executor: Any, blocks: Iterable[Block]) -> Iterator[Done]:
                     raise
                 # One of those that were at work did it: each by itself now.
                 suspects, waiting = [block for block, _ in waiting], deque()
-                for block in suspects:
-                    yield block, _alone(again, block)
                 worker = again()
+                for block in suspects:
+                    try:
+                        outcomes = _together(worker, block)
+                    except BrokenExecutor as error:
+                        outcomes, worker = _by_halves(partial(_alone, again), block, error), again()
+                    yield block, outcomes
+            except Exception as error:  # of a cluster, which goes on without a worker that died
+                if not is_death(error):
+                    raise
+                block, _ = waiting.popleft()
+                yield block, _by_halves(partial(_together, worker), block, error)
     finally:
         for _, future in waiting:
             if hasattr(future, "cancel"):
@@ -471,18 +482,32 @@ def _alone(make: Callable[[], Any], block: Block) -> list[Outcome]:
     """Work on a block with an executor of its own; if that dies, on each half of it."""
     worker = make()
     try:
-        found: list[Outcome] = worker.submit(run_block, block).result()
-        return found
+        return _together(worker, block)
     except BrokenExecutor as error:
-        if len(block.numbers) == 1:
-            return [Outcome(CRASHED, f"the worker died of it: {error}", success=False)]
-        half = len(block.numbers) // 2
-        return [
-            *_alone(make, _part(block, slice(0, half))),
-            *_alone(make, _part(block, slice(half, None))),
-        ]  # fmt: skip
+        return _by_halves(partial(_alone, make), block, error)
     finally:
         worker.shutdown()
+
+
+def _together(worker: Any, block: Block) -> list[Outcome]:
+    """Work on a block with an executor that goes on when a worker dies; if so, on each half."""
+    try:
+        found: list[Outcome] = worker.submit(run_block, block).result()
+        return found
+    except Exception as error:
+        if isinstance(error, BrokenExecutor) or not is_death(error):
+            raise
+        return _by_halves(partial(_together, worker), block, error)
+
+
+def _by_halves(
+    work: Callable[[Block], list[Outcome]], block: Block, error: Exception
+) -> list[Outcome]:
+    """Work on each half of a block that a worker died of; a single trial is the one."""
+    if len(block.numbers) == 1:
+        return [Outcome(CRASHED, f"the worker died of it: {error}", success=False)]
+    half = len(block.numbers) // 2
+    return [*work(_part(block, slice(0, half))), *work(_part(block, slice(half, None)))]
 
 
 def _part(block: Block, rows: slice) -> Block:

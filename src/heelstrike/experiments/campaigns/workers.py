@@ -1,4 +1,4 @@
-"""Workers beyond own threads: processes, and the workers of a Dask cluster."""
+"""Workers beyond own threads: processes, and those of clusters."""
 
 from __future__ import annotations
 
@@ -9,6 +9,20 @@ from functools import partial
 from typing import Any
 
 from heelstrike.errors import SimulationError
+
+DEATHS = ("BrokenExecutor", "KilledWorker", "UncompletedJobError")
+"""Errors by which executors of Python, Dask and submitit say that a worker died of its work."""
+
+
+def is_death(error: BaseException) -> bool:
+    """Whether an error says that a worker died, of whatever executor; none need be installed.
+
+    Parameters
+    ----------
+    error : BaseException
+        What ``result()`` raised.
+    """
+    return any(kind.__name__ in DEATHS for kind in type(error).__mro__)
 
 
 def process_pool(processes: int) -> Callable[[], ProcessPoolExecutor]:

@@ -163,7 +163,7 @@ def mimic(
         If the file is none that can be read, there is no whole stride in it, its joints seem to be
         in degrees and no unit is told, forces go with joints, or the robot cannot do what people
         do.
-    InfeasibleGaitError
+    GaitNotFoundError
         If no motion was found; the message names what is in conflict.
     """
     tell = progress or (lambda _, __: None)

@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 
 from heelstrike.contact.ground import Ground
-from heelstrike.errors import GaitError, InfeasibleGaitError
+from heelstrike.errors import GaitError, GaitNotFoundError
 from heelstrike.experiments.people.retarget import Retargeted
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.cost import Instant
@@ -85,7 +85,7 @@ def nearest_motion(
 
     Raises
     ------
-    InfeasibleGaitError
+    GaitNotFoundError
         If none was found; the message names what is in conflict.
     """
     report = progress or (lambda _: None)
@@ -118,13 +118,13 @@ def nearest_motion(
                     _reported, report, begin + SKETCH * share, (1.0 - SKETCH) * share
                 ),
             )  # fmt: skip
-        except InfeasibleGaitError as error:
+        except GaitNotFoundError as error:
             failure = failure or error
             continue
         report(1.0)
         return _measured(wanted, motion)
     assert failure is not None
-    raise InfeasibleGaitError(
+    raise GaitNotFoundError(
         f"robot {robot.name!r} at {wanted.length / wanted.duration:.3g} m/s, steps of "
         f"{0.5 * wanted.length:.3g} m in {0.5 * wanted.duration:.3g} s: {failure}"
     )

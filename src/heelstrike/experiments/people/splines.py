@@ -23,14 +23,16 @@ class Splines:
     ----------
     time : (n,) array
         When there are samples (s), rising from 0.
+    apart : float
+        Time between two knots (s), if there are samples enough.
     """
 
-    def __init__(self, time: Floats) -> None:
+    def __init__(self, time: Floats, apart: float = KNOTS) -> None:
         from scipy.interpolate import BSpline  # takes long to import
 
         self.time = time
         duration = float(time[-1])
-        apart = max(KNOTS, SAMPLES * duration / (len(time) - 1))
+        apart = max(apart, SAMPLES * duration / (len(time) - 1))
         pieces = max(int(duration / apart), 1)
         inner = np.linspace(0.0, duration, pieces + 1)
         ends = np.full(DEGREE, 1.0)
@@ -43,6 +45,20 @@ class Splines:
     def _at(self, time: Floats) -> Any:
         inside = np.clip(time, 0.0, self.time[-1])
         return self._spline.design_matrix(inside, self._knots, DEGREE).tocsr()
+
+    def basis(self, time: Floats, order: int) -> Floats:
+        """Return a derivative of the basis at other times within, (m, size).
+
+        Parameters
+        ----------
+        time : (m,) array
+            When (s).
+        order : int
+            Order of the derivative; 0 is the basis itself.
+        """
+        each = self._spline(self._knots, np.eye(self.size), DEGREE)
+        found: Floats = (each.derivative(order) if order else each)(time)
+        return found
 
     def values(self, coefficients: Floats, order: int = 0) -> Floats:
         """Return curves, or a derivative, at the samples, (n, k).

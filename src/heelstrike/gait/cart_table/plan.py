@@ -10,7 +10,7 @@ from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.cart_table.center_of_mass import Planner, followed
 from heelstrike.gait.cart_table.forces import shared_forces, zero_moment_point
 from heelstrike.gait.cart_table.step import Planned, Step, lowest
-from heelstrike.gait.motion.instant import Instants
+from heelstrike.gait.motion.instant import MotionFunctions
 from heelstrike.gait.motion.motion import Motion
 from heelstrike.gait.motion.optimize import checked_request, motion_of
 from heelstrike.gait.motion.phases import ContactPhase
@@ -121,7 +121,7 @@ def plan_motion(
         force_margin=0.0, landing_speed=0.0,
     )  # fmt: skip
     program = MotionProgram(
-        request, Instants(robot, request.cost, per_metre=False),
+        request, MotionFunctions(robot, request.cost, per_metre=False),
         tuple(looked_at(phase.pieces) for phase in phases),
     )  # fmt: skip
     step = Step(robot, step_length, step_duration, both, clearance)

@@ -47,6 +47,7 @@ def save_motion(motion: Motion, path: str | PathLike[str]) -> None:
         "mirror_contact": motion.mirror_contact.tolist(),
         "repeat": motion.repeat.value,
         "optimal": motion.optimal,
+        "rise_m": motion.rise,
         "initial_position": motion.initial_state.q.tolist(),
         "initial_velocity": motion.initial_state.v.tolist(),
         "margins": {name: float(value) for name, value in motion.margins.items()},
@@ -119,6 +120,7 @@ def _motion_of(entries: Entries) -> Motion:
         mirror_contact=contact,
         initial_state=State(position, entries.numbers("initial_velocity", nv)),
         optimal=entries.data.get("optimal") is True,
+        rise=entries.number("rise_m") if "rise_m" in entries.data else 0.0,
         margins={name: margins.number(name) for name in margins.data},
     )
 

@@ -17,13 +17,14 @@ from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, sym
 from heelstrike.gait.blocks import Block
 from heelstrike.gait.cost import Instant
 from heelstrike.gait.cost_rate import heat_of, rate_of
-from heelstrike.gait.motion.rows import Kind, Rows
+from heelstrike.gait.motion.rows import Kind
+from heelstrike.gait.rows import Limit, Rows, joint_limits
 from heelstrike.robot.robot import Robot
 
 Symbols = Any
 
 
-class Instants:
+class MotionFunctions:
     """Functions of a robot whose contact points stand, or not, on level or sloping ground.
 
     The parameters of both blocks are the slope of the ground (rad) and the coefficient of friction.
@@ -151,26 +152,14 @@ class Instants:
                 rows.add(kinds[1], cone, subject=name, unit=unit, of=contacts)
 
     def _add_limits(self, rows: Rows, dynamics: TracedDynamics, torque: Symbols) -> None:
-        robot, model = self.robot, self.robot.model
-        for i, j in enumerate(model.actuator_joint.tolist()):
-            low, high, name = model.torque_lower[i], model.torque_upper[i], robot.joint_names[j]
-            largest = max((abs(x) for x in (low, high) if np.isfinite(x)), default=1.0) or 1.0
-            if np.isfinite([low, high]).any():
-                rows.add(Kind.TORQUE, torque[i], subject=name, lower=low, upper=high, unit=largest)
-            stall, free = model.stall_torque[j], model.no_load_speed[j]
-            if np.isfinite(stall):
-                drag = torque[i] + stall / free * dynamics.v[j]
-                rows.add(Kind.TORQUE, drag, subject=name, lower=-stall, upper=stall, unit=stall)
-        for j, name in enumerate(robot.joint_names):
-            if j < 3 and robot.floating:
-                continue
-            low, high, speed = model.lower[j], model.upper[j], model.speed_limit[j]
-            if np.isfinite([low, high]).any():
-                rows.add(Kind.RANGE, dynamics.q[j], subject=name, lower=low, upper=high)
-            if np.isfinite(speed):
-                rows.add(
-                    Kind.SPEED, dynamics.v[j], subject=name, lower=-speed, upper=speed, unit=speed
-                )
+        model = self.robot.model
+        kinds = {Limit.RANGE: Kind.RANGE, Limit.SPEED: Kind.SPEED, Limit.TORQUE: Kind.TORQUE}
+        for limit, value, bounds in joint_limits(
+            self.robot, dynamics.q, dynamics.v,
+            dict(zip(model.actuator_joint.tolist(), torque, strict=True)),
+            (model.lower, model.upper), model.speed_limit,
+        ):  # fmt: skip
+            rows.add(kinds[limit], value, **bounds)
 
     def _build_landing(self) -> None:
         robot = self.robot

@@ -128,6 +128,8 @@ class Motion(ShownInNotebooks):
     margins: Mapping[str, float]
     """Smallest distance from every kind of limit along the phases, in its unit; those of landings
     are not among them."""
+    rise: float = 0.0
+    """By how much (m) the ground is higher from one repetition to the next, on level stairs."""
 
     @property
     def duration(self) -> float:
@@ -213,7 +215,7 @@ class Motion(ShownInNotebooks):
             value = np.where((cycle % 2 == 1)[..., None], image, value)
         if order == 0:
             along = self.distance * np.array([np.cos(self.slope), np.sin(self.slope)])
-            value[..., :2] += cycle[..., None] * along
+            value[..., :2] += cycle[..., None] * (along + np.array([0.0, self.rise]))
         return value
 
     def check_robot(self, robot: Robot) -> None:

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 
 from heelstrike.arguments import are_numbers, shown, takes
 from heelstrike.dynamics import contact_jacobian, contact_positions
-from heelstrike.errors import GaitError, InfeasibleGaitError
+from heelstrike.errors import GaitError, GaitNotFoundError
 from heelstrike.gait.cost import Cost, OwnCost, costs_of
 from heelstrike.gait.gait import fingerprint
 from heelstrike.gait.motion.guess import guess_of
-from heelstrike.gait.motion.instant import Instants
+from heelstrike.gait.motion.instant import MotionFunctions
 from heelstrike.gait.motion.motion import Motion, MotionPhase
 from heelstrike.gait.motion.phases import ContactPhase
 from heelstrike.gait.motion.program import (
@@ -33,7 +33,7 @@ from heelstrike.gait.motion.program import (
 )
 from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.gait.motion.rows import Kind
-from heelstrike.gait.polynomials import Instants as Grid
+from heelstrike.gait.polynomials import Instants
 from heelstrike.gait.program import FEASIBLE
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
@@ -137,7 +137,7 @@ def optimize_motion(
     ------
     GaitError
         If the robot cannot move this way or an argument makes no sense.
-    InfeasibleGaitError
+    GaitNotFoundError
         If no motion was found; the message names the constraints that are violated most.
 
     Examples
@@ -161,7 +161,9 @@ def optimize_motion(
     free = request.distance[0] < request.distance[1] and (
         request.speed is None or request.total is None
     )
-    functions = Instants(robot, request.cost, per_metre=free and request.repeat is not Repeat.NEVER)
+    functions = MotionFunctions(
+        robot, request.cost, per_metre=free and request.repeat is not Repeat.NEVER
+    )
     program = MotionProgram(
         request, functions, tuple(looked_at(phase.pieces) for phase in request.phases)
     )
@@ -348,7 +350,7 @@ def _solved(
         report(0.1 + 0.6 * (k + 1) / starts)
     if feasible is not None:
         return feasible, False
-    raise InfeasibleGaitError(_not_found(program, nearest))
+    raise GaitNotFoundError(_not_found(program, nearest))
 
 
 def _not_found(program: MotionProgram, unknowns: Floats) -> str:
@@ -388,7 +390,7 @@ def _refined(
         )  # fmt: skip
         found, _, told = finer.solve(_resampled(program, unknowns, finer))
         if np.abs(finer.violations(found)).max() > FEASIBLE:
-            raise InfeasibleGaitError(_not_found(finer, found))
+            raise GaitNotFoundError(_not_found(finer, found))
         program, unknowns, optimal = finer, found, told["return_status"] == "Solve_Succeeded"
 
 
@@ -437,19 +439,19 @@ MOST_PIECES = 48
 """Pieces of a phase beyond which the mesh is not refined."""
 
 
-def _fine(pieces: int) -> Grid:
+def _fine(pieces: int) -> Instants:
     """Instants at which limits are checked."""
     count = FINER * STAGES
     share = (np.arange(count) + 0.5) / count
-    return Grid(
+    return Instants(
         pieces, np.repeat(np.arange(pieces), count), np.tile(share, pieces),
         np.zeros(pieces * count),
     )  # fmt: skip
 
 
 def _rows_at(
-    program: MotionProgram, unknowns: Floats, p: int, grid: Grid,
-    functions: Instants | None = None,
+    program: MotionProgram, unknowns: Floats, p: int, grid: Instants,
+    functions: MotionFunctions | None = None,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Cost rates (N,) and scaled constraints (rows, N) of a phase at instants."""
     phases, _, distance = program.parts(casadi.DM(unknowns))
@@ -478,13 +480,13 @@ def _held_between(
             bad = np.flatnonzero(by_piece.max(axis=1) > ALLOWED)
             failed = failed or bad.size > 0
             share = fine.share.reshape(grid.pieces, -1)[bad, by_piece[bad].argmax(axis=1)]
-            grids.append(grid.joined(Grid(grid.pieces, bad, share, np.zeros(bad.size))))
+            grids.append(grid.joined(Instants(grid.pieces, bad, share, np.zeros(bad.size))))
         if not failed:
             break
         program = replace(program, grids=tuple(grids), near=True)
         found, _, told = program.solve(unknowns)
         if np.abs(program.violations(found)).max() > FEASIBLE:
-            raise InfeasibleGaitError(_not_found(program, found))
+            raise GaitNotFoundError(_not_found(program, found))
         unknowns, optimal = found, told["return_status"] == "Solve_Succeeded"
     return program, unknowns, optimal
 
@@ -501,7 +503,7 @@ def motion_of(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion
     if program.functions.per_metre:
         spent *= abs(float(distance))
     margins = dict[str, float]()
-    torque = Instants(robot, costs_of("torque"), per_metre=False)
+    torque = MotionFunctions(robot, costs_of("torque"), per_metre=False)
     phases = _phases(program, unknowns)
     for p, phase in enumerate(phases):
         grid = gauss_points(len(phase.pieces))

@@ -12,13 +12,13 @@ import numpy as np
 from heelstrike.dynamics import contact_positions, link_poses
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.blocks import BlockProgram, Copies
-from heelstrike.gait.motion.instant import Instants
+from heelstrike.gait.motion.instant import MotionFunctions
 from heelstrike.gait.motion.phases import Standing
 from heelstrike.gait.motion.request import MotionRequest, Repeat
-from heelstrike.gait.motion.rows import Kind, Row
-from heelstrike.gait.polynomials import Instants as Grid
-from heelstrike.gait.polynomials import coefficients, gauss
+from heelstrike.gait.motion.rows import Kind
+from heelstrike.gait.polynomials import Instants, coefficients, gauss
 from heelstrike.gait.program import NEAR, SETTINGS, Ipopt, satisfied
+from heelstrike.gait.rows import Row
 from heelstrike.robot.model import Floats
 
 STAGES = 4
@@ -32,9 +32,9 @@ EQUATIONS = {
 }  # fmt: skip
 """Kinds of constraint along the path that are equations."""
 MORE_ITERATIONS = {"max_iter": 300}
-BEGIN = {"mu_init": 1e-2}
-"""Settings of IPOPT: phases of free duration take more iterations than a step, and fewer from this
-barrier parameter than from IPOPT's own 0.1."""
+ADAPTIVE = {"mu_strategy": "adaptive"}
+"""Settings of IPOPT: phases of free duration take more iterations than a step. With a barrier that
+follows the problem, least energies are found, too; one that only falls misses them."""
 FROM_STOPS = 1e-3
 """Distance (rad, m) that joints keep from their stops: a robot that follows a motion nearly is not
 to hit them."""
@@ -78,7 +78,7 @@ class PhaseUnknowns:
         """Shares of the phase that its pieces last, (K,)."""
         return np.diff(breakpoints(self.v.shape[1]))
 
-    def along(self, grid: Grid) -> tuple[Any, Any, Any]:
+    def along(self, grid: Instants) -> tuple[Any, Any, Any]:
         """Positions and derivatives by the share of a piece at instants, (nv, N) each."""
         values = casadi.horzcat(self.q[:, :-1], self.v, self.a)
         first, second, third = (
@@ -86,7 +86,7 @@ class PhaseUnknowns:
         )
         return first, second, third
 
-    def forces(self, grid: Grid) -> Any:
+    def forces(self, grid: Instants) -> Any:
         """Forces at instants, (2 nc, N)."""
         values = np.zeros((self.force.shape[1], grid.share.size))
         shares = lagrange(grid.share)
@@ -95,8 +95,8 @@ class PhaseUnknowns:
         return self.force @ casadi.sparsify(casadi.DM(values))
 
 
-def path_variables(phases: list[PhaseUnknowns], p: int, grid: Grid, distance: Any) -> Any:
-    """Variables of ``Instants.path`` at instants of a phase, (variables, N)."""
+def path_variables(phases: list[PhaseUnknowns], p: int, grid: Instants, distance: Any) -> Any:
+    """Variables of ``MotionFunctions.path`` at instants of a phase, (variables, N)."""
     own, count = phases[p], grid.share.size
     step = casadi.DM(own.lengths[grid.piece]).T * own.duration
     places, far = (casadi.repmat(each, 1, count) for each in (own.places, distance))
@@ -113,36 +113,36 @@ def breakpoints(pieces: int) -> Floats:
     return np.asarray(0.5 * (1.0 - np.cos(np.pi * np.arange(pieces + 1) / pieces)))
 
 
-def phases_of(grid: Grid) -> Floats:
+def phases_of(grid: Instants) -> Floats:
     """Share of the phase that has gone by at instants, (N,)."""
     ends = breakpoints(grid.pieces)
     shares: Floats = ends[grid.piece] + np.diff(ends)[grid.piece] * grid.share
     return shares
 
 
-def gauss_points(pieces: int) -> Grid:
+def gauss_points(pieces: int) -> Instants:
     """Gauss points of all pieces of a phase."""
     nodes, weights = gauss(STAGES)
-    return Grid(
+    return Instants(
         pieces, np.repeat(np.arange(pieces), STAGES), np.tile(nodes, pieces),
         np.tile(weights, pieces) / pieces,
     )  # fmt: skip
 
 
-def looked_at(pieces: int) -> Grid:
+def looked_at(pieces: int) -> Instants:
     """Gauss points of all pieces of a phase, where the pieces end, and where the first begins."""
-    begin = Grid(pieces, np.zeros(1, np.int64), np.zeros(1), np.zeros(1))
+    begin = Instants(pieces, np.zeros(1, np.int64), np.zeros(1), np.zeros(1))
     return gauss_points(pieces).joined(endings(pieces)).joined(begin)
 
 
-def beginnings(pieces: int) -> Grid:
+def beginnings(pieces: int) -> Instants:
     """The beginning of every piece."""
-    return Grid(pieces, np.arange(pieces), np.zeros(pieces), np.zeros(pieces))
+    return Instants(pieces, np.arange(pieces), np.zeros(pieces), np.zeros(pieces))
 
 
-def endings(pieces: int) -> Grid:
+def endings(pieces: int) -> Instants:
     """The end of every piece."""
-    return Grid(pieces, np.arange(pieces), np.ones(pieces), np.zeros(pieces))
+    return Instants(pieces, np.arange(pieces), np.ones(pieces), np.zeros(pieces))
 
 
 @dataclass(eq=False)
@@ -157,9 +157,9 @@ class MotionProgram:
 
     request: MotionRequest
     """What is asked."""
-    functions: Instants
+    functions: MotionFunctions
     """The robot at an instant, and at a landing."""
-    grids: tuple[Grid, ...]
+    grids: tuple[Instants, ...]
     """When the constraints of each phase hold; equations where there is a weight."""
     near: bool = False
     """Whether guesses are nearly optima."""
@@ -294,7 +294,7 @@ class MotionProgram:
         self._solver = Ipopt(
             x, f, g[rows], gradient=blocks.gradient(x), jacobian=slopes,
             hessian=(price, prices, blocks.hessian(x, price, all_prices)),
-            settings=NEAR | MORE_ITERATIONS if self.near else SETTINGS | MORE_ITERATIONS | BEGIN,
+            settings=NEAR | MORE_ITERATIONS if self.near else SETTINGS | MORE_ITERATIONS | ADAPTIVE,
         )  # fmt: skip
 
     def _gaps(self, phases: list[PhaseUnknowns]) -> list[Any]:
@@ -337,7 +337,7 @@ class MotionProgram:
         last = p + 1 == len(phases)
         return self.request.wrapped_velocity(start) if last else start, piece
 
-    def path_bounds(self, p: int, grid: Grid) -> tuple[Floats, Floats]:
+    def path_bounds(self, p: int, grid: Instants) -> tuple[Floats, Floats]:
         """Scaled bounds of the constraints along a phase, (rows, N) each; infinite if unused."""
         request, rows = self.request, self.functions.path_rows
         stands, count = request.standing[p], grid.share.size

@@ -9,7 +9,7 @@ walkers*, IEEE Transactions on Automatic Control 48(1).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,8 @@ from heelstrike.arguments import check_fields
 from heelstrike.errors import GaitError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
+from heelstrike.gait.motion.motion import Motion
+from heelstrike.gait.motion.request import Repeat
 from heelstrike.gait.phased.series import fitted, interpolated
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -147,7 +149,7 @@ class PhasedGait:
     def from_gait(
         cls,
         robot: Robot,
-        gait: Gait,
+        gait: Gait | Motion,
         *,
         phase: Mapping[str, float] | None = None,
         degree: int = 24,
@@ -161,8 +163,9 @@ class PhasedGait:
         ----------
         robot : Robot
             The robot.
-        gait : Gait
-            A gait on point feet, designed for it.
+        gait : Gait or Motion
+            A gait on point feet, designed for it; or a motion that stands on one point foot and
+            goes on with its mirror image.
         phase : mapping of str to float, optional
             As in :meth:`from_bezier`.
         degree : int
@@ -178,30 +181,27 @@ class PhasedGait:
         GaitError
             If the gait is on flat feet or of another robot, or the phase does not rise throughout.
         """
-        for name, given, kind in (("robot", robot, Robot), ("gait", gait, Gait)):
+        for name, given, kind in (("robot", robot, Robot), ("gait", gait, Gait | Motion)):
             if not isinstance(given, kind):
                 raise GaitError(
-                    f"{name} must be a {kind.__name__}, got {type(given).__name__}: "
+                    f"{name} must be a {name.capitalize()}, got {type(given).__name__}: "
                     "from_gait(robot, gait)"
                 )
         check_robot(robot)
-        gait.check_joints(robot)
-        if not gait.point_feet:
-            raise GaitError(
-                "virtual constraints are for gaits on point feet: on a flat foot nothing is left "
-                "without a motor, and ComputedTorque follows the gait"
-            )
+        if isinstance(gait, Motion):
+            stance_foot, duration, at = _course_of_motion(robot, gait)
+        else:
+            stance_foot, duration, at = _course_of_gait(robot, gait)
         if not (isinstance(degree, (int, np.integer)) and degree >= 3):
             raise GaitError(
                 f"degree must be a whole number, 3 or more to meet both ends of a step; got "
                 f"{degree!r}"
             )
-        factors = phase_of(robot, gait.stance_foot, phase)
-        time = np.linspace(0.0, gait.step_duration, INSTANTS * (degree + 1) + 1)
+        factors = phase_of(robot, stance_foot, phase)
+        time = np.linspace(0.0, duration, INSTANTS * (degree + 1) + 1)
         driven = robot.model.actuator_joint
-        theta = factors[2] * gait.pitch(time) + gait.in_step(time) @ factors[driven]
-        rate = factors[2] * gait.pitch(time, order=1)
-        rate = rate + gait.in_step(time, order=1) @ factors[driven]
+        place, speed = at(time, 0), at(time, 1)
+        theta, rate = place @ factors, speed @ factors
         if not np.all(rate > 0.0):
             raise GaitError(
                 f"the phase does not rise at {time[np.argmax(rate <= 0.0)]:.4g} s of the step; "
@@ -209,14 +209,14 @@ class PhasedGait:
             )
         ends = np.array([theta[0], theta[-1]])
         x = 2.0 * (theta - ends[0]) / (ends[1] - ends[0]) - 1.0
-        slopes = 0.5 * (ends[1] - ends[0]) * gait.in_step(time[[0, -1]], order=1)
+        slopes = 0.5 * (ends[1] - ends[0]) * speed[[0, -1]][:, driven]
         slopes = slopes / rate[[0, -1], None]
         return cls(
             robot=robot,
-            stance_foot=gait.stance_foot,
+            stance_foot=stance_foot,
             phase=factors,
             phase_range=(float(ends[0]), float(ends[1])),
-            coefficients=fitted(x, gait.in_step(time), slopes, degree),
+            coefficients=fitted(x, place[:, driven], slopes, degree),
         )
 
     def joints(self, theta: ArrayLike, *, order: int = 0) -> Floats:
@@ -352,6 +352,51 @@ class PhasedGait:
             lambda x: self.joints(first + half * (x + 1.0)), len(self.coefficients) - 1
         )
         return replace(self, phase_range=(first, theta), coefficients=coefficients)
+
+
+Course = Callable[[Floats, int], Floats]
+"""Of times of a step and an order, to coordinates or derivatives of them, (times, nv); where the
+trunk is is left out."""
+
+
+def _course_of_gait(robot: Robot, gait: Gait) -> tuple[int, float, Course]:
+    """Foot that stands in a gait, duration of its step (s), and what it does."""
+    gait.check_joints(robot)
+    if not gait.point_feet:
+        raise GaitError(
+            "virtual constraints are for gaits on point feet: on a flat foot nothing is left "
+            "without a motor, and ComputedTorque follows the gait"
+        )
+
+    def at(time: Floats, order: int) -> Floats:
+        whole = np.zeros((len(time), robot.nv))
+        whole[:, 2] = gait.pitch(time, order=order)
+        whole[:, robot.model.actuator_joint] = gait.in_step(time, order=order)
+        return whole
+
+    return gait.stance_foot, gait.step_duration, at
+
+
+def _course_of_motion(robot: Robot, motion: Motion) -> tuple[int, float, Course]:
+    """Return the same of a motion that is such a step."""
+    motion.check_robot(robot)
+    stand = [{robot.contact_names.index(name) for name in one.contacts} for one in motion.phases]
+    feet = [foot for foot, each in enumerate(robot.feet) if stand[0] == set(each.contacts)]
+    if len(motion.phases) > 1 or not feet or motion.repeat is not Repeat.MIRRORED:
+        raise GaitError(
+            "virtual constraints need one phase variable for all of a step, which one foot and its "
+            "mirror image take in turn; in flight or on two feet there is none. This motion has "
+            f"{len(motion.phases)} phases on {', '.join(map(str, map(len, stand)))} points; "
+            "hs.MotionLQR follows it"
+        )
+    (phase,) = motion.phases
+
+    def at(time: Floats, order: int) -> Floats:
+        whole = phase.coordinates(time, order=order)
+        whole[:, :2] = 0.0
+        return whole
+
+    return feet[0], phase.duration, at
 
 
 def check_robot(robot: Robot) -> None:

@@ -23,6 +23,7 @@ from heelstrike.gait.recordings.lines import (
 )
 from heelstrike.gait.recordings.units import UNITS, told
 from heelstrike.robot.model import Floats
+from heelstrike.sim.files.table import EVENTS
 
 TIMES = ("time", "t", "seconds")
 """Columns that hold times."""
@@ -147,8 +148,12 @@ def read_table(path: Name, *, gaps: bool = False) -> Table:
     heading = lines[0][1]
     separator = next((each for each in (",", ";", "\t") if each in heading), None)
     names = [name.strip().strip('"') for name in heading.split(separator)]
-    numbers = numbers_in(path, lines[1:], separator, len(names), gaps=gaps)
-    return table_of(path, names, numbers, tuple(place for place, _ in lines[1:]))
+    rows = lines[1:]
+    if separator == "," and names[-1] == EVENTS:  # words, in tables of runs
+        names = names[:-1]
+        rows = [(place, line.rpartition(",")[0]) for place, line in rows]
+    numbers = numbers_in(path, rows, separator, len(names), gaps=gaps)
+    return table_of(path, names, numbers, tuple(place for place, _ in rows))
 
 
 def table_of(

@@ -10,7 +10,7 @@ from heelstrike.errors import GaitError
 
 UNITS = {
     "rad": 1.0, "deg": np.pi / 180.0, "degrees": np.pi / 180.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3,
-    "s": 1.0, "ms": 1e-3, "n": 1.0,
+    "s": 1.0, "ms": 1e-3, "n": 1.0, "n m": 1.0,
 }  # fmt: skip
 """Units, in those of ours."""
 
@@ -38,7 +38,7 @@ def plain(name: str) -> str:
 
 def told(name: str) -> tuple[str, str]:
     """Return the plain name of a column and its unit, if it names one."""
-    bracket = re.fullmatch(r"(.*?)\s*[\[(]\s*(\w+)\s*[\])]", name)
+    bracket = re.fullmatch(r"(.*?)\s*[\[(]\s*(\w+(?: \w+)?)\s*[\])]", name)
     if bracket and bracket[2].lower() in UNITS:
         return plain(bracket[1]), bracket[2].lower()
     whole = plain(name)

@@ -91,7 +91,8 @@ def planned(
         latched=[None] if latched is None else _joints("latched", latched),
         braked=_joints("braked", braked),
     )
-    laws = {id(each): _law(each) for each in _listed(controller)}
+    begin = dimension_of(asked[0]["robot"]).compiles_meanwhile
+    laws = {id(each): _law(each, begin=begin) for each in _listed(controller)}
     plans = []
     for index, each in enumerate(asked):
         with naming(index, len(asked)):
@@ -272,9 +273,9 @@ def way_of(robot: AnyRobot | Sequence[AnyRobot], method: Method | None) -> Metho
     return dimension_of(robots[0]).way(method)
 
 
-def _law(controller: Any) -> Law:
+def _law(controller: Any, *, begin: bool) -> Law:
     """Return the law that a controller is, which must be one that can be compiled."""
-    law = law_of(controller, begin=True)
+    law = law_of(controller, begin=begin)
     if law is None or not law.function.compiles:
         raise ControllerError(
             f"{type(controller).__name__} runs in Python, so a batch of it would run one at a "

@@ -57,6 +57,7 @@ class Space(Dimension):
     quantities = RECORDED
     record = SpatialRecord
     certificates = SpatialCertificates
+    compiles_meanwhile = False  # what it would compile is for the plane
     solved = ("solves", "shortcuts", "fallbacks", "failures")
 
     def way(self, method: Method | None) -> InSpace:

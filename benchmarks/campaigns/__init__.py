@@ -1,0 +1,1 @@
+"""What campaigns cost, and whether any kind of death loses a trial."""

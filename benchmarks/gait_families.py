@@ -1,0 +1,106 @@
+"""Families of gaits over speed and slope: their time, and what gaits between them are worth.
+
+Run, from the top folder::
+
+    python benchmarks/gait_families.py            # both robots
+    python benchmarks/gait_families.py bravo7     # one of them
+
+A family has 10 speeds and 10 slopes, -8° to 8°. In the middle of each of the 81 cells its gait is
+interpolated, held against the optimum that is found from it, and walked event-driven under computed
+torque on its slope: 20 steps on flat feet, one on points, on which computed torque cannot go on.
+Times are of the clock and of the processor; the load is that of the machine before and after.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from rich.console import Console
+from table import Table
+
+import heelstrike as hs
+
+os.environ["HEELSTRIKE_KEEP_GAITS"] = "0"  # what is timed is the design
+
+SLOPES = np.deg2rad(np.linspace(-8.0, 8.0, 10)).tolist()
+ROBOTS = {
+    "bravo7": {"step_duration": 0.70, "friction": 0.75},
+    "rabbit": {"step_duration": 0.60, "friction": 0.60},
+}
+SPEEDS = np.linspace(0.3, 0.6, 10).tolist()
+STEPS = 20
+
+
+@dataclass(frozen=True)
+class Between:
+    """A gait between those of a family."""
+
+    more: float
+    """By how much it costs more than the optimum, as a share."""
+    steps: int
+    """How many steps it was walked."""
+    asked: int
+    """How many it was to be walked."""
+
+
+def middles(axis: np.ndarray) -> list[float]:
+    """Return the middles between the values of an axis."""
+    return (0.5 * (axis[1:] + axis[:-1])).tolist()
+
+
+def tried(family: hs.GaitFamily, speed: float, slope: float) -> Between | None:
+    """Interpolate a gait, find the optimum from it, and walk it; None where there is a gap."""
+    try:
+        gait = family.at(speed=speed, slope=slope)
+    except hs.GaitError:
+        return None
+    robot = family.robot
+    best = hs.optimize_gait(robot, **family.asked, speed=speed, slope=slope, warm_start=gait)
+    steps = 1 if gait.point_feet else STEPS
+    run = hs.simulate(
+        robot, hs.ComputedTorque(robot, gait), state=gait.initial_state,
+        duration=(steps + 0.1) * gait.step_duration, method=hs.EventDriven(),
+        ground=hs.Ground(friction=0.75, slope=slope),
+    )  # fmt: skip
+    return Between(gait.spent / best.spent - 1.0, run.summary(gait=gait).steps, steps)
+
+
+def row(name: str) -> list[str]:
+    """Design the family of a robot and return its row of the table."""
+    load = os.getloadavg()[0]
+    clock, spent = time.perf_counter(), time.process_time()
+    family = hs.gait_family(hs.load_robot(name), **ROBOTS[name], speed=SPEEDS, slope=SLOPES)
+    clock, spent = time.perf_counter() - clock, time.process_time() - spent
+    optimal = sum(gait.optimal for gait in family.gaits.values())
+    errors = [
+        max(each.margins.touchdown_error, each.margins.impact_error)
+        for each in family.gaits.values()
+    ]
+    cells = [
+        tried(family, speed, slope)
+        for speed, slope in product(*(middles(axis) for axis in family.axes.values()))
+    ]
+    found = [each for each in cells if each is not None]
+    more = [100.0 * each.more for each in found]
+    return [
+        name, str(len(family.gaits)), str(len(family.gaps)), str(optimal), f"{max(errors):.0e}",
+        f"{clock:.0f}", f"{spent:.0f}", f"{load:.1f}, {os.getloadavg()[0]:.1f}", str(len(found)),
+        f"{np.median(more):.2f}", f"{max(more):.2f}",
+        f"{sum(each.steps == each.asked for each in found)}",
+    ]  # fmt: skip
+
+
+def main() -> None:
+    """Print the table."""
+    head = ["robot", "gaits", "gaps", "optimal", "closes to", "clock (s)", "processor (s)", "load"]
+    head += ["between", "costs more (%): median", "most", "walked"]
+    Console(width=180).print(Table("", head, [row(name) for name in sys.argv[1:] or ROBOTS]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,198 @@
+"""One motion of each kind: designed, refined until it closes, and kept for the tests.
+
+Run, from the top folder::
+
+    python benchmarks/motion_kinds.py                # all of them
+    python benchmarks/motion_kinds.py toe limp       # some of them
+
+Each is designed by `hs.optimize_motion` and written to `tests/gait/motion/kinds`, where the tests
+look at it with MuJoCo's equations of motion. It closes if computed torque, from its initial state,
+brings the robot to where the motion goes on, to 3e-9 (m, rad, m/s, rad/s): pieces are doubled until
+then. The table has the time of the processor for the first design and for all of it.
+"""
+
+from __future__ import annotations
+
+import gzip
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import casadi
+import numpy as np
+
+import heelstrike as hs
+from heelstrike import ContactPhase as Phase
+from heelstrike import dynamics
+
+FOLDER = Path(__file__).parents[1] / "tests" / "gait" / "motion" / "kinds"
+CLOSED = 3e-9
+"""A third of what the tests allow: another processor rounds otherwise."""
+MOST_PIECES = 48
+STEP = {"distance": 0.30, "duration": 0.70}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of motion."""
+
+    robot: Callable[[], hs.Robot]
+    phases: tuple[Phase, ...]
+    asked: Callable[[hs.Robot], dict[str, Any]] | dict[str, Any] = field(default_factory=dict)
+
+    def arguments(self, robot: hs.Robot) -> dict[str, Any]:
+        """Return what is asked of a motion but its phases."""
+        return self.asked(robot) if callable(self.asked) else self.asked
+
+
+def of_library(name: str) -> Callable[[], hs.Robot]:
+    """Return what loads a robot."""
+    return lambda: hs.load_robot(name)
+
+
+def sprung() -> hs.Robot:
+    """bravo7 with springs at its knees and ankles."""
+    robot = hs.load_robot("bravo7")
+    stiffness = robot.model.stiffness.copy()
+    for side in ("right", "left"):
+        stiffness[robot.joint_names.index(f"{side}_knee")] = 40.0
+        stiffness[robot.joint_names.index(f"{side}_ankle")] = 100.0
+    return replace(robot, model=robot.model.replaced(stiffness=stiffness))
+
+
+def geared() -> hs.Robot:
+    """bravo7 with motors whose torque falls with their speed."""
+    robot = hs.load_robot("bravo7")
+    driven = np.isin(np.arange(robot.nv), robot.model.actuator_joint)
+    lines = {
+        "stall_torque": np.where(driven, 300.0, np.inf),
+        "no_load_speed": np.where(driven, 15.0, np.inf),
+    }
+    return replace(robot, model=robot.model.replaced(**lines))
+
+
+def round_feet() -> hs.Robot:
+    """Return rabbit on discs of 5 cm, which roll."""
+    robot = hs.load_robot("rabbit")
+    return replace(robot, model=robot.model.replaced(contact_radius=np.full(robot.nc, 0.05)))
+
+
+def crouched(robot: hs.Robot, knee: float) -> hs.State:
+    """bravo7 at rest on both flat feet, on bent knees."""
+    q = robot.reference_state().q.copy()
+    for side in ("right", "left"):
+        for name, angle in (("hip", -0.5 * knee), ("knee", knee), ("ankle", -0.5 * knee)):
+            q[robot.joint_names.index(f"{side}_{name}")] += angle
+    q[:2] -= dynamics.contact_positions(robot, q).mean(axis=0)
+    return hs.State(q, np.zeros(robot.nv))
+
+
+def rising(robot: hs.Robot) -> dict[str, Any]:
+    """From deeply bent knees to less bent ones: on straight legs, two feet are singular."""
+    return {"repeat": "never", "start": crouched(robot, 1.6), "end": crouched(robot, 0.5)}
+
+
+def of_user(now: hs.gait.Instant) -> Any:
+    """Torques and speeds of the motors."""
+    return casadi.sumsqr(now.torque) + 50.0 * casadi.sumsqr(now.motor_velocity)
+
+
+BRAVO7, RABBIT = of_library("bravo7"), of_library("rabbit")
+FLAT = (Phase("right_foot", duration=0.7),)
+TOE = Phase("right_foot_toe", duration=(0.05, 0.3), pieces=3)
+KINDS = {
+    "single support": Kind(BRAVO7, FLAT, STEP),
+    "uphill": Kind(BRAVO7, FLAT, {**STEP, "slope": np.deg2rad(8.0)}),
+    "downhill": Kind(BRAVO7, FLAT, {**STEP, "slope": np.deg2rad(-8.0)}),
+    "toe": Kind(BRAVO7, (Phase("right_foot", duration=(0.3, 0.6)), TOE), STEP),
+    "rolling": Kind(round_feet, (Phase("right_tibia", duration=0.6),), {"distance": 0.25}),
+    "limp": Kind(
+        RABBIT,
+        (
+            Phase("right_tibia", duration=(0.55, 0.8)),
+            Phase("left_tibia", duration=(0.2, 0.5)),
+        ),
+        {"distance": 0.5, "duration": 1.0, "repeat": "same"},
+    ),
+    "standing up": Kind(
+        BRAVO7, (Phase("right_foot", "left_foot", duration=0.6, pieces=4),), rising
+    ),
+    "springs": Kind(sprung, FLAT, STEP),
+    "electrical energy": Kind(geared, FLAT, {**STEP, "cost": "electrical_energy"}),
+    "user's cost": Kind(BRAVO7, FLAT, {**STEP, "cost": of_user}),
+}
+
+
+def file_of(name: str) -> Path:
+    """Return where a kind is kept."""
+    plain = "".join(each if each.isalnum() else "_" for each in name)
+    return FOLDER / f"{plain}.json.gz"
+
+
+def keep(motion: hs.Motion, path: Path) -> None:
+    """Write a motion, packed, the same file for the same motion."""
+    with tempfile.TemporaryDirectory() as folder:
+        plain = Path(folder) / "motion.json"
+        motion.save(plain)
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(gzip.compress(plain.read_bytes(), mtime=0))
+
+
+def kept(name: str, robot: hs.Robot) -> hs.Motion:
+    """Read the motion of a kind."""
+    with tempfile.TemporaryDirectory() as folder:
+        plain = Path(folder) / "motion.json"
+        plain.write_bytes(gzip.decompress(file_of(name).read_bytes()))
+        return hs.load_motion(plain, robot)
+
+
+def designed(name: str) -> str:
+    """Design the motion of a kind, keep it, and return its row of the table."""
+    from closing import gap, lacking, mechanics_of
+
+    kind = KINDS[name]
+    robot = kind.robot()
+    begin = time.process_time()
+    asked = kind.arguments(robot)
+    motion = hs.optimize_motion(robot, kind.phases, **asked)
+    first = time.process_time() - begin
+    mechanics = mechanics_of(robot, motion.slope)
+    while (missed := gap(mechanics, motion)) > CLOSED:
+        pieces = [2 * len(each.pieces) for each in motion.phases]
+        if max(pieces) > MOST_PIECES:
+            break
+        finer = [
+            Phase(*each.contacts, duration=each.duration, pieces=count)
+            for each, count in zip(kind.phases, pieces, strict=True)
+        ]
+        motion = hs.optimize_motion(robot, finer, **asked, warm_start=motion, refine=False)
+    keep(motion, file_of(name))
+    spent = time.process_time() - begin
+    counts = " + ".join(str(len(each.pieces)) for each in motion.phases)
+    cells = (
+        name, robot.name, f"{first:.1f}", f"{spent:.1f}", f"{motion.cost:.4g}",
+        "yes" if motion.optimal else "no", counts, f"{missed:.0e}",
+        f"{lacking(mechanics, motion):.0e}", f"{file_of(name).stat().st_size / 1024:.0f}",
+    )  # fmt: skip
+    return f"| {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Design, keep, and print the table."""
+    sys.path.insert(0, str(FOLDER.parents[2]))  # the judge is among the tests
+    head = "motion, robot, design (s), all (s), cost (N²m²s), optimal, pieces, closes to"
+    columns = [*head.split(", "), "lacks (N)", "kB"]
+    print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
+    for name in sys.argv[1:] or KINDS:
+        try:
+            print(designed(name), flush=True)
+        except hs.GaitError as error:
+            print(f"| {name} | {error} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""``heelstrike identify``: what a robot is, from what it measured as it moved."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from heelstrike.cli.options import AsJson, Reading
+from heelstrike.cli.terminal import output, spoken, stage, wrote
+
+
+# As many arguments as the command has options: a person's, none of which is handed on one by one.
+@spoken
+def identify(
+    recording: Annotated[
+        Path, typer.Argument(help="Table of text: time, joints, torques, perhaps contact forces.")
+    ],
+    *,
+    robot: Annotated[
+        str, typer.Option(help="A built-in robot, or an MJCF, URDF or SDF file.")
+    ] = "bravo7",
+    rate: Annotated[
+        float | None, typer.Option(help="Rows a second, where there is no column of times.")
+    ] = None,
+    unit: Annotated[
+        str, typer.Option(help="Of columns that name none: rad or deg.", show_default="rad")
+    ] = "",
+    encoder_noise: Annotated[
+        float | None,
+        typer.Option(help="Noise of the encoders in rad.", show_default="told by roughness"),
+    ] = None,
+    torque_noise: Annotated[float, typer.Option(help="Noise of the torques in N m.")] = 0.2,
+    force_noise: Annotated[float, typer.Option(help="Noise of the contact forces in N.")] = 2.0,
+    longest_delay: Annotated[
+        float, typer.Option(help="Longest delay of the motors in s that is looked for.")
+    ] = 0.0,
+    how: Reading,
+    figure: Annotated[
+        Path | None, typer.Option(dir_okay=False, help="Also draw it, as .png, .svg or .pdf.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Tell masses, moments, friction and delay of a robot from a recorded motion.
+
+    Each number comes with an interval that holds in 95 %, and what the motion does not tell is
+    named. Lengths are those of the robot's file.
+    """
+    with stage("loading"):
+        from heelstrike.experiments.identification import identify as told_by
+        from heelstrike.experiments.identification.figure import draw_identified
+        from heelstrike.gait.recordings.robot_log import load_robot_log
+        from heelstrike.robot import builtin_robots
+        from heelstrike.robot.library import load_planar_robot
+        from heelstrike.view.style import save_figure
+
+        keywords = {} if robot in builtin_robots() else how.keywords()
+        machine = load_planar_robot(robot, **keywords)
+        log = load_robot_log(recording, machine, rate=rate, unit=unit)
+    with stage("fitting"):
+        found = told_by(
+            machine, log, encoder_noise=encoder_noise, torque_noise=torque_noise,
+            force_noise=force_noise, longest_delay=longest_delay,
+        )  # fmt: skip
+    if figure is not None:
+        wrote(save_figure(draw_identified(found), figure))
+    if as_json:
+        told = {
+            "numbers": [
+                {"name": each.name, "unit": each.unit, "value": each.value, "low": each.low,
+                 "high": each.high, "file": each.assumed, "told": each.told,
+                 "with": [{"share": share, "name": name} for share, name in each.others]}
+                for each in found.numbers
+            ],
+            "delay": None if math.isnan(found.delay) else found.delay,
+            "friction": found.friction.value if found.friction.samples else None,
+            "not_told": list(found.hidden), "misfit": found.misfit,
+        }  # fmt: skip
+        typer.echo(json.dumps(told, indent=2))
+    else:
+        output().print(str(found), markup=False)

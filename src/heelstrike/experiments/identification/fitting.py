@@ -1,0 +1,360 @@
+"""Motion and parameters fitted together: what was measured of each is as likely as can be.
+
+Joints move along splines. Their coefficients c, the base parameters β and the delay d of the motors
+make the errors
+
+    of encoders    θ(t) − measured
+    of motors      Y(θ, θ̇, θ̈) β + springs − Γ(t − d)
+    of the ground  Y_b β − J_bᵀ f, where forces f are measured
+
+least in sum of squares, each over its standard deviation: maximum likelihood for noise that is
+normal. Accelerations are no data, so that their noise, which is large, biases nothing, as it does
+where they are put into the regression as if they were known. What the file says counts as an
+observation, too, as inexact as a part may be other than it is written: it keeps what the motion
+hardly tells from wandering off. Newton's method by Gauss; of each piece of the motion the
+coefficients are eliminated. Intervals follow from what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from heelstrike.errors import SimulationError
+from heelstrike.experiments.identification.base_parameters import BaseParameters
+from heelstrike.experiments.identification.equations import Columns, Equations, Slopes
+from heelstrike.experiments.identification.standing import Piece
+from heelstrike.experiments.people.splines import DEGREE, Splines
+from heelstrike.field_texts import dataclass
+from heelstrike.gait.recordings.robot_log import RobotLog
+from heelstrike.robot.model import Floats
+
+ORDERS = range(4)
+"""Derivatives of joints that are looked at: the third tells what a delay does."""
+RESTING = 5.0
+"""Standard deviations of encoders that a joint moves from knot to knot, above which it is known
+which way: where it may rest, its dry friction may be anything up to its size."""
+SETTLED_FIT = 0.02
+"""Standard deviations by which no parameter changes any more."""
+NO_WORSE = 1e-7
+"""Rise of the mean square that is rounding."""
+SHORTEST_STEP = 1e-3
+"""Part of a step below which it is taken, whatever comes of it."""
+MOST_STEPS = 60
+"""Steps that are tried: most motions need six."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations of what is measured."""
+
+    encoder: Floats
+    """(k,) Of the joints (rad, m)."""
+    torque: float
+    """Of the torques (N m, N): what motors do otherwise than is logged."""
+    force: float
+    """Of the forces of each contact point, along each axis (N)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The most likely parameters."""
+
+    values: Floats
+    """(b,) Base parameters."""
+    covariance: Floats
+    """(b, b)"""
+    delay: float
+    """Of the motors (s)."""
+    delay_deviation: float
+    """Its standard deviation (s); zero if it was not looked for."""
+    misfit: float
+    """Sum of squares over its expectation: about 1 where noise is what it is said to be."""
+    degrees: int
+    """Degrees of freedom of that sum."""
+    torque: tuple[tuple[Floats, Floats, Floats], ...]
+    """Of each piece times (n,), torques that were measured and those that the parameters make of
+    the motion, (n, k) each."""
+
+
+class Fitting:
+    """A motion whose parameters are looked for.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the robot.
+    log : RobotLog
+        What was measured.
+    pieces : sequence of Piece
+        Where the equations are known.
+    base : BaseParameters
+        What can be told.
+    noise : Noise
+        How exact measurements are.
+    knots : float
+        Time between two knots of the splines (s).
+    longest_delay : float
+        Longest delay that is looked for (s); zero for none.
+    """
+
+    def __init__(
+        self, equations: Equations, log: RobotLog, pieces: Sequence[Piece], base: BaseParameters,
+        noise: Noise, *, knots: float, longest_delay: float,
+    ) -> None:  # fmt: skip
+        self.equations, self.log, self.base, self.noise = equations, log, base, noise
+        self.longest = longest_delay
+        self._pieces = [_Stretch(self, piece, knots) for piece in pieces]
+
+    def solve(self, values: Floats) -> Fit:
+        """Find the most likely parameters.
+
+        Parameters
+        ----------
+        values : (unknowns,) array
+            Where to begin: what the robot's file says.
+
+        Raises
+        ------
+        SimulationError
+            If they are not found.
+        """
+        size = len(self.base.chosen)
+        free = size + (self.longest > 0.0)
+        before = self.base.matrix * self.equations.unknowns.size
+        known = np.linalg.inv(before @ before.T)
+        there = np.zeros(free)  # base parameters, and the delay if it is looked for
+        there[:size] = begun = self.base.matrix @ values
+        least, part = np.inf, 1.0
+        for _ in range(MOST_STEPS):
+            found = self._evaluated(values, there)
+            matrix, right, squares = found.matrix, found.right, found.squares
+            matrix[:size, :size] += known
+            right[:size] += known @ (there[:size] - begun)
+            away = squares + float((there[:size] - begun) @ known @ (there[:size] - begun))
+            if away > least + NO_WORSE * found.rows and part > SHORTEST_STEP:
+                part *= 0.5  # too far: a shorter step from where it began
+            else:
+                least, part = away, 1.0
+                covariance = np.asarray(np.linalg.inv(matrix), np.float64)
+                step = -covariance @ right
+                deviation = np.sqrt(np.diag(covariance))
+                if np.all(np.abs(step) <= SETTLED_FIT * deviation):
+                    degrees = found.rows - free - sum(piece.size for piece in self._pieces)
+                    return Fit(
+                        there[:size], covariance[:size, :size], float(there[size:].sum()),
+                        float(deviation[size:].sum()), squares / degrees, degrees,
+                        tuple(piece.compared for piece in self._pieces),
+                    )  # fmt: skip
+                start = there, [(each.coefficients, each.change(step)) for each in self._pieces]
+            there = start[0] + part * step
+            there[size:] = np.clip(there[size:], -self.longest, self.longest)
+            for piece, (coefficients, change) in zip(self._pieces, start[1], strict=True):
+                piece.coefficients = coefficients + part * change
+        raise SimulationError(
+            "the parameters do not settle: the motion does not fit the robot. Look whether columns "
+            "have the right units and signs, and whether the feet stand flat"
+        )
+
+    def _evaluated(self, values: Floats, there: Floats) -> _Normal:
+        """Return the normal equations of the parameters at some of them."""
+        size = len(self.base.chosen)
+        assumed, delay = self.assumed(values, there[:size]), float(there[size:].sum())
+        found = _Normal(np.zeros((len(there), len(there))), np.zeros(len(there)), 0.0, 0)
+        for piece in self._pieces:
+            found = found.plus(piece.reduced(assumed, there[:size], delay, len(there)))
+        return found
+
+    def assumed(self, values: Floats, beta: Floats) -> Floats:
+        """Return values of all unknowns, near to some, that have given base parameters."""
+        matrix, size = self.base.matrix, self.equations.unknowns.size
+        scaled = matrix * size
+        change = np.linalg.lstsq(scaled, beta - matrix @ values, rcond=None)[0]
+        return values + size * change
+
+
+@dataclass(frozen=True, eq=False)
+class _Normal:
+    """Normal equations of the parameters, the sum of squares, and of how many errors it is."""
+
+    matrix: Floats
+    right: Floats
+    squares: float
+    rows: int
+
+    def plus(self, other: _Normal) -> _Normal:
+        """Add those of other errors."""
+        return _Normal(
+            self.matrix + other.matrix, self.right + other.right, self.squares + other.squares,
+            self.rows + other.rows,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What was seen of a motion: its splines, joints, columns and slopes."""
+
+    basis: Sequence[Floats]
+    theta: Sequence[Floats]
+    columns: Columns
+    slopes: Slopes
+
+
+class _Stretch:
+    """A piece of the motion with the coefficients of its splines."""
+
+    def __init__(self, whole: Fitting, piece: Piece, knots: float) -> None:
+        self._whole, self._foot = whole, piece.foot
+        log, rows = whole.log, slice(piece.first, piece.end)
+        self._time = log.time[rows] - log.time[piece.first]
+        self._begin = float(log.time[piece.first])
+        self._splines = Splines(self._time, knots)
+        self._apart = float(self._time[-1]) / (self._splines.size - DEGREE)
+        away = np.minimum(self._time, self._time[-1] - self._time)
+        self._inner = away >= whole.longest  # where commands act in here, whatever the delay
+        self._measured = log.joints[rows]
+        equations = whole.equations
+        self._torque = np.zeros_like(self._measured)
+        self._torque[:, equations.robot.model.actuator_joint - equations.first] = log.torque[rows]
+        self._force = None if log.force is None or piece.foot is None else log.force[rows]
+        self.coefficients = self._splines.fitted(self._measured)
+        self._basis = [self._splines.basis(self._time, order) for order in ORDERS]
+        moved = np.abs(self._basis[1] @ self.coefficients) * self._apart
+        self._moves = moved > RESTING * whole.noise.encoder
+        self._answer: Floats = np.zeros(0)
+        self._coupling: Floats = np.zeros((0, 0))
+        self.compared: tuple[Floats, Floats, Floats] = (np.zeros(0),) * 3
+
+    @property
+    def size(self) -> int:
+        """How many coefficients there are."""
+        return self.coefficients.size
+
+    def change(self, step: Floats) -> Floats:
+        """Return how coefficients change with the parameters, (size, joints)."""
+        change = -(self._answer + self._coupling @ step)
+        return change.reshape(self.coefficients.shape)
+
+    def reduced(self, assumed: Floats, beta: Floats, delay: float, free: int) -> _Normal:
+        """Return normal equations of the parameters.
+
+        Coefficients are eliminated, and change as :meth:`change` says.
+        """
+        noise, joints = self._whole.noise, self._measured.shape[1]
+        system = _System(self._splines.size, joints, free)
+        error = (self._basis[0] @ self.coefficients - self._measured) / noise.encoder
+        system.add_own(self._basis[0], error, noise.encoder)
+        here = there = self._seen(self._basis, assumed)
+        if not self._inner.all():
+            at = self._time[self._inner] + delay
+            there = self._seen([self._splines.basis(at, order) for order in ORDERS], assumed)
+        self._motors(system, there, beta)
+        if self._force is not None:
+            self._ground(system, here, beta)
+        self._answer, self._coupling, matrix, right = system.eliminated()
+        return _Normal(matrix, right, system.squares, system.rows)
+
+    def _seen(self, basis: Sequence[Floats], assumed: Floats) -> _Seen:
+        """Look at the motion at some times."""
+        theta = [each @ self.coefficients for each in basis]
+        equations = self._whole.equations
+        at = equations.columns((theta[0], theta[1], theta[2]), self._foot)
+        return _Seen(basis, theta, at, equations.slopes(at, assumed, self._foot))
+
+    def _motors(self, system: _System, seen: _Seen, beta: Floats) -> None:
+        """Add the errors of motors."""
+        whole, noise = self._whole, self._whole.noise
+        at, slopes = seen.columns, seen.slopes.motors
+        chosen = at.motors[:, :, list(whole.base.chosen)]
+        made = chosen @ beta + at.known
+        measured = self._torque[self._inner]
+        self.compared = (self._begin + self._time[self._inner], measured, made)
+        system.add(
+            seen.basis, (made - measured) / noise.torque, [each / noise.torque for each in slopes],
+            _with_delay(chosen, slopes, seen.theta, system.free) / noise.torque,
+            self._moves[self._inner],
+        )  # fmt: skip
+
+    def _ground(self, system: _System, seen: _Seen, beta: Floats) -> None:
+        """Add the errors of forces of the ground, each along its own axes."""
+        assert self._force is not None
+        assert self._foot is not None
+        whole = self._whole
+        at, slopes = seen.columns, seen.slopes.ground
+        held = whole.equations.held_rows(self._foot)
+        points = list(whole.equations.soles[self._foot].contacts)
+        force = self._force[:, points].reshape(len(self._time), -1)
+        back = np.swapaxes(at.rows[:, held, : whole.equations.first], 1, 2)
+        chosen = at.ground[:, :, list(whole.base.chosen)]
+        error = chosen @ beta - (back @ force[:, :, None])[:, :, 0]
+        scale = np.linalg.inv(np.linalg.cholesky(back @ np.swapaxes(back, 1, 2)))
+        scale = scale / whole.noise.force
+        parameters = np.zeros((*error.shape, system.free))
+        parameters[:, :, : len(beta)] = scale @ chosen
+        system.add(
+            seen.basis, (scale @ error[:, :, None])[:, :, 0], [scale @ each for each in slopes],
+            parameters, np.ones(error.shape, dtype=bool),
+        )  # fmt: skip
+
+
+def _with_delay(
+    chosen: Floats, slopes: Sequence[Floats], theta: Sequence[Floats], free: int
+) -> Floats:
+    """Return derivatives of torques by the parameters, of which the last may be a delay."""
+    size = chosen.shape[2]
+    found = np.zeros((*chosen.shape[:2], free))
+    found[:, :, :size] = chosen
+    if free > size:
+        for slope, rate in zip(slopes, theta[1:], strict=True):
+            found[:, :, size] += (slope @ rate[:, :, None])[:, :, 0]
+    return found
+
+
+class _System:
+    """Normal equations of coefficients, (size, joints) of them, and of parameters."""
+
+    def __init__(self, size: int, joints: int, free: int) -> None:
+        self.free, self.rows, self.squares = free, 0, 0.0
+        self._shape = size, joints
+        self._inner = np.zeros((size * joints, size * joints))
+        self._outer = np.zeros((size * joints, free))
+        self._corner, self._right = np.zeros((free, free)), np.zeros(free)
+        self._lacks = np.zeros(size * joints)
+
+    def add_own(self, basis: Floats, error: Floats, deviation: Floats) -> None:
+        """Add errors (n, joints) of the curves themselves, over their standard deviations."""
+        self._inner += np.kron(basis.T @ basis, np.diag(deviation**-2.0))
+        self._lacks += ((basis.T @ error) / deviation).ravel()
+        self.squares += float(np.sum(error**2))
+        self.rows += error.size
+
+    def add(
+        self, basis: Sequence[Floats], error: Floats, slopes: Sequence[Floats],
+        parameters: Floats, counts: Floats,
+    ) -> None:  # fmt: skip
+        """Add errors (n, m), their derivatives by θ, θ̇, θ̈ (n, m, joints) and by parameters."""
+        size, joints = self._shape
+        by = sum(
+            np.einsum("ia,iml->imal", each, slope)
+            for each, slope in zip(basis, slopes, strict=False)
+        )
+        rows = np.asarray(by).reshape(-1, size * joints)[counts.ravel()]
+        own, lacks = parameters.reshape(-1, self.free)[counts.ravel()], error[counts]
+        self._inner += rows.T @ rows
+        self._outer += rows.T @ own
+        self._corner += own.T @ own
+        self._lacks += rows.T @ lacks
+        self._right += own.T @ lacks
+        self.squares += float(lacks @ lacks)
+        self.rows += len(lacks)
+
+    def eliminated(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return how coefficients follow, and normal equations of the parameters alone."""
+        right = np.column_stack([self._lacks, self._outer])
+        found = np.asarray(np.linalg.solve(self._inner, right), np.float64)
+        answer, coupling = found[:, 0], found[:, 1:]
+        return (
+            answer, coupling, self._corner - self._outer.T @ coupling,
+            self._right - self._outer.T @ answer,
+        )  # fmt: skip

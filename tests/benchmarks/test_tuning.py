@@ -1,0 +1,58 @@
+"""The example of tuning: what it makes larger depends on what is tuned; a study goes on."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+import tuning
+import walking
+
+import heelstrike as hs
+
+USUAL = {"frequency": 20.0, "damping_ratio": 1.0, "step_duration": 0.7, "clearance": 0.02}
+
+
+class Suggests:
+    """A trial that takes the middle of every range."""
+
+    def suggest_float(self, name: str, low: float, high: float, *, log: bool = False) -> float:
+        return (low * high) ** 0.5 if log else 0.5 * (low + high)
+
+
+def test_what_is_suggested_makes_a_walk() -> None:
+    trial = tuning.tuned(walking.bravo7(), tuning.suggested(Suggests()))
+    assert trial.step_duration == pytest.approx(0.7)
+    assert isinstance(trial.controller, hs.ComputedTorque)
+
+
+@pytest.mark.slow
+def test_gains_matter() -> None:
+    robot = walking.bravo7()
+    stiff = tuning.share(robot, USUAL, 8)
+    assert stiff > tuning.share(robot, USUAL | {"frequency": 1.0}, 8)
+
+
+def test_without_optuna_it_says_what_to_install() -> None:
+    if find_spec("optuna") is not None:
+        pytest.skip("Optuna is installed")
+    ended = subprocess.run(
+        [sys.executable, tuning.__file__], capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 1
+    assert "pip install optuna" in ended.stderr
+
+
+@pytest.mark.slow
+def test_a_study_goes_on_where_it_was_ended(tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    command = [sys.executable, tuning.__file__, "--walks", "2", "--study", str(tmp_path / "s")]
+    for trials in ("1", "2"):
+        ended = subprocess.run(
+            [*command, "--trials", trials], capture_output=True, text=True, check=True
+        )
+        assert "of the walks go on" in ended.stdout
+    assert "Using an existing study" in ended.stderr

@@ -1,0 +1,125 @@
+"""Executors of others: the same to the last bit, and a worker that dies of a trial is no end."""
+
+from __future__ import annotations
+
+import importlib.util
+import pickle
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import campaign_cases as cases
+import numpy as np
+import pytest
+from scipy import stats
+
+import heelstrike as hs
+from heelstrike.errors import SimulationError
+from heelstrike.experiments.campaigns import Draw
+from heelstrike.experiments.campaigns.workers import dask_client, is_death
+
+FRICTION = {"ground.friction": stats.uniform(0.2, 0.6), "state.v.root_x": stats.norm(0.0, 0.3)}
+
+
+def made(trials: int = 70) -> hs.Campaign:
+    return hs.Campaign(cases.limp(), FRICTION, trials, 3)
+
+
+def as_text(results: hs.CampaignResults) -> str:
+    return repr((results.numbers, results.outcomes))
+
+
+class KilledWorker(Exception):  # noqa: N818 - as Dask calls it
+    """What Dask raises of a task on which its workers died."""
+
+
+@dataclass(frozen=True)
+class Sent:
+    """A call on its way to another machine and back, as text of bytes both times."""
+
+    call: bytes
+    deadly: Callable[[Any], bool]
+
+    def result(self) -> Any:
+        function, arguments = pickle.loads(self.call)
+        if self.deadly(*arguments):
+            raise KilledWorker("attempted on three workers, which all died")
+        return pickle.loads(pickle.dumps(function(*arguments)))
+
+    def cancel(self) -> None:
+        """Nothing has begun before somebody asks for the result."""
+
+
+class Client:
+    """What has the interface of a Dask client: it outlives the workers that die."""
+
+    def __init__(self, deadly: Callable[[Any], bool] = lambda _: False) -> None:
+        self.deadly, self.submitted = deadly, 0
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, pure: bool = True) -> Sent:
+        assert pure
+        self.submitted += 1
+        return Sent(pickle.dumps((function, arguments)), self.deadly)
+
+
+def test_a_cluster_comes_to_the_same_to_the_last_bit() -> None:
+    client = Client()
+    assert as_text(made().run(executor=client)) == as_text(made().run(workers=1))
+    assert client.submitted == 3  # blocks of 32
+
+
+def test_of_a_block_that_kills_workers_of_a_cluster_only_the_trial_is_lost() -> None:
+    alone = made().run(workers=1).outcomes
+    client = Client(lambda block: 40 in block.numbers)
+    found = made().run(executor=client).outcomes
+    assert found[40].status == "crashed"
+    assert "the worker died of it" in found[40].message
+    assert repr(found[:40] + found[41:]) == repr(alone[:40] + alone[41:])
+    assert client.submitted == 3 + 2 * 5  # 32 = 2⁵ trials are halved five times
+
+
+def test_what_is_no_death_ends_the_campaign() -> None:
+    class Lost(Client):
+        def submit(self, *_: Any, **__: Any) -> Any:
+            raise ConnectionError("the scheduler is gone")
+
+    with pytest.raises(ConnectionError, match="scheduler is gone"):
+        made().run(executor=Lost())
+
+
+def test_deaths_are_told_by_the_names_that_libraries_give_them() -> None:
+    class UncompletedJobError(RuntimeError):
+        pass
+
+    class PreemptedError(UncompletedJobError):
+        pass
+
+    assert is_death(KilledWorker())
+    assert is_death(PreemptedError())
+    assert not is_death(RuntimeError("a bug"))
+
+
+def test_without_dask_it_says_what_to_install() -> None:
+    if importlib.util.find_spec("distributed") is not None:
+        pytest.skip("Dask is installed")
+    with pytest.raises(SimulationError, match="pip install distributed"):
+        dask_client("tcp://127.0.0.1:8786")
+
+
+@pytest.mark.slow
+def test_the_same_on_a_dask_cluster() -> None:
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        assert as_text(made().run(executor=client)) == as_text(made().run(workers=1))
+
+
+@pytest.mark.slow
+def test_the_same_by_submitit(tmp_path: Any) -> None:
+    submitit = pytest.importorskip("submitit")
+    executor = submitit.LocalExecutor(folder=tmp_path)
+    grid = hs.Campaign(cases.limp(), {"ground.friction": [0.2, 0.8]}, draw=Draw.GRID)
+    assert as_text(grid.run(executor=executor)) == as_text(grid.run(workers=1))
+    assert np.isfinite(grid.run(workers=1).column("distance")).all()

@@ -1,0 +1,333 @@
+"""Numbers of robots from their motion: closed forms, another engine, and intervals that hold."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+import walking
+from typer.testing import CliRunner
+
+import heelstrike as hs
+from heelstrike.cli.main import app
+from heelstrike.errors import GaitError, RobotError
+from heelstrike.experiments.identification import Identified
+from heelstrike.experiments.identification.equations import Columns, Equations
+from heelstrike.experiments.identification.figure import draw_identified
+from heelstrike.gait.recordings.robot_log import RobotLog, load_robot_log
+
+GRAVITY = 9.81
+NOISE = {"encoder_noise": 1e-4, "torque_noise": 0.2, "force_noise": 2.0}
+EXACT = {"encoder_noise": 1e-8, "torque_noise": 1e-5, "force_noise": 1e-4, "knots": 0.02}
+
+
+def pendulum(mass: float = 2.0) -> hs.Robot:
+    build = hs.RobotBuilder("pendulum")
+    build.hinge("pivot", None, at=(0.0, 2.0), link="rod", mass=mass, inertia=0.05,
+                center_of_mass=(0.02, -0.4), torque=np.inf)  # fmt: skip
+    return build.build()
+
+
+def swinging(count: int = 1500) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Time, angle, velocity and acceleration of two sines."""
+    time = np.linspace(0.0, 3.0, count)
+    waves = ((0.9, 4.0), (0.4, 9.0))
+    return (
+        time,
+        sum(a * np.sin(w * time) for a, w in waves),  # type: ignore[return-value]
+        sum(a * w * np.cos(w * time) for a, w in waves),
+        sum(-a * w**2 * np.sin(w * time) for a, w in waves),
+    )
+
+
+def of_pendulum(**noise: float) -> Identified:
+    """What a pendulum tells whose torque is the textbook's, with friction of its pivot.
+
+    About +y, with the centre of mass at (c_x, c_z) from the pivot as it hangs: J θ̈ = Γ − d θ̇ −
+    c sign θ̇ + m g (c_x cos θ + c_z sin θ).
+    """
+    time, angle, velocity, acceleration = swinging()
+    moment, hx, hz, damping, dry = 0.41, 0.06, -0.9, 0.3, 0.5
+    weight = GRAVITY * (hx * np.cos(angle) + hz * np.sin(angle))
+    torque = moment * acceleration - weight + damping * velocity + dry * np.sign(velocity)
+    rng = np.random.default_rng(1)  # for intervals only
+    measured = angle + noise.get("encoder_noise", 0.0) * rng.standard_normal(len(time))
+    torque = torque + noise.get("torque_noise", 0.0) * rng.standard_normal(len(time))
+    return hs.identify(pendulum(), RobotLog(time, measured[:, None], torque[:, None]), **noise)
+
+
+PENDULUM = {
+    "first moment x of rod": 0.06, "first moment z of rod": -0.9, "moment of inertia of rod": 0.41,
+    "damping of pivot": 0.3, "dry friction of pivot": 0.5,
+}  # fmt: skip
+
+
+def test_a_pendulum_has_the_base_parameters_of_the_textbook() -> None:
+    """Its mass by itself never shows; the rotor turns as the rod does."""
+    found = of_pendulum(**EXACT)
+    values = {each.name.replace("rotor inertia of pivot", "moment of inertia of rod"): each.value
+              for each in found.numbers}  # fmt: skip
+    assert values == pytest.approx(PENDULUM, abs=1e-4)
+    assert any("mass of rod: no motion" in each for each in found.hidden)
+    inertia = next(each for each in found.numbers if "inertia" in each.name)
+    assert [share for share, _ in inertia.others] == pytest.approx([1.0])
+
+
+def test_intervals_of_a_pendulum_are_those_of_its_noise() -> None:
+    """Of 0.1 N m on 1500 samples alone, by the normal equations of the closed form."""
+    noise = {"encoder_noise": 1e-6, "torque_noise": 0.1, "knots": 0.03}
+    found = of_pendulum(**noise)
+    _, angle, velocity, acceleration = swinging()
+    columns = {
+        "first moment x of rod": -GRAVITY * np.cos(angle),
+        "first moment z of rod": -GRAVITY * np.sin(angle), "inertia": acceleration,
+        "damping of pivot": velocity, "dry friction of pivot": np.sign(velocity),
+    }  # fmt: skip
+    matrix = np.column_stack(list(columns.values()))
+    spread = 0.1 * np.sqrt(np.diag(np.linalg.inv(matrix.T @ matrix)))
+    expected = dict(zip(columns, spread, strict=True))
+    for each in found.numbers:
+        name = "inertia" if "inertia" in each.name else each.name
+        assert each.deviation == pytest.approx(expected[name], rel=0.02)
+        assert abs(each.value - PENDULUM.get(each.name, 0.41)) < 4.0 * each.deviation
+    assert found.misfit == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_joint_that_rests_tells_nothing() -> None:
+    """Its dry friction may hold whatever its weight does not."""
+    time = np.linspace(0.0, 2.0, 400)
+    torque = np.full((400, 1), GRAVITY * 0.8)
+    angle = np.full((400, 1), 0.5 * np.pi)
+    found = hs.identify(pendulum(), RobotLog(time, angle, torque), **EXACT)
+    assert not any(each.told for each in found.numbers)
+    hidden = " ".join(found.hidden)
+    for name in ("damping of pivot", "dry friction of pivot", "first moment z of rod"):
+        assert f"{name}: this motion hardly depends on it" in hidden
+
+
+ARM = """
+<mujoco model="arm"><compiler angle="radian"/><option gravity="0 0 -9.81"/><worldbody>
+  <body name="upper" pos="0 0 2"><joint name="shoulder" type="hinge" axis="0 1 0" damping="0.2"
+    armature="0.03"/><inertial pos="0.02 0 -0.2" mass="1.7" diaginertia="0.06 0.06 0.06"/>
+    <body name="lower" pos="0.03 0 -0.5">
+      <joint name="elbow" type="hinge" axis="0 1 0" damping="0.1"/>
+      <inertial pos="-0.01 0 -0.15" mass="0.9" diaginertia="0.02 0.02 0.02"/></body></body>
+</worldbody><actuator><motor name="shoulder" joint="shoulder"/><motor name="elbow" joint="elbow"/>
+</actuator></mujoco>
+"""  # fmt: skip
+
+
+def test_torques_of_another_engine_tell_its_numbers(tmp_path: Path) -> None:
+    """MuJoCo's inverse dynamics of an arm, for a file that has other masses."""
+    file = tmp_path / "arm.xml"
+    file.write_text(ARM.replace('mass="1.7"', 'mass="1.2"').replace('mass="0.9"', 'mass="1.5"'))
+    model = mujoco.MjModel.from_xml_string(ARM)
+    data = mujoco.MjData(model)
+    time, *first = swinging()
+    second = [0.6 * np.cos(5.3 * time), -0.6 * 5.3 * np.sin(5.3 * time),
+              -0.6 * 5.3**2 * np.cos(5.3 * time)]  # fmt: skip
+    theta = [np.column_stack(pair) for pair in zip(first, second, strict=True)]
+    torque = np.empty_like(theta[0])
+    for row in range(len(time)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = (each[row] for each in theta)
+        mujoco.mj_inverse(model, data)
+        torque[row] = data.qfrc_inverse
+    found = hs.identify(hs.load_robot(file), RobotLog(time, theta[0], torque), **EXACT)
+    truth = hs.load_robot(_written(tmp_path / "true.xml", ARM))
+    exact = hs.identify(truth, RobotLog(time, theta[0], torque), **EXACT)
+    assert [each.name for each in found.numbers] == [each.name for each in exact.numbers]
+    for each, true in zip(found.numbers, exact.numbers, strict=True):
+        assert each.value == pytest.approx(true.assumed, abs=2e-3), each.name
+
+
+def _written(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def test_columns_along_a_walk_are_the_torques_and_forces_of_the_walk() -> None:
+    """Of a simulated walk, whose torques and contact forces the simulator wrote."""
+    found = hs.identify(walking.bravo7(), measured_walk(), **NOISE)
+    assert found.misfit < 0.01
+    for _, torque, made in found.torque:
+        assert np.abs(torque - made).max() < 0.1
+
+
+@pytest.mark.parametrize("foot", [0, 1])
+def test_slopes_are_differences_of_columns(foot: int) -> None:
+    """Wherever the numbers are: of links off their axes and joints with rotors and dampers, too."""
+    equations, rng = Equations(walking.bravo7()), np.random.default_rng(foot)
+    theta = [scale * rng.standard_normal((3, 6)) for scale in (0.5, 2.0, 8.0)]
+    known = equations.unknowns.of(walking.bravo7().model)
+    values = known + 0.2 * rng.uniform(0.5, 1.0, len(known))
+    at = equations.columns((theta[0], theta[1], theta[2]), foot)
+    slopes = equations.slopes(at, values, foot)
+    held = equations.held_rows(foot)
+    forces = np.linalg.pinv(trunk_rows(at, held)) @ (at.ground @ values)[:, :, None]
+    step = 1e-6
+    for order in range(3):
+        for joint in range(6):
+            ends = []
+            for sign in (-1.0, 1.0):
+                moved = [np.array(each) for each in theta]
+                moved[order][:, joint] += sign * step
+                there = equations.columns((moved[0], moved[1], moved[2]), foot)
+                lacks = there.ground @ values - (trunk_rows(there, held) @ forces)[:, :, 0]
+                ends.append((there.motors @ values, lacks))
+            motors, ground = ((ends[1][k] - ends[0][k]) / (2.0 * step) for k in range(2))
+            np.testing.assert_allclose(slopes.motors[order][:, :, joint], motors, atol=2e-5)
+            np.testing.assert_allclose(slopes.ground[order][:, :, joint], ground, atol=2e-5)
+
+
+def trunk_rows(at: Columns, held: list[int]) -> np.ndarray:
+    """What forces of the contact points of a foot do to the trunk, (n, 3, held)."""
+    return np.swapaxes(at.rows[:, held, :3], 1, 2)
+
+
+STEPS, RATE = 4, 250.0
+
+
+@cache
+def measured_walk() -> RobotLog:
+    """A walk without noise, event-driven: its accelerations are those of the equations."""
+    run = hs.simulate(
+        walking.bravo7(), hs.ComputedTorque(walking.bravo7(), walking.gait()),
+        state=walking.gait().initial_state, duration=STEPS * walking.STEP_DURATION,
+        method=hs.EventDriven(output_period=1.0 / RATE), ground=hs.Ground(friction=0.75),
+    )  # fmt: skip
+    log = RobotLog.of(run)
+    rows = np.abs(log.time * RATE - np.round(log.time * RATE)) < 1e-6
+    return replace(log, **{name: getattr(log, name)[rows] for name in
+                           ("time", "joints", "torque", "force", "trunk")})  # fmt: skip
+
+
+def noisy(log: RobotLog, seed: int) -> RobotLog:
+    rng = np.random.default_rng(seed)
+    size = {"joints": 1e-4, "torque": 0.2, "force": 2.0, "trunk": 1e-4}
+    return replace(log, **{name: getattr(log, name) + each * rng.standard_normal(
+        getattr(log, name).shape) for name, each in size.items()})  # fmt: skip
+
+
+def wrong_file() -> hs.Robot:
+    robot, rng = walking.bravo7(), np.random.default_rng(0)
+    wrong = ("mass", "center_of_mass", "inertia")
+    numbers = {name: each * rng.uniform(0.8, 1.2, each.shape)
+               for name, each in robot.model.members().items() if name in wrong}  # fmt: skip
+    return replace(robot, model=robot.model.replaced(**numbers))
+
+
+def test_a_noisy_walk_tells_a_robot_whose_file_is_wrong() -> None:
+    """Errors are as large as their intervals say; most of them are far less than the file's."""
+    known = hs.identify(walking.bravo7(), measured_walk(), **NOISE)
+    true = [each.assumed for each in known.numbers]
+    found = hs.identify(wrong_file(), noisy(measured_walk(), 3), **NOISE)
+    errors = np.array([(each.value - t) / each.deviation
+                       for each, t in zip(found.numbers, true, strict=True)])  # fmt: skip
+    assert np.abs(errors).max() < 4.5
+    assert np.mean(errors**2) == pytest.approx(1.0, abs=0.9)
+    assert found.misfit == pytest.approx(1.0, abs=0.05)
+    assert not found.friction.samples
+    assert "not visible" in str(found.friction)
+    assert str(found).count("±") == sum(each.told for each in found.numbers)
+
+
+def test_without_forces_the_ground_is_eliminated() -> None:
+    log = replace(noisy(measured_walk(), 5), force=None, trunk=None)
+    true = hs.identify(walking.bravo7(), log, **NOISE).numbers
+    found = hs.identify(wrong_file(), log, **NOISE).numbers
+    for each, t in zip(found, true, strict=True):
+        assert abs(each.value - t.assumed) < 4.5 * each.deviation, each.name
+
+
+def test_the_noise_of_encoders_is_told_by_their_roughness() -> None:
+    known = hs.identify(walking.bravo7(), noisy(measured_walk(), 3), **NOISE)
+    told = hs.identify(walking.bravo7(), noisy(measured_walk(), 3), torque_noise=0.2)
+    for one, other in zip(known.numbers, told.numbers, strict=True):
+        assert other.deviation == pytest.approx(one.deviation, rel=0.2)
+
+
+def test_noise_that_is_larger_than_told_widens_intervals() -> None:
+    log = noisy(measured_walk(), 3)
+    honest = hs.identify(walking.bravo7(), log, **NOISE)
+    proud = hs.identify(walking.bravo7(), log, **NOISE | {"torque_noise": 0.1, "force_noise": 1.0})
+    assert proud.misfit > 1.3
+    assert np.median([p.deviation / h.deviation for p, h in
+                      zip(proud.numbers, honest.numbers, strict=True)]) > 0.5  # fmt: skip
+
+
+def test_a_delay_of_the_motors_is_found() -> None:
+    """Commands come 4 ms before what they do: a row of the table at 250 rows a second."""
+    log = noisy(measured_walk(), 4)
+    early = replace(log, torque=np.vstack([log.torque[1:], log.torque[-1:]]))
+    found = hs.identify(walking.bravo7(), early, longest_delay=0.02, **NOISE)
+    assert found.delay == pytest.approx(1.0 / RATE, abs=4.0 * found.delay_deviation)
+    assert found.delay_deviation < 1e-3
+    assert "delay of the motors: 4" in str(found)
+
+
+@pytest.mark.parametrize("friction", [0.15, 0.2])
+def test_friction_shows_where_a_foot_slides(friction: float) -> None:
+    """A walk on ground that is too slippery for it."""
+    run = hs.simulate(
+        walking.bravo7(), hs.ComputedTorque(walking.bravo7(), walking.gait()),
+        state=walking.gait().initial_state, duration=3 * walking.STEP_DURATION,
+        ground=hs.Ground(friction=friction),
+    )  # fmt: skip
+    found = hs.identify(walking.bravo7(), noisy(RobotLog.of(run), 1), **NOISE).friction
+    assert found.samples > 10
+    assert found.value == pytest.approx(friction, rel=0.05)
+
+
+def test_a_table_of_a_run_is_read_as_the_run_is(tmp_path: Path) -> None:
+    run = walking.walk(steps=2)
+    file = tmp_path / "run.csv"
+    run.save(file)
+    read, own = load_robot_log(file, walking.bravo7()), RobotLog.of(run)
+    for name in ("time", "joints", "torque", "force", "trunk"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(own, name), err_msg=name)
+    figure = tmp_path / "f.png"
+    told = CliRunner().invoke(app, ["identify", str(file), "--json", "--figure", str(figure)])
+    assert told.exit_code == 0, told.output
+    assert {"numbers", "friction", "not_told", "misfit"} <= json.loads(told.stdout).keys()
+    assert figure.stat().st_size > 10_000
+
+
+def test_its_figure_names_every_number_that_is_told() -> None:
+    found = of_pendulum(**EXACT)
+    figure = draw_identified(found)
+    words = {text.get_text() for axes in figure.axes for text in axes.get_yticklabels()}
+    assert {each.name for each in found.numbers if each.told} <= words
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "words"),
+    [
+        ({"torque_noise": 0.0}, hs.SimulationError, "torque_noise must be a positive number"),
+        ({"longest_delay": -1.0}, hs.SimulationError, "longest_delay"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(
+    given: dict[str, float], error: type[Exception], words: str
+) -> None:
+    with pytest.raises(error, match=words):
+        hs.identify(walking.bravo7(), measured_walk(), **given)
+
+
+def test_robots_that_it_does_not_know_are_refused(tmp_path: Path) -> None:
+    compass = hs.load_robot("rabbit")
+    time = np.linspace(0.0, 1.0, 50)
+    log = RobotLog(time, np.zeros((50, compass.nv - 3)), np.zeros((50, compass.nu)))
+    with pytest.raises(RobotError, match="feet must be flat"):
+        hs.identify(compass, log)
+    standing = replace(measured_walk(), joints=np.zeros_like(measured_walk().joints))
+    with pytest.raises(hs.SimulationError, match="never stands flat on one foot"):
+        hs.identify(walking.bravo7(), standing)
+    file = tmp_path / "lacks.csv"
+    file.write_text("time,right_hip\n" + "".join(f"{i},0\n" for i in range(9)))
+    with pytest.raises(GaitError, match="no column 'position right_knee'"):
+        load_robot_log(file, walking.bravo7())

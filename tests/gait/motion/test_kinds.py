@@ -1,0 +1,101 @@
+"""One motion of each kind, as `benchmarks/motion_kinds.py` designed and kept it.
+
+What judges it is MuJoCo's mechanics (`closing`): inverse dynamics, plastic impacts, and the motion
+integrated phase by phase.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from closing import Mechanics, gap, held_rows, lacking, mechanics_of
+from motion_kinds import FOLDER, KINDS, file_of, kept
+
+import heelstrike as hs
+
+CLOSED = 1e-8
+SMALL = (
+    1e-5  # of the weight, or m, that a limit may be missed by between the instants it is held at
+)
+RELAXED = 1.1e-8  # s; IPOPT relaxes bounds by 1e-8
+QUICK = ("single support", "standing up")  # the others are left to `make test`
+
+
+def loaded(name: str) -> tuple[hs.Robot, hs.Motion, Mechanics]:
+    robot = KINDS[name].robot()
+    motion = kept(name, robot)
+    return robot, motion, mechanics_of(robot, motion.slope)
+
+
+def test_every_kind_is_kept() -> None:
+    assert {each.name for each in FOLDER.iterdir()} == {file_of(name).name for name in KINDS}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_it_is_what_was_asked_for(name: str) -> None:
+    robot, motion, _ = loaded(name)
+    kind = KINDS[name]
+    for phase, asked in zip(motion.phases, kind.phases, strict=True):
+        low, high = asked.duration
+        assert low - RELAXED <= phase.duration <= high + RELAXED
+        named = {foot.name: foot.contacts for foot in robot.feet}
+        points = [named.get(each) or (robot.contact_names.index(each),) for each in asked.contacts]
+        wanted = {robot.contact_names[i] for contacts in points for i in contacts}
+        assert set(phase.contacts) == wanted
+    if not callable(kind.asked):
+        for key in {"distance", "duration", "speed", "slope"} & set(kind.asked):
+            assert getattr(motion, key) == pytest.approx(kind.asked[key], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_nothing_is_lacking(name: str) -> None:
+    """What trunk and passive joints need, the ground gives: to rounding."""
+    robot, motion, mechanics = loaded(name)
+    assert lacking(mechanics, motion) < 1e-8 * robot.weight
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_ground_pushes_in_its_cone(name: str) -> None:
+    """Of forces at all times, and of the impulses of landings."""
+    robot, motion, _ = loaded(name)
+    for phase in motion.phases:
+        allowed = SMALL * robot.weight
+        for pushed in (phase.forces(np.linspace(0.0, phase.duration, 100)), phase.impulse[None]):
+            assert pushed[..., 0].min() > -allowed
+            for foot in robot.feet:
+                normal, tangent = pushed[:, list(foot.contacts)].sum(axis=1).T
+                assert np.all(np.abs(tangent) <= motion.friction * normal + allowed)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_what_stands_rests(name: str) -> None:
+    """Velocities of contact points by MuJoCo's Jacobians, between the instants held at, too."""
+    _, motion, mechanics = loaded(name)
+    for phase in motion.phases:
+        held = held_rows(mechanics.robot, phase)
+        for t in np.linspace(0.0, phase.duration, 20):
+            q, v = (phase.coordinates(t, order=order) for order in range(2))
+            moving = mechanics.at(q, v).jacobian @ v
+            assert max((abs(moving[row]) for row in held), default=0.0) < 1e-3
+
+
+@pytest.mark.parametrize(
+    "name",
+    [each if each in QUICK else pytest.param(each, marks=pytest.mark.slow) for each in KINDS],
+)
+def test_it_closes(name: str) -> None:
+    """Followed by computed torque, it ends where it goes on: after the last landing, if it has."""
+    _, motion, mechanics = loaded(name)
+    assert gap(mechanics, motion) < CLOSED
+
+
+def test_a_motion_that_does_not_repeat_is_seen() -> None:
+    """The judge can say no: by a wrong distance, and by a force too little."""
+    from dataclasses import replace
+
+    robot, motion, mechanics = loaded("single support")
+    longer = replace(motion, distance=motion.distance + 1e-6)
+    assert gap(mechanics, longer) > 100.0 * CLOSED
+    (phase,) = motion.phases
+    less = replace(motion, phases=(replace(phase, force=0.999 * phase.force),))
+    assert lacking(mechanics, less) > 1e-4 * robot.weight
