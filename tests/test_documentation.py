@@ -57,6 +57,18 @@ def test_links_to_names_lead_to_what_is_described() -> None:
             assert f"::: {name}\n" in described, f"{page.name}: {name}"
 
 
+def test_rows_of_tables_have_a_head() -> None:
+    """Rows after a blank line are shown as text."""
+    lost = []
+    for page in PAGES:
+        text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+        for table in re.findall(r"(?:^\|.*$\n?)+", text, re.MULTILINE):
+            first, *rows = table.splitlines()
+            if not rows or not re.fullmatch(r"[|: -]+", rows[0]):
+                lost.append(f"{page.name}: {first[:60]}")
+    assert lost == []
+
+
 def test_every_page_is_in_the_navigation() -> None:
     docs = ROOT / "docs"
     pages = {str(page.relative_to(docs).as_posix()) for page in docs.rglob("*.md")}

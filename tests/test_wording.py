@@ -48,6 +48,10 @@ FORBIDDEN = {
     r"\bto be least\b": "minimised",
     r"\bis no whole number\b": "is not a whole number, is not a multiple of",
     r"\b1 contact problems\b": "1 contact problem",
+    r"\bbegun again\b": "run again to resume",
+    r"\bwhose twins\b": "the same, without the cause",
+    r"\bfells it\b": "makes it fall",
+    r"\blooks? at the gap alone\b": "tests only whether the gap is closed",
 }
 """Phrases that readers stumbled over, and what to write instead."""
 
