@@ -142,7 +142,7 @@ def test_what_there_is_to_doubt() -> None:
 
 @pytest.mark.parametrize(("name", "returns"), [("shove", 2), ("push", 0)])
 def test_what_it_tells_nothing_of(name: str, returns: int) -> None:
-    with pytest.raises(hs.SimulationError, match=r"after push.*; got"):
+    with pytest.raises(hs.SimulationError, match=r"push, height.*; got"):
         measured().after(name, returns)
 
 

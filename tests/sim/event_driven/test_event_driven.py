@@ -316,7 +316,7 @@ def test_the_events_of_an_instant_have_room() -> None:
     simulation.step()
     contacts = len(allocate_motion(robot).phase.modes.closed)
     assert contacts == 2 * robot.nc + 3 * robot.nv
-    assert len(simulation._records[0].event_time) > 2 * ((LOOKS + 6) * contacts + 8)
+    assert len(simulation._records[0].told.event_time) > 2 * ((LOOKS + 6) * contacts + 8)
 
 
 @pytest.mark.parametrize("turn", [0.0, -3.0])

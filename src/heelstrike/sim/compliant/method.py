@@ -727,7 +727,7 @@ def move(
     tell_of_stops(end, step, reaction.stop_torque, told, reported.stopped)
     tell_of_constraints(end, work.now.own.force, sums.own, rows, told, reported.closed)
     react(model, first, memory.q, told, loops.held)
-    if work.row >= 0:
+    if 0 <= work.row < record.rows:  # a simulation that was restored has a record of its own
         # What acted until the next sample takes the place of what acted at the first instant.
         note_forces(
             model, work.row, contacts.force, reaction.stop_torque, reaction.friction_torque,
