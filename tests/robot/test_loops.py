@@ -32,7 +32,7 @@ def pair() -> RobotBuilder:
         (lambda b: b.loop("front", None, at=(0, np.nan)), "at must be finite"),
         (lambda b: b.loop("front", None, at=(0, 0), other_at=0), "other_at must be a pair"),
         (lambda b: b.couple("front", "knee"), "no joint 'knee' to couple. Joints are: front, rear"),
-        (lambda b: b.couple("front", "front"), "joint 'front' follows itself"),
+        (lambda b: b.couple("front", "front"), "joint 'front' cannot follow itself"),
         (lambda b: b.couple("front", "rear", []), "polynomial of one to 5 coefficients"),
         (lambda b: b.couple("front", "rear", range(6)), "polynomial of one to 5 coefficients"),
         (lambda b: b.couple("front", "rear", [np.inf]), "coefficient of its polynomial must be"),

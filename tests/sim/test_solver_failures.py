@@ -29,7 +29,7 @@ PRESSED = """
 def test_what_one_solver_cannot_another_does_and_the_run_counts_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(certified_solve, "AMENDMENTS", 0)  # which need no solver here
+    monkeypatch.setattr(certified_solve, "MODE_CORRECTIONS", 0)  # which need no solver here
     robot = hs.load_robot("bravo7")
     state = hs.State(robot.model.reference.copy(), np.array(CIRCLING))
 

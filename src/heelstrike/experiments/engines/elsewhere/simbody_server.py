@@ -50,7 +50,7 @@ class Robot:
         self.asked, self.settings = asked, settings
         self.tree = Tree(asked["links"])
         if any(point[3] for link in self.tree.links for point in link["points"]):
-            raise ValueError("this engine is given contact points, not discs")
+            raise ValueError("this engine is not given discs, only contact points")
         mass = sum(link["mass"] for link in self.tree.links)
         self.weight = mass * math.hypot(*self.tree.gravity)
         self.turns = [-turn if turn else 1.0 for turn in self.tree.turns]
