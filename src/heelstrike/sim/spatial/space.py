@@ -121,9 +121,9 @@ class Space(Dimension):
             (self.mold(each).cast().blocks, each.robot.model)
             for each in {(each.robot, has_walls(each.ground)): each for each in settings}.values()
         ]
-        table, model = max(tables, key=lambda each: most_rows_of(each[0]))
-        entries = max(len(each.kind) for each, _ in tables)
-        return spatial_scratch(entries, most_rows_of(table), model)
+        entries = max(len(table.kind) for table, _ in tables)
+        rows = max(most_rows_of(table) for table, _ in tables)
+        return spatial_scratch(entries, rows, [model for _, model in tables])
 
     def mold(self, setting: Setting) -> Mold[SpatialMemory]:
         """Return the mold of the memory of a simulation, with nothing to scribble on."""
