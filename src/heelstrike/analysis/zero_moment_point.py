@@ -16,7 +16,7 @@ An impact is a large force over one step, and counts like any other force.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,13 @@ from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import soles
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.run import Run
-from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.tolerances import STANDING_GAP
 
 if TYPE_CHECKING:
     from heelstrike.analysis.spatial.zero_moment_point import SpatialZeroMomentPoint
+    from heelstrike.sim.spatial.run import SpatialRun
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,10 +93,11 @@ def zero_moment_point(
     ZeroMomentPoint or SpatialZeroMomentPoint
         Of each foot and of the whole robot, row by row.
     """
-    if isinstance(run, SpatialRun):
+    if isinstance(run.robot, SpatialRobot):
         from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 
-        return spatial_zero_moment_point(run)
+        return spatial_zero_moment_point(cast("SpatialRun", run))
+    run = cast(Run, run)
     robot, rows = run.robot, len(run.time)
     reference = sole_points(run, motion=motion)
     foot = np.full((rows, len(robot.feet)), np.nan)
