@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -136,6 +138,11 @@ class Space(Dimension):
     def words_of(self, law: Law) -> Any:
         """Words by which loops find the machine code of a law."""
         return words_in_space(law.function)
+
+    def tallied(self, memory: SpatialMemory, solves_with: str) -> dict[str, Any]:
+        """Return counts and worst values of a simulation, as fields of a run."""
+        found = super().tallied(memory, solves_with)
+        return found | {"solver": replace(found["solver"], relaxed=memory.tally.relaxed)}
 
     def shown(self, robot: SpatialRobot) -> Shown:
         """Return what the laws of a robot are shown."""
