@@ -16,7 +16,7 @@ An impact is a large force over one step, and counts like any other force.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast, overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,8 +96,7 @@ def zero_moment_point(
     if isinstance(run.robot, SpatialRobot):
         from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 
-        return spatial_zero_moment_point(cast("SpatialRun", run))
-    run = cast(Run, run)
+        return spatial_zero_moment_point(run)
     robot, rows = run.robot, len(run.time)
     reference = sole_points(run, motion=motion)
     foot = np.full((rows, len(robot.feet)), np.nan)
