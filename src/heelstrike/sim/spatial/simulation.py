@@ -36,7 +36,7 @@ class SpatialSimulation(Simulation):
         If the arguments are not usable.
     """
 
-    @wraps(Simulation.__init__)  # type: ignore[misc] - help shows its signature
+    @wraps(Simulation.__init__)  # type: ignore[misc]  # help shows its signature
     def __init__(self, robot: SpatialRobot, *others: Any, **setup: Any) -> None:
         if not isinstance(robot, SpatialRobot):
             raise SimulationError(f"robot must be a SpatialRobot, got {type(robot).__name__}")
