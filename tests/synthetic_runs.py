@@ -13,7 +13,7 @@ import heelstrike as hs
 from heelstrike.dynamics import contact_positions
 from heelstrike.robot import read_mjcf
 from heelstrike.sim import Certificates, Event, EventKind, RunStatus, SolverCount, Timing
-from heelstrike.sim.record.record import ROW_EXTENTS
+from heelstrike.sim.plane import PLANE
 from heelstrike.sim.run import QUANTITIES
 
 
@@ -45,7 +45,7 @@ def make_run(
     normal = np.array([-np.sin(ground.slope), np.cos(ground.slope)])
     center = np.array([contact_positions(robot, row) for row in q]).reshape(rows, robot.nc, 2)
     radius = robot.model.contact_radius
-    extents = robot.model.extents | ROW_EXTENTS | {"constraints": len(robot.constraints)}
+    extents = robot.model.extents | PLANE.row_extents(robot)
     given: dict[str, Any] = {
         "position": q,
         "velocity": velocity,

@@ -138,6 +138,21 @@ def test_simulations_begin_without_what_takes_long_to_import() -> None:
     assert told.stdout == "\n"
 
 
+def test_planar_runs_and_their_summaries_do_not_load_space() -> None:
+    """But for what tells robots in space from others."""
+    script = (
+        "import heelstrike as hs, sys; robot = hs.load_robot('compass_gait')\n"
+        "run = hs.simulate(robot, state=robot.reference_state(), duration=0.01); run.summary()\n"
+        "space = 'heelstrike.sim.spatial', 'heelstrike.analysis.spatial', "
+        "'heelstrike.contact.spatial'\n"
+        "print(*(each for each in sys.modules if each.startswith(space)))"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert told.stdout == "\n"
+
+
 def test_no_module_needs_one_operating_system() -> None:
     """But where it does without what is not there."""
     needed = {str(source.relative_to(PACKAGE)): needs(source) for source in SOURCES}

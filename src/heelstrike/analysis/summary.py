@@ -12,7 +12,7 @@ from heelstrike.analysis.friction import friction_use
 from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.slip import max_slip
 from heelstrike.analysis.support import double_support_fraction, walking_steps
-from heelstrike.analysis.told_summary import ToldSummary, in_lines
+from heelstrike.analysis.told_summary import OF_A_GAIN, UNKNOWN, ToldSummary, in_lines
 from heelstrike.analysis.tracking import tracking_error
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
 from heelstrike.field_texts import dataclass
@@ -20,8 +20,6 @@ from heelstrike.sim.run import Run, SolverCount
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
-
-UNKNOWN = float("nan")
 
 
 @dataclass(frozen=True)
@@ -188,7 +186,7 @@ LINES = {
     "slip": "{s.slip_max_m:.2} m",
     "penetration": "{s.penetration_max_m:.2} m",
     "contact problems": "{s.solver}; complementarity residual {s.complementarity_max:.2}",
-    "energy created by impacts": "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
+    OF_A_GAIN: "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
     "cost of transport": "{s.cost_of_transport:.3} "
     "({s.cost_of_transport_positive:.3} by positive work alone)",
     "torques at their limit": "{s.saturations}",
@@ -196,4 +194,3 @@ LINES = {
     "compilation {s.compile_s:.3} s",
 }
 OF_A_GAIT = ("gait", "joint tracking error")
-OF_A_GAIN = "energy created by impacts"

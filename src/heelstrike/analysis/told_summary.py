@@ -16,6 +16,12 @@ from heelstrike.sim.closed_sets import RunStatus
 if TYPE_CHECKING:
     from rich.table import Table
 
+UNKNOWN = float("nan")
+"""A figure that does not exist."""
+
+OF_A_GAIN = "energy created by impacts"
+"""Label of a line that is needless where nothing was created."""
+
 
 class ToldSummary(ShownInNotebooks):
     """Base of the figures of a run: dataclasses, with the lines that tell them."""

@@ -28,12 +28,13 @@ from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import soles
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.run import Run
-from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.tolerances import STANDING_GAP
 
 if TYPE_CHECKING:
     from heelstrike.analysis.spatial.zero_moment_point import SpatialZeroMomentPoint
+    from heelstrike.sim.spatial.run import SpatialRun
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,7 @@ def zero_moment_point(
     ZeroMomentPoint or SpatialZeroMomentPoint
         Of each foot and of the whole robot, row by row.
     """
-    if isinstance(run, SpatialRun):
+    if isinstance(run.robot, SpatialRobot):
         from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 
         return spatial_zero_moment_point(run)

@@ -75,8 +75,28 @@ class Dimension(ABC):
     solved: ClassVar[tuple[str, ...]]
     """What is counted of the contact problems of a run, in the tally of its solver."""
 
+    def way(self, method: Any) -> Method:
+        """Return what goes through time as a method says, time stepping if none is asked for.
+
+        Refuse what is no method, and one that is not for it.
+        """
+        from heelstrike.sim.method import Method, UnknownMethod
+        from heelstrike.sim.time_stepping import TimeStepping
+
+        if isinstance(method, UnknownMethod):
+            raise SimulationError(
+                f"{method.name} is here as data only, as its file tells of it; load the run with "
+                f"the class, or those of its laws: load_run(path, classes=[{method.name}])"
+            )
+        if not (method is None or isinstance(method, Method)):
+            raise SimulationError(
+                f"method must be a simulation method such as TimeStepping(), got {method!r}"
+                + (f"; write {method.__name__}()" if isinstance(method, type) else "")
+            )
+        return self.way_of(TimeStepping() if method is None else method)
+
     @abstractmethod
-    def way(self, method: Method | None) -> Method:
+    def way_of(self, method: Method) -> Method:
         """Return what goes through time as a method says, or refuse one that is not for it."""
 
     @abstractmethod
@@ -152,6 +172,10 @@ class Dimension(ABC):
     @abstractmethod
     def gaps(self, robot: Any, state: State, ground: Any) -> tuple[Floats, Floats]:
         """Gaps of contact points in a state (m), (nc,), and how far up their normals point."""
+
+    @abstractmethod
+    def way_out(self, ground: Any) -> str:
+        """Say what gets a state out of a ground."""
 
     @abstractmethod
     def latched(self, robot: Any, memory: Any) -> tuple[str, ...]:

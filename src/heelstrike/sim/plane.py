@@ -25,13 +25,10 @@ from heelstrike.sim.controller.robot import ControlState, robot_view
 from heelstrike.sim.dimension import Dimension, Shown
 from heelstrike.sim.look import Look
 from heelstrike.sim.memory import Memory, allocate_memory
-from heelstrike.sim.method import Method, UnknownMethod, check_constraints
+from heelstrike.sim.method import Method, check_constraints
 from heelstrike.sim.record.record import ROW_EXTENTS, Record
 from heelstrike.sim.run import QUANTITIES, SOLVED, Certificates, Run
 from heelstrike.sim.setting import Setting, check_state
-from heelstrike.sim.time_stepping import TimeStepping
-
-_USUAL = TimeStepping()
 
 
 class Plane(Dimension):
@@ -46,20 +43,8 @@ class Plane(Dimension):
     compiles_meanwhile = True
     solved = SOLVED
 
-    def way(self, method: Method | None) -> Method:
-        """Return a method, time stepping if none is asked for, or refuse what is none."""
-        if method is None:
-            return _USUAL
-        if isinstance(method, UnknownMethod):
-            raise SimulationError(
-                f"{method.name} is here as data only, as its file tells of it; load the run with "
-                f"the class, or those of its laws: load_run(path, classes=[{method.name}])"
-            )
-        if not isinstance(method, Method):
-            raise SimulationError(
-                f"method must be a simulation method such as TimeStepping(), got {method!r}"
-                + (f"; write {method.__name__}()" if isinstance(method, type) else "")
-            )
+    def way_of(self, method: Method) -> Method:
+        """Return a method as it is."""
         return method
 
     def row_extents(self, robot: Robot) -> dict[str, int]:
@@ -160,6 +145,10 @@ class Plane(Dimension):
         """Gaps of contact points in a state (m), (nc,), and how far up their normals point."""
         at = contact_kinematics(robot, state.q, state.v, ground)
         return at.gap, at.normal[:, 1]
+
+    def way_out(self, ground: Ground) -> str:
+        """Say what gets a state out of a ground."""
+        return "robot.placed(state, ground) gives a state that is not"
 
     def latched(self, robot: Robot, memory: Memory) -> tuple[str, ...]:
         """Joints that latches hold."""

@@ -136,7 +136,8 @@ def _numbers(name: str, value: Sequence[float]) -> tuple[float, ...]:
         numbers = ()
     if len(numbers) not in (2, 3):
         raise SimulationError(
-            f"the {name} of a push must be two numbers (x, z), got {value!r}"
+            f"the {name} of a push must be two numbers (x, z), or three (x, y, z) in space, got "
+            f"{value!r}"
         ) from None
     if not np.all(np.isfinite(numbers)):
         raise SimulationError(f"the {name} of a push must be finite, got {value!r}")

@@ -6,19 +6,20 @@ import inspect
 import operator
 import sys
 import time as clock_time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Unpack, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from heelstrike.arguments import refusal, takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.mold import Mold
 from heelstrike.contact.ground import Ground
-from heelstrike.errors import ControllerError, SimulationError
+from heelstrike.errors import ControllerError, HeelstrikeError, SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -59,6 +60,8 @@ NEVER = 2**62
 FAR = 1e300
 # Points deeper than this (m) in ground that is laid under them are in it.
 LAID = 1e-6
+# Vertical part of the normal of a face above which lowering the ground gets a point out of it.
+UPWARDS = 0.1
 
 _OUTCOMES = tuple(Outcome)
 _CLOCK = Mold(Clock())
@@ -283,7 +286,7 @@ class Simulation:
             point = int(np.argmax(deep))
             raise SimulationError(
                 f"contact point {self.robot.contact_names[point]!r} would be {deep[point]:.3g} m "
-                "in the ground; robot.placed(state, ground) gives a state that is not"
+                f"in the ground; {self._dimension.way_out(self._ground)}"
             )
         self._dimension.held(self.robot, state, self._ground, self.latched, ())
         self._check(replace(self._setting, ground=self._ground, state=state))
@@ -310,17 +313,20 @@ class Simulation:
         ground = self._dimension.checked_ground(ground)
         deep, upwards = self._depth(self.state, ground)
         if deep.any():
-            point = int(np.argmax(deep))
+            point, sunk = int(np.argmax(deep)), deep > 0.0
+            name = self.robot.contact_names[point]
+            if np.all(upwards[sunk] > UPWARDS):
+                lower = float(np.max(deep[sunk] / upwards[sunk]))
+                raise SimulationError(
+                    f"this ground would be {deep[point]:.3g} m above contact point {name!r}; lower "
+                    f"it by {lower:.3g} m, or raise the robot first"
+                )
             raise SimulationError(
-                f"this ground would be {deep[point]:.3g} m above contact point "
-                f"{self.robot.contact_names[point]!r}; lower it by "
-                f"{float(np.max(deep / upwards)):.3g} m, or raise "
-                "the robot first"
+                f"contact point {name!r} would be {deep[point]:.3g} m in this ground, behind a "
+                "wall; move the ground or the robot away first"
             )
         self._check(replace(self._setting, ground=ground, state=self.state))
-        mine, its = self._ground.numbers(), ground.numbers()
-        alike = mine.keys() == its.keys()
-        if not (alike and all(np.array_equal(mine[name], its[name]) for name in mine)):
+        if not _are_alike(self._ground.numbers(), ground.numbers()):
             self._dimension.check_fit(ground, self._memory)
             self._way.forget_ground(self.robot, self._work, self._clock)
             self._dimension.laid(self._memory)
@@ -862,6 +868,8 @@ class Simulation:
                 taken = camera.image_of(snapshot.arrays, taken)
             if self._python is not None:
                 _partaking(self._python, self._name).restore(beside["controller"].copy())
+        except HeelstrikeError:
+            raise
         except (KeyError, ValueError) as error:
             raise SimulationError(f"the snapshot is damaged: {error}") from error
         camera.put_back(taken)
@@ -1058,6 +1066,14 @@ def check_duration(duration: float) -> None:
     """Refuse a duration that is none."""
     if not (np.isfinite(duration) and duration >= 0.0):
         raise SimulationError(f"duration must be a finite number ≥ 0, got {duration}")
+
+
+def _are_alike(mine: Mapping[str, NDArray[Any]], its: Mapping[str, NDArray[Any]]) -> bool:
+    """Whether two grounds have the same numbers; NaN, which a box has of its ground, is one."""
+    return mine.keys() == its.keys() and all(
+        np.array_equal(mine[name], its[name], equal_nan=mine[name].dtype.kind == "f")
+        for name in mine
+    )
 
 
 def _place(thing: Any) -> str:

@@ -207,3 +207,64 @@ def test_the_lock_is_released_while_lanes_move(robot: hs.SpatialRobot) -> None:
         counted += 1
     thread.join()
     assert counted > 1
+
+
+ROOT = (
+    "<body name='root' pos='0 0 0.1'><freejoint/><geom type='sphere' size='0.1' mass='2'/>"
+    "{limbs}</body>"
+)
+LIMB = (
+    "<body name='l{i}' pos='0.25 {y} 0'><joint name='j{i}' axis='0 0 1'/>"
+    "<geom type='sphere' size='0.1' mass='1'/>{more}</body>"
+)
+
+
+@pytest.fixture
+def unlike(made: Maker) -> dict[str, hs.SpatialRobot]:
+    """Three limbs on a body, and in a row: as many rows, but chains of other lengths."""
+    motors = "".join(f"<motor name='m{i}' joint='j{i}'/>" for i in range(3))
+    after = f"<actuator>{motors}</actuator>"
+    star = "".join(LIMB.format(i=i, y=0.25 * (i - 1), more="") for i in range(3))
+    serial = ""
+    for i in (2, 1, 0):
+        serial = LIMB.format(i=i, y=0, more=serial)
+    return {
+        "star": made(ROOT.format(limbs=star), after),
+        "serial": made(ROOT.format(limbs=serial), after),
+    }
+
+
+@pytest.mark.parametrize("order", [("star", "serial"), ("serial", "star")])
+def test_chains_of_other_lengths_have_room(
+    unlike: dict[str, hs.SpatialRobot], order: tuple[str, str]
+) -> None:
+    robots = [unlike[name] for name in order]
+    assert {robot.model.longest for robot in robots} == {7, 9}
+    v = np.r_[0.5, 0.2, 0.0, 0.0, 0.0, 0.4, 1.0, -2.0, 1.5]
+    states = [hs.State(robot.reference_state().q, v) for robot in robots]
+    batch = hs.simulate_batch(robots, state=states, duration=0.1, threads=1)
+    for i, (robot, state) in enumerate(zip(robots, states, strict=True)):
+        alone = hs.simulate(robot, state=state, duration=0.1)
+        assert batch.completed[i]
+        assert np.array_equal(batch.position[i], alone.position[-1])
+
+
+BOX = hs.Box(center=(3.0, 0.0, 0.1), size=(1.0, 1.0, 0.2))
+
+
+def test_grounds_that_do_not_lie_in_columns_are_not_blamed_on_robots(
+    robot: hs.SpatialRobot,
+) -> None:
+    for boxes in ((), (BOX,)), ((BOX,), ()):
+        grounds = [hs.SpatialGround(boxes=each) for each in boxes]
+        with pytest.raises(SimulationError, match="the grounds of a batch must all have boxes"):
+            hs.Batch(robot, state=robot.reference_state(), ground=grounds)
+
+
+def test_a_lane_that_starts_again_is_given_no_ground_without_room(robot: hs.SpatialRobot) -> None:
+    batch = hs.Batch(robot, state=robot.reference_state(), lanes=2)
+    with pytest.raises(SimulationError, match="this ground has boxes"):
+        batch._renew(0, ground=hs.SpatialGround(boxes=(BOX,)))
+    batch.advance(0.01)
+    assert batch.going.all()
+    batch.close()

@@ -55,7 +55,7 @@ def test_a_snapshot_brings_ground_and_pushes_along(made: Maker) -> None:
     simulation.restore(kept)
     assert simulation.ground.friction == 0.3
     assert simulation.record.pushes[0].force == push.force
-    with pytest.raises(SimulationError, match="this ground has boxes, and the simulation began"):
+    with pytest.raises(SimulationError, match=r"^this ground has boxes, and the simulation began"):
         simulation.restore(hs.Simulation(robot, state=state, ground=high).snapshot())
     assert simulation.ground.friction == 0.3
 
@@ -122,9 +122,100 @@ def test_options_of_the_plane_are_told_from_unknown_ones(made: Maker) -> None:
     for option, words in (
         ({"braked": ("knee",)}, "brakes are for robots in the plane"),
         ({"latched": ("knee",)}, "latches are for robots in the plane"),
+        ({"braked": 0}, "brakes are for robots in the plane"),
+        ({"latched": 0}, "latches are for robots in the plane"),
         ({"checked": True}, "checked=True looks at the indices of laws of robots in the plane"),
     ):
         with pytest.raises(SimulationError, match=words):
             hs.Simulation(robot, state=robot.reference_state(), **option)
     with pytest.raises(TypeError, match="'colour'"):
         hs.Simulation(robot, state=robot.reference_state(), colour="red")
+
+
+BOUNCES = hs.SpatialGround(restitution=0.5)
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ({"method": hs.TimeStepping(solver="gauss_seidel")}, "leave solver out"),
+        ({"method": hs.TimeStepping(activation=0.1)}, "leave activation out"),
+        ({"method": hs.TimeStepping(bounded_restitution=True)}, "leave bounded_restitution out"),
+        ({"method": hs.TimeStepping}, r"write TimeStepping\(\)"),
+        ({"method": "fast"}, "must be a simulation method such as .* got 'fast'"),
+        (
+            {"method": hs.TimeStepping(scheme=hs.Scheme.GAP_LINEARISED), "ground": BOUNCES},
+            "has restitution; use Scheme.IMPACT_RESOLVED$",
+        ),
+    ],
+)
+def test_what_a_method_would_not_heed_is_refused(
+    made: Maker, option: dict[str, Any], words: str
+) -> None:
+    robot = made(BALL)
+    with pytest.raises(SimulationError, match=words):
+        hs.Simulation(robot, state=robot.reference_state(), **option)
+
+
+def test_ground_that_is_laid_again_changes_nothing(made: Maker) -> None:
+    """Also where a box has friction and restitution of the ground: its numbers are NaN."""
+    robot = made(BALL)
+    q = robot.reference_state().q.copy()
+    q[2] = 0.1
+    ground = hs.SpatialGround(boxes=(BOX,))
+    simulation = hs.Simulation(robot, state=hs.State(q, np.zeros(6)), ground=ground)
+    simulation.advance(0.01)
+    touched = simulation._memory.blocks.touching.copy()
+    assert touched.max() > 0
+    simulation.ground = simulation.ground
+    assert np.array_equal(simulation._memory.blocks.touching, touched)
+
+
+def test_what_was_in_a_wedge_is_forgotten_where_it_is_put_elsewhere(made: Maker) -> None:
+    robot = made(BALL)
+    q = robot.reference_state().q.copy()
+    q[2] = 0.2
+    simulation = hs.Simulation(robot, state=hs.State(q, np.zeros(6)))
+    wedge = simulation._memory.wedge
+    never = wedge.wedged
+    wedge.wedged = 5
+    simulation.state = hs.State(q, np.ones(6))
+    assert wedge.wedged == never
+    wedge.wedged = 5
+    simulation.ground = hs.SpatialGround(friction=0.3)
+    assert wedge.wedged == never
+
+
+def test_the_count_of_solves_tells_of_relaxed_steps(made: Maker) -> None:
+    robot = made(BALL)
+    simulation = hs.Simulation(robot, state=robot.reference_state())
+    simulation._memory.tally.relaxed = 3
+    assert simulation.record.certificates.relaxed == 3
+    assert simulation.record.solver.relaxed == 3
+
+
+def test_advice_out_of_the_ground_is_true_in_space(made: Maker) -> None:
+    """No method that there is not, no number that lowers a wall."""
+    robot = made(BALL)
+    q = robot.reference_state().q.copy()
+    q[2] = 0.2
+    simulation = hs.Simulation(
+        robot, state=hs.State(q, np.zeros(6)), ground=hs.SpatialGround(boxes=(BOX,))
+    )
+    deep = q.copy()
+    deep[2] = 0.05
+    with pytest.raises(SimulationError, match=r"m in the ground; raise the robot, or move it away"):
+        simulation.state = hs.State(deep, np.zeros(6))
+    low = hs.SpatialGround(height=0.15, boxes=(BOX,))
+    with pytest.raises(SimulationError, match=r"lower it by 0.05 m, or raise the robot first"):
+        simulation.ground = low
+    wall = hs.Box(center=(0.55, 0.0, 1.0), size=(1.0, 4.0, 2.0))
+    with pytest.raises(SimulationError, match="in this ground, behind a wall; move the ground"):
+        simulation.ground = hs.SpatialGround(boxes=(wall,))
+
+
+def test_a_push_may_have_three_components_and_says_so() -> None:
+    with pytest.raises(
+        SimulationError, match=r"two numbers \(x, z\), or three \(x, y, z\) in space"
+    ):
+        hs.Push("ball", force=(1.0,), start=0.0, duration=0.1)

@@ -26,3 +26,19 @@ def test_a_simulation_of_ones_own_takes_robots_in_space() -> None:
     assert Own(robot).step() is hs.RunStatus.COMPLETED
     with pytest.raises(hs.SimulationError, match="robot must be a SpatialRobot"):
         SpatialSimulation(hs.load_robot("bravo7"))
+
+
+def test_the_help_of_simulations_in_space_tells_their_options() -> None:
+    assert list(inspect.signature(SpatialSimulation).parameters) == list(
+        inspect.signature(hs.Simulation).parameters
+    )
+
+
+def test_a_law_that_cannot_be_compiled_is_told_how_it_can_run() -> None:
+    @hs.controller
+    def opens(torque):  # type: ignore[no-untyped-def]
+        open("file")  # noqa: SIM115, PTH123
+
+    robot = hs.load_robot("bravo7", dimension=3)
+    with pytest.raises(hs.ControllerError, match=r"@controller\(compile=False\) runs it in Python"):
+        hs.Simulation(robot, opens(), state=robot.reference_state())

@@ -166,25 +166,6 @@ class SpatialGround:
         object.__setattr__(self, "normal", tuple(normal.tolist()))
         object.__setattr__(self, "_model", model)
 
-    def has_shape_of(self, other: SpatialGround) -> bool:
-        """Whether the plane and the boxes are where they are in another ground.
-
-        Parameters
-        ----------
-        other : SpatialGround
-            The other, whose friction and restitution do not count.
-
-        Returns
-        -------
-        bool
-            Whether they are.
-        """
-        mine, its = self._model, other._model
-        return mine.height == its.height and all(
-            np.array_equal(getattr(mine, name), getattr(its, name))
-            for name in ("normal", "center", "rotation", "half")
-        )
-
     @classmethod
     @takes(SimulationError)
     def stairs(

@@ -210,9 +210,3 @@ def point_bias(work: SpatialWorkspace, link: int, position: Vector) -> Vector:
 def angular_velocity(work: SpatialWorkspace, link: int) -> Vector:
     """Angular velocity of a link, in world axes."""
     return angular(spatial(work.velocity, link))
-
-
-@kernel
-def origin_velocity(work: SpatialWorkspace, link: int) -> Vector:
-    """Velocity of the origin of a link's frame."""
-    return point_velocity(work, link, vector(work.origin, link))

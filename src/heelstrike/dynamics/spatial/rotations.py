@@ -118,13 +118,3 @@ def turned(a: Matrix, b: Vector) -> Vector:
         a[3] * b[0] + a[4] * b[1] + a[5] * b[2],
         a[6] * b[0] + a[7] * b[1] + a[8] * b[2],
     )
-
-
-@kernel
-def turned_back(a: Matrix, b: Vector) -> Vector:
-    """Turn a vector by the transpose of a matrix."""
-    return (
-        a[0] * b[0] + a[3] * b[1] + a[6] * b[2],
-        a[1] * b[0] + a[4] * b[1] + a[7] * b[2],
-        a[2] * b[0] + a[5] * b[1] + a[8] * b[2],
-    )

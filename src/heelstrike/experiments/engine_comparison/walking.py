@@ -24,7 +24,7 @@ from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law
 from heelstrike.sim.method import UnknownMethod
-from heelstrike.sim.record.record import ROW_EXTENTS
+from heelstrike.sim.plane import PLANE
 from heelstrike.sim.run import QUANTITIES, Certificates, Event, Run, SolverCount, Timing
 
 FALLEN = 0.5
@@ -154,7 +154,7 @@ def recorded_run(
     """
     robot = peer.scenario.robot
     model = robot.model
-    extents = model.extents | ROW_EXTENTS | {"constraints": len(robot.constraints)}
+    extents = model.extents | PLANE.row_extents(robot)
     rows = len(time)
     given: dict[str, Any] = {
         "position": position, "velocity": velocity, "torque": torque, "contact_force": force

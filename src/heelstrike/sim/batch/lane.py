@@ -137,6 +137,8 @@ class Lane(Simulation):
 
         It has to start again before it moves.
         """
+        if setting.ground is not self._ground:
+            self._dimension.check_fit(setting.ground, self._memory)
         if setting.pushes is not self._pushes and setting.pushes:
             mine, its = self._memory.pushes, pushes_on(self.robot, setting.pushes)
             for name in ("link", "point", "force", "start", "end"):

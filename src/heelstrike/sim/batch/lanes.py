@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.dimension import dimension_of
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import pushes_on
+from heelstrike.sim.setting import Setting
 
 
 class Lanes:
@@ -84,13 +86,24 @@ class Lanes:
         return lane
 
     def refuse_others(self, plans: Sequence[Plan]) -> None:
-        """Refuse robots whose memory would not lie in columns."""
+        """Refuse robots and grounds whose memory would not lie in columns."""
         wanted = self._block.shape[1] - self._clock_mold.size
-        if any(self._dimension.mold(plan.setting).size != wanted for plan in plans):
+
+        def fits(setting: Setting) -> bool:
+            return bool(self._dimension.mold(setting).size == wanted)
+
+        others = [plan.setting for plan in plans if not fits(plan.setting)]
+        if not others:
+            return
+        if any(fits(replace(others[0], ground=lane.ground)) for lane in self.lanes):
             raise SimulationError(
-                "the robots of a batch must have the same structure, joint by joint; one of these "
-                "differs. Use simulate_batch for such robots"
+                "the grounds of a batch must all have boxes, or none of them may; one of these "
+                "differs. Use simulate_batch for such grounds"
             )
+        raise SimulationError(
+            "the robots of a batch must have the same structure, joint by joint; one of these "
+            "differs. Use simulate_batch for such robots"
+        )
 
     def find(self, index: int) -> None:
         """Find what a lane is moved with, which may be elsewhere now."""

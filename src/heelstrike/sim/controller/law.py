@@ -142,13 +142,7 @@ class ControllerFunction:
         ControllerError
             If it cannot be compiled.
         """
-        try:
-            return self.separate.finish()
-        except CompileError as error:
-            raise ControllerError(
-                f"controller {self.name!r} cannot be compiled; @controller(compile=False) runs it "
-                f"in Python. {error}"
-            ) from error
+        return _finished(self, self.separate)
 
     @cached_property
     def separate(self) -> SeparateKernel:
@@ -186,10 +180,18 @@ def machine_code_of(law: ControllerFunction, seen: Mapping[str, Any]) -> Integer
     ControllerError
         If it cannot be compiled.
     """
+    return _words(_finished(law, _separate(law, seen)))
+
+
+def _finished(law: ControllerFunction, separate: SeparateKernel) -> Any:
+    """Return the machine code of a law, compiled or loaded."""
     try:
-        return _words(_separate(law, seen).finish())
+        return separate.finish()
     except CompileError as error:
-        raise ControllerError(f"controller {law.name!r} cannot be compiled. {error}") from error
+        raise ControllerError(
+            f"controller {law.name!r} cannot be compiled; @controller(compile=False) runs it in "
+            f"Python. {error}"
+        ) from error
 
 
 _SEEN: Mapping[str, Any] = {"state": ControlState, "contacts": Contacts, "robot": ControlledRobot}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -209,7 +209,6 @@ SEEN: dict[str, Any] = {
 """What laws are shown in space."""
 
 
-@cache
 def words_in_space(function: ControllerFunction) -> Integers:
     """Words by which the loop finds the machine code of a law, made for robots in space.
 
@@ -218,7 +217,12 @@ def words_in_space(function: ControllerFunction) -> Integers:
     ControllerError
         If it cannot be compiled.
     """
-    return machine_code_of(function, SEEN)
+    if function not in _WORDS:
+        _WORDS[function] = machine_code_of(function, SEEN)
+    return _WORDS[function]
+
+
+_WORDS: WeakKeyDictionary[ControllerFunction, Integers] = WeakKeyDictionary()
 
 
 def view_of(robot: SpatialRobot) -> SpatialControlledRobot:

@@ -219,10 +219,11 @@ class SpatialScratch(NamedTuple):
     solver: BlockWorkspace
 
 
-def spatial_scratch(entries: int, rows: int, model: SpatialModel) -> SpatialScratch:
-    """Allocate room for problems of so many entries and rows."""
+def spatial_scratch(entries: int, rows: int, models: Sequence[SpatialModel]) -> SpatialScratch:
+    """Allocate room for problems of so many entries and rows, of any of some robots."""
     blocks, most = max(entries, 1), max(rows, 1)
-    extents = {**model.extents, "entries": entries, "capacity": most}
+    largest = {name: max(model.extents[name] for model in models) for name in models[0].extents}
+    extents = {**largest, "entries": entries, "capacity": most}
 
     def both() -> dict[str, Any]:
         return {"problem": block_problem(blocks, most), "answer": block_answer(blocks, most)}
@@ -240,7 +241,7 @@ def allocate_spatial_memory(
     """Allocate the memory of a simulation of a robot in space, on ground with walls or without."""
     memory = spatial_mold(robot, walls=walls).cast()
     table = memory.blocks
-    scratch = spatial_scratch(len(table.kind), most_rows_of(table), robot.model)
+    scratch = spatial_scratch(len(table.kind), most_rows_of(table), [robot.model])
     return beside_scratch(memory, scratch).replaced(pushes=pushes_on(robot, pushes))
 
 
@@ -263,7 +264,7 @@ _MOLDS: WeakKeyDictionary[SpatialRobot, dict[bool, Mold[SpatialMemory]]] = WeakK
 
 def _laid_out(robot: SpatialRobot, *, walls: bool) -> SpatialMemory:
     table = lay_out_table(robot, walls=walls)
-    nothing = spatial_scratch(0, 0, robot.model)
+    nothing = spatial_scratch(0, 0, [robot.model])
     extents = {
         **robot.model.extents, "entries": len(table.kind), "axes": 3, "components": 3,
         "feet": (2 if walls else 1) * robot.model.nc,

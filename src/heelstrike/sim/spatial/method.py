@@ -36,6 +36,7 @@ from heelstrike.sim.spatial.record import (
 from heelstrike.sim.spatial.stepping import find_state, take_step
 from heelstrike.sim.spatial.table import lay_out_table
 from heelstrike.sim.time_stepping import TimeStepping
+from heelstrike.sim.time_stepping.method import refuse_restitution
 
 # ruff: noqa: ARG001 - the kernels of all methods have the same arguments
 
@@ -50,6 +51,9 @@ SPRINGS = "its springs and dampers of the ground are written for the plane"
 
 SCHEMES = (Scheme.IMPACT_RESOLVED, Scheme.GAP_LINEARISED)
 """Those that there are in space."""
+
+OF_THE_PLANE = ("solver", "activation", "bounded_restitution")
+"""Settings of time stepping that nothing in space asks for."""
 
 
 class SpatialStepping(Bundle):
@@ -105,7 +109,8 @@ class InSpace(Method):
         return 1, 2 * len(lay_out_table(robot, walls=False).kind) + 4
 
     def check(self, setting: Setting) -> None:
-        """Refuse what is for the plane only."""
+        """Refuse what is for the plane only, and restitution where impacts are plastic."""
+        refuse_restitution(self.settings.scheme, setting, (Scheme.IMPACT_RESOLVED,))
         if setting.checked:
             raise SimulationError(
                 "checked=True looks at the indices of laws of robots in the plane; in space leave "
@@ -113,7 +118,7 @@ class InSpace(Method):
             )
 
 
-def way_in_space(method: Method | None) -> InSpace:
+def way_in_space(method: Method) -> InSpace:
     """Return the time stepping that a simulation in space goes by.
 
     Raises
@@ -121,8 +126,6 @@ def way_in_space(method: Method | None) -> InSpace:
     SimulationError
         If it is another method, or a scheme of the plane only; with the reason.
     """
-    if method is None:
-        return InSpace(TimeStepping())
     if isinstance(method, InSpace):
         return method
     if not isinstance(method, TimeStepping):
@@ -136,8 +139,12 @@ def way_in_space(method: Method | None) -> InSpace:
             f"Scheme.{method.scheme.name} is for robots in the plane; in space there are "
             f"{' and '.join(f'Scheme.{scheme.name}' for scheme in SCHEMES)}"
         )
-    if method.bounded_restitution:
-        raise SimulationError("bounded_restitution is for robots in the plane")
+    for name in OF_THE_PLANE:
+        if getattr(method, name) != getattr(TimeStepping, name):
+            raise SimulationError(
+                f"TimeStepping({name}={getattr(method, name)!r}) is for robots in the plane; leave "
+                f"{name} out"
+            )
     return InSpace(method)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import wraps
 from typing import Any
 
 from heelstrike.errors import SimulationError
@@ -18,11 +19,16 @@ class SpatialSimulation(Simulation):
     ----------
     robot : SpatialRobot
         The robot.
-    *others, **setup
-        As for :class:`~heelstrike.Simulation`: `method` is TimeStepping, its scheme
-        ``IMPACT_RESOLVED`` or ``GAP_LINEARISED``; `ground` is a SpatialGround, or a Ground without
-        a profile, which is taken for all y; pushes have forces (x, y, z). Latches, brakes and
-        `checked` are for the plane.
+    controller, state, control_period, record_every, stop_when_fallen, on_error
+        As for :class:`~heelstrike.Simulation`.
+    method : TimeStepping
+        Its scheme is ``IMPACT_RESOLVED`` or ``GAP_LINEARISED``.
+    ground : SpatialGround or Ground
+        A Ground without a profile is taken for all y.
+    pushes : sequence of Push
+        Their forces have three components (x, y, z).
+    latched, braked, checked
+        For the plane only.
 
     Raises
     ------
@@ -30,6 +36,7 @@ class SpatialSimulation(Simulation):
         If the arguments are not usable.
     """
 
+    @wraps(Simulation.__init__)  # type: ignore[misc]  # help shows its signature
     def __init__(self, robot: SpatialRobot, *others: Any, **setup: Any) -> None:
         if not isinstance(robot, SpatialRobot):
             raise SimulationError(f"robot must be a SpatialRobot, got {type(robot).__name__}")

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
+from numba import types
 
+from heelstrike.compiler.compilation import loop_for
 from heelstrike.compiler.mold import Mold
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.spatial.ground import SpatialGround
+from heelstrike.contact.spatial.ground import SpatialGround, SpatialGroundModel
 from heelstrike.dynamics import spatial
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.robot.model import Floats
+from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot, checked_state, quaternion_places
 from heelstrike.robot.state import State
+from heelstrike.sim.contacts.latches import several
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law
 from heelstrike.sim.dimension import Dimension, Shown
@@ -60,7 +66,7 @@ class Space(Dimension):
     compiles_meanwhile = False  # what it would compile is for the plane
     solved = ("solves", "shortcuts", "fallbacks", "failures")
 
-    def way(self, method: Method | None) -> InSpace:
+    def way_of(self, method: Method) -> InSpace:
         """Return the time stepping of space, or refuse what is for the plane."""
         return way_in_space(method)
 
@@ -121,9 +127,9 @@ class Space(Dimension):
             (self.mold(each).cast().blocks, each.robot.model)
             for each in {(each.robot, has_walls(each.ground)): each for each in settings}.values()
         ]
-        table, model = max(tables, key=lambda each: most_rows_of(each[0]))
-        entries = max(len(each.kind) for each, _ in tables)
-        return spatial_scratch(entries, most_rows_of(table), model)
+        entries = max(len(table.kind) for table, _ in tables)
+        rows = max(most_rows_of(table) for table, _ in tables)
+        return spatial_scratch(entries, rows, [model for _, model in tables])
 
     def mold(self, setting: Setting) -> Mold[SpatialMemory]:
         """Return the mold of the memory of a simulation, with nothing to scribble on."""
@@ -132,6 +138,11 @@ class Space(Dimension):
     def with_scratch(self, memory: SpatialMemory, scratch: SpatialScratch) -> SpatialMemory:
         """Return a memory that its solvers scribble beside."""
         return beside_scratch(memory, scratch)
+
+    def tallied(self, memory: SpatialMemory, solves_with: str) -> dict[str, Any]:
+        """Return counts and worst values of a simulation, as fields of a run."""
+        found = super().tallied(memory, solves_with)
+        return found | {"solver": replace(found["solver"], relaxed=memory.tally.relaxed)}
 
     def words_of(self, law: Law) -> Any:
         """Words by which loops find the machine code of a law."""
@@ -165,6 +176,11 @@ class Space(Dimension):
         """Gaps of contact points in a state (m), (nc,), and how far up their normals point."""
         seen = SpatialLook(robot).in_state(ground, state.q, state.v)
         return seen.gap, seen.normal[:, 2]
+
+    def way_out(self, ground: SpatialGround) -> str:
+        """Say what gets a state out of a ground."""
+        beside = ", or move it away from the box that it is in" if has_walls(ground) else ""
+        return f"raise the robot{beside}"
 
     def latched(self, robot: SpatialRobot, memory: SpatialMemory) -> tuple[str, ...]:
         """No joint is held by a latch."""
@@ -201,6 +217,7 @@ class Space(Dimension):
     def moved(self, state: State, robot: SpatialRobot, memory: SpatialMemory) -> None:
         """Nothing touches what it touched before."""
         memory.blocks.touching[:] = NEVER_TOUCHED
+        memory.wedge.wedged = NEVER_TOUCHED
 
     def check_fit(self, ground: SpatialGround, memory: SpatialMemory) -> None:
         """Refuse boxes where there were none, or none where there were some."""
@@ -217,6 +234,7 @@ class Space(Dimension):
         table = memory.blocks
         stays = np.isin(table.kind, (STOP, BALL_STOP))
         table.touching[~stays] = NEVER_TOUCHED
+        memory.wedge.wedged = NEVER_TOUCHED
 
     def unsolved(self, now: str, memory: SpatialMemory) -> str:
         """Say that nothing could certify a contact problem, and what it is like."""
@@ -233,7 +251,7 @@ def has_walls(ground: SpatialGround) -> bool:
 
 def refuse_joints(robot: SpatialRobot, what: str, joints: Any) -> None:
     """Refuse joints that latches or brakes are to hold."""
-    if joints is not None and len(tuple(joints)) > 0:
+    if joints is not None and len(tuple(several(what, joints))) > 0:
         raise SimulationError(
             f"{what} are for robots in the plane; robot {robot.name!r} in space has none"
         )
@@ -254,10 +272,8 @@ class SpatialLook:
     def in_state(self, ground: SpatialGround, q: Floats, v: Floats) -> Contacts:
         """Return the contact points in a state, without forces."""
         own = spatial_mold(self._robot, walls=has_walls(ground)).cast()
-        find_state(
-            self._robot.model, ground.model(), q, v, own.equations, own.blocks, own.contacts,
-            own.feet,
-        )  # fmt: skip
+        own.q[:], own.v[:] = q, v
+        _find()(self._robot.model, ground.model(), own)
         return own.contacts
 
     def at_contacts(self, ground: SpatialGround, memory: SpatialMemory) -> Contacts:
@@ -265,6 +281,19 @@ class SpatialLook:
         contacts = self.in_state(ground, memory.q, memory.v)
         contacts.force[:] = memory.contacts.force
         return contacts
+
+
+@cache
+def _find() -> Any:
+    def find_now(model: SpatialModel, ground: SpatialGroundModel, memory: SpatialMemory) -> int:
+        find_state(
+            model, ground, memory.q, memory.v, memory.equations, memory.blocks, memory.contacts,
+            memory.feet,
+        )  # fmt: skip
+        return 0
+
+    kinds = SpatialModel, SpatialGroundModel, SpatialMemory
+    return loop_for(types.int64(*(kind.compiled_type() for kind in kinds)), find_now)
 
 
 SPACE = Space()

@@ -417,6 +417,7 @@ def take_step(
                 memory.contacts, memory.feet,
             )  # fmt: skip
         number = tally.steps + counts.parts
+        left = 0  # whether the impact is left to the next step
         worst = solve_step_of(model, time + done * step, step, number, resolves, memory)
         if worst > 0.0 and halvings < HALVINGS_OF_A_STEP:
             counts.halved = 1
@@ -430,7 +431,7 @@ def take_step(
             if worst > 0.0 and memory.impact.happens == 1:
                 # Between faces that nearly oppose each other an impact may have no answer at all.
                 worst = solve_step_of(model, time + done * step, step, number, False, memory)
-                counts.relaxed += 1
+                left = 1
             memory.solver.settings.effort = MOST_ITERATIONS
         if not worst <= BEARABLE:
             tally.unsolved = reaction.residual = worst
@@ -447,7 +448,8 @@ def take_step(
             tally.residual = max(tally.residual, reaction.residual)
         if memory.impact.happens == 1:
             tally.residual = max(tally.residual, residual_of(memory.impact.answer))
-        counts.relaxed += memory.wedge.relaxed
+        if left == 1 or memory.wedge.relaxed == 1:
+            counts.relaxed = 1
         if done + 1 == parts:
             find_slip(
                 model, memory.next_v, memory.feet, memory.blocks.kind, memory.assembly.count,

@@ -203,6 +203,15 @@ class Stepping(Bundle):
     """What closes in a step."""
 
 
+def refuse_restitution(scheme: Scheme, setting: Setting, bounce: tuple[Scheme, ...]) -> None:
+    """Refuse ground with restitution under a scheme that is none of those that bounce."""
+    if scheme not in bounce and np.any(setting.ground.model().restitution > 0.0):
+        raise SimulationError(
+            f"{scheme.name} knows plastic impacts only, and this ground has restitution; use "
+            f"{' or '.join(f'Scheme.{each.name}' for each in bounce)}"
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
 class TimeStepping(Method):
     """Fixed steps whose contact impulses decide the velocity at the end of the step.
@@ -302,12 +311,7 @@ class TimeStepping(Method):
 
     def check(self, setting: Setting) -> None:
         """Refuse ground with restitution where the scheme knows plastic impacts only."""
-        bounces = self.scheme in (Scheme.MOREAU_JEAN, Scheme.IMPACT_RESOLVED)
-        if not bounces and np.any(setting.ground.model().restitution > 0.0):
-            raise SimulationError(
-                f"{self.scheme.name} knows plastic impacts only, and this ground has "
-                f"restitution; use Scheme.IMPACT_RESOLVED or Scheme.MOREAU_JEAN"
-            )
+        refuse_restitution(self.scheme, setting, (Scheme.IMPACT_RESOLVED, Scheme.MOREAU_JEAN))
 
     def warning(self, setting: Setting) -> str:
         """Say which spring is too stiff for the step."""
