@@ -175,8 +175,8 @@ class PhasedOrbit:
             raise ControllerError(
                 f"{self.robot.contact_names[slowest]!r} comes down at {speeds[slowest]:.2g} m/s at "
                 f"the end of phase {p + 1}: of what comes down slowly small errors decide when. "
-                "Design the motion by hs.optimize_motion(..., landing_speed=0.1), or follow it with "
-                "hs.ComputedTorque"
+                "Design the motion by hs.optimize_motion(..., landing_speed=0.1), or follow it "
+                "with hs.ComputedTorque"
             )
         if len(fresh) > TOGETHER:
             raise ControllerError(
