@@ -408,3 +408,47 @@ def test_a_run_on_a_slope_is_refused() -> None:
     )
     with pytest.raises(hs.SimulationError, match="level ground"):
         hs.identify(robot, run)
+
+
+def of_textbook(count: int = 300) -> RobotLog:
+    """A pendulum of 0.9 kg m and 0.41 kg m² without friction."""
+    time, angle, _, acceleration = swinging(count)
+    torque = 0.41 * acceleration + GRAVITY * 0.9 * np.sin(angle)
+    return RobotLog(time, angle[:, None], torque[:, None])
+
+
+FINE = of_textbook()
+BROKEN = {
+    "log must be a RobotLog or a Run, got dict": {"time": FINE.time},
+    "the log's joints must have shape": replace(FINE, joints=FINE.joints[:, 0]),
+    "the log's torque must have shape": replace(FINE, torque=FINE.torque[:-1]),
+    "the log's joints has no number in row 7": replace(
+        FINE, joints=np.where(np.arange(300) == 7, np.nan, FINE.joints.T).T
+    ),
+    "does not go on in row 1": replace(FINE, time=FINE.time[::-1]),
+    "the log has 9 rows": of_textbook(9),
+    "at least 10 are wanted in each second": of_textbook(20),
+    "joint 'pivot' reads the same all along": replace(FINE, joints=0.0 * FINE.joints + 0.3),
+}
+
+
+@pytest.mark.parametrize("words", BROKEN)
+def test_what_is_no_log_of_the_robot_is_refused(words: str) -> None:
+    with pytest.raises(hs.SimulationError, match=words):
+        hs.identify(pendulum(), BROKEN[words])  # type: ignore[arg-type]
+
+
+def test_delays_are_shorter_than_half_a_piece_and_one_at_the_bound_is_told() -> None:
+    exact = {"encoder_noise": 1e-6, "torque_noise": 1e-3, "knots": 0.02}
+    with pytest.raises(hs.SimulationError, match="longest piece of the motion lasts"):
+        hs.identify(pendulum(), FINE, longest_delay=0.6, **exact)
+    late = 20  # samples of 2 ms, which torques are told too early
+    log = of_textbook(1500)
+    early = RobotLog(log.time[late:], log.joints[late:], log.torque[:-late])
+    ahead = RobotLog(log.time[:-late], log.joints[:-late], log.torque[late:])
+    for each in (early, ahead):
+        found = hs.identify(pendulum(), each, longest_delay=0.004, **exact)
+        assert abs(found.delay) == 0.004
+        assert any("give a larger longest_delay" in line for line in found.hidden)
+    found = hs.identify(pendulum(), log, longest_delay=0.004, **exact)
+    assert not any("longest_delay" in line for line in found.hidden)
