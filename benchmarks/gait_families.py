@@ -57,10 +57,12 @@ def tried(family: hs.GaitFamily, speed: float, slope: float) -> Between | None:
     """Interpolate a gait, find the optimum from it, and walk it; None where there is a gap."""
     try:
         gait = family.at(speed=speed, slope=slope)
+        best = hs.optimize_gait(
+            family.robot, **family.asked, speed=speed, slope=slope, warm_start=gait
+        )
     except hs.GaitError:
         return None
     robot = family.robot
-    best = hs.optimize_gait(robot, **family.asked, speed=speed, slope=slope, warm_start=gait)
     steps = 1 if gait.point_feet else STEPS
     run = hs.simulate(
         robot, hs.ComputedTorque(robot, gait), state=gait.initial_state,

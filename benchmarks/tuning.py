@@ -106,11 +106,16 @@ def main() -> None:
     robot = hs.load_robot("bravo7")
     study = optuna.create_study(
         study_name="bravo7", storage=f"sqlite:///{options.study}", load_if_exists=True,
-        direction="maximize", sampler=optuna.samplers.TPESampler(seed=SEED),
+        direction="maximize",
     )  # fmt: skip
+    # Another seed at each start: by the same one it would try the same points again.
+    study.sampler = optuna.samplers.TPESampler(seed=SEED + len(study.trials))
     ended = (optuna.trial.TrialState.COMPLETE, optuna.trial.TrialState.PRUNED)
     left = options.trials - len(study.get_trials(deepcopy=False, states=ended))
     study.optimize(lambda trial: objective(trial, robot, options.walks), n_trials=max(left, 0))
+    complete = study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,))
+    if not complete:
+        raise SystemExit("no trial has a gait; ask for more trials")
     print(f"{study.best_value:.0%} of the walks go on, trial {study.best_trial.number}")
     for name, value in study.best_params.items():
         print(f"  {name} {value:.4g}")

@@ -85,13 +85,14 @@ def cost(trials: int, rounds: int, workers: int) -> None:
 
 def kills(count: int, trials: int, seed: int) -> None:
     """Kill campaigns and workers again and again, half of the times each; tell what was lost."""
-    for who, workers in (("campaigns", False), ("workers", True)):
+    halves = ("campaigns", False, count - count // 2), ("workers", True, count // 2)
+    for who, workers, most in halves:
         deaths = lost = twice = rounds = 0
-        while deaths < count // 2:
+        while deaths < most:
             with tempfile.TemporaryDirectory() as folder:
                 whole = short_campaign(Path(folder), trials)
                 found = killed(
-                    Path(folder), whole, workers=workers, most=count // 2 - deaths,
+                    Path(folder), whole, workers=workers, most=most - deaths,
                     seed=seed + rounds,
                 )  # fmt: skip
             rounds += 1

@@ -17,6 +17,6 @@ def test_killed_at_random_nothing_is_lost_and_nothing_is_twice(
 ) -> None:
     campaign = short_campaign(tmp_path, 600)
     found = killed(tmp_path, campaign, workers=workers, most=3, seed=1)
-    assert found.kills == 3
+    assert 1 <= found.kills <= 3  # a fast machine may be through before
     assert (found.lost, found.twice) == (0, 0)
     assert found.same

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 QUICK_STEPS, QUICK_SIZES = 4, (1e-3,)
 """Walking steps and step sizes (s) of a quick comparison."""
+QUICK_SEARCH: Mapping[str, int] = {"strides": 2, "halvings": 1}
+"""How it searches for the largest push."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ class InEngines:
         bool, typer.Option("--films", help="Write films of the walks in engines that fall.")
     ] = False
     quick: Annotated[
-        bool, typer.Option("--quick", help="For engines: only four steps at 1 ms.")
+        bool, typer.Option("--quick", help="For engines: only four steps at 1 ms, and few pushes.")
     ] = False
 
     def refuse_without_engines(self) -> None:
@@ -89,7 +92,7 @@ def compare_in_engines(
 ) -> None:
     """Walk a case in other engines; tell, write and draw what came of it."""
     from heelstrike.experiments.engine_comparison import compare_engines
-    from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD, STEP_SIZES
+    from heelstrike.experiments.engine_comparison.comparison import STEP_SIZES
     from heelstrike.view.style import save_figure
     from heelstrike.whole_file import write_whole
 
@@ -120,9 +123,7 @@ def compare_in_engines(
             progress=show.doing,
         )
     out.mkdir(parents=True, exist_ok=True)
-    law = type(start.controller).__name__
-    if asked.period != CONTROL_PERIOD:
-        law += f"-every-{1e3 * asked.period:g}-ms"
+    law = _law(start, asked)
     text = json.dumps(comparison.to_dict(), indent=2, ensure_ascii=False)
     wrote(write_whole(out / f"engines-{law}.json", text + "\n"))
     if as_json:
@@ -137,6 +138,14 @@ def compare_in_engines(
         _pushes(case, start, asked, out, as_json=as_json)
     if asked.page is not None:
         _write_page(comparison, out, asked.page)
+
+
+def _law(start: Beginning, asked: InEngines) -> str:
+    """Name of the law in files, with how often it is called if that is unusual."""
+    from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
+
+    often = "" if asked.period == CONTROL_PERIOD else f"-every-{1e3 * asked.period:g}-ms"
+    return type(start.controller).__name__ + often
 
 
 def _scenes(case: Case, names: list[str], out: Path, *, as_json: bool) -> None:
@@ -186,10 +195,12 @@ def _pushes(case: Case, start: Beginning, asked: InEngines, out: Path, *, as_jso
             engines="all" if names == ["all"] else names,
             settings=asked.settings.split(","),
             friction=_friction(case),
+            control_period=asked.period,
             folder=out / "engines",
             progress=show.doing,
+            **(QUICK_SEARCH if asked.quick else {}),
         )
-    name = f"pushes-{type(start.controller).__name__}.json"
+    name = f"pushes-{_law(start, asked)}.json"
     text = json.dumps(table.to_dict(), indent=2, ensure_ascii=False)
     wrote(write_whole(out / name, text + "\n"))
     if not as_json:

@@ -10,7 +10,11 @@ from typing import Annotated
 import typer
 
 from heelstrike.cli.options import AsJson, Reading
-from heelstrike.cli.terminal import output, spoken, stage, wrote
+from heelstrike.cli.terminal import output, spoken, stage, tell, wrote
+from heelstrike.wording import some_of
+
+SHOWN = 6
+"""Columns of no use that are named."""
 
 
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
@@ -60,6 +64,8 @@ def identify(
         keywords = {} if robot in builtin_robots() else how.keywords()
         machine = load_planar_robot(robot, **keywords)
         log = load_robot_log(recording, machine, rate=rate, unit=unit)
+    if log.ignored:
+        tell(f"columns of no use: {some_of(log.ignored, SHOWN)}")
     with stage("fitting"):
         found = told_by(
             machine, log, encoder_noise=encoder_noise, torque_noise=torque_noise,

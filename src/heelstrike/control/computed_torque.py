@@ -250,8 +250,10 @@ class ComputedTorque(Law):
         encoder: Encoder | None = None,
     ) -> None:
         must_be(Robot, "robot", robot)
-        self.gait, self.encoder = gait, encoder
+        self.gait = None if isinstance(gait, Motion) else gait
+        self.encoder = encoder
         if isinstance(gait, Motion):
+            self.motion = gait
             if encoder is not None:
                 raise ControllerError(
                     "joint encoders tell where the robot is only while a foot lies flat, which a "

@@ -163,9 +163,10 @@ class MotionTracking(Law):
 
     A phase ends when the points come down that stand in the next one, in its second half; one in
     which nothing comes down ends by time, and so at the latest does one in which a foot that stands
-    rolls onto other points of its own. Nothing brings back what the joints do not reach, as the
-    pitch of a trunk on a point: motions may be unstable under this law, and
-    :class:`~heelstrike.MotionLQR` makes them stable.
+    rolls onto other points of its own at less than 0.02 m/s. Where a faster touchdown fails to
+    come, the motion stands still soon after the end of its phase. Nothing brings back what the
+    joints do not reach, as the pitch of a trunk on a point: motions may be unstable under this law,
+    and :class:`~heelstrike.MotionLQR` makes them stable.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
 from heelstrike.analysis.told_summary import plain
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
-from heelstrike.control import ComputedTorque, MotionTracking
+from heelstrike.control import ComputedTorque
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, Motion, Planner, optimize_gait, plan_motion
@@ -170,10 +170,9 @@ def _walked(
     robot: Robot, walk: Motion | Gait, planner: str, speed: float, duration: float, friction: float
 ) -> Planned:
     """Simulate a walk and say what it costs."""
-    law = ComputedTorque(robot, walk) if isinstance(walk, Gait) else MotionTracking(robot, walk)
     run = simulate(
-        robot, law, state=walk.initial_state, duration=duration, method=EventDriven(),
-        ground=Ground(friction=friction),
+        robot, ComputedTorque(robot, walk), state=walk.initial_state, duration=duration,
+        method=EventDriven(), ground=Ground(friction=friction),
     )  # fmt: skip
     fall = first_cause(run, walk if isinstance(walk, Gait) else None)
     summary = run.summary()

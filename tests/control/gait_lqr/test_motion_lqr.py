@@ -11,6 +11,9 @@ import walking
 
 import heelstrike as hs
 from heelstrike import dynamics
+from heelstrike.control.gait_lqr.phases import PhasedOrbit
+from heelstrike.control.gait_lqr.phases_law import first_level
+from heelstrike.sim.controller.interface import Contacts
 
 SPEED = 2.0
 
@@ -96,6 +99,36 @@ def test_where_in_the_world_it_is_does_not_matter() -> None:
     q[0] += 1000.0
     here, there = run(0.9), run(0.9, state=hs.State(q, moved.v))
     np.testing.assert_allclose(there.position[-1, 1:], here.position[-1, 1:], atol=1e-5)
+
+
+def test_nor_does_how_high_it_is_from_the_first_step_on() -> None:
+    motion = running()
+    high = hs.Ground(friction=motion.friction, profile=[(-1.0, 0.1), (9.0, 0.1)])
+    raised = motion.initial_state.q.copy()
+    raised[1] += 0.1
+    here = run(0.3)
+    there = run(0.3, state=hs.State(raised, motion.initial_state.v), ground=high)
+    np.testing.assert_allclose(there.torque[0], here.torque[0], atol=1e-8)
+    np.testing.assert_allclose(there.velocity[-1], here.velocity[-1], atol=1e-6)
+
+
+def test_the_first_ground_is_that_below_the_foot_that_stands_and_in_flight_the_lowest() -> None:
+    stands, gap = law().parameters.stands[0, ::2], np.array([0.3, 0.0])
+    if not stands[1]:
+        gap = gap[::-1].copy()
+    ground_below = np.where(stands == 1, 0.2, 0.1)
+    contacts = Contacts(
+        position=np.column_stack([np.zeros(2), ground_below + gap]),
+        normal=np.array([[0.0, 1.0], [0.0, 1.0]]), gap=gap, force=np.zeros((2, 2)),
+    )  # fmt: skip
+    assert first_level(contacts, law().parameters, 0) == pytest.approx(0.2)
+    assert first_level(contacts, law().parameters, 1) == pytest.approx(0.1)
+
+
+def test_after_the_last_phase_of_a_motion_that_never_repeats_nothing_comes_down() -> None:
+    once = replace(running(), repeat=hs.Repeat.NEVER)
+    assert len(PhasedOrbit(rabbit(), once).jumps) == len(once.phases) - 1
+    assert hs.MotionLQR(rabbit(), once).multipliers.size == 0
 
 
 @pytest.mark.slow

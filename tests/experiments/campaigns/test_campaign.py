@@ -20,6 +20,7 @@ from typing import Any
 import campaign_cases as cases
 import numpy as np
 import pytest
+import walking
 from scipy import stats
 
 import heelstrike as hs
@@ -86,6 +87,20 @@ def test_a_trial_replayed_alone_is_that_of_the_campaign() -> None:
     assert campaign.gait(0) is cases.walks().controller.gait
     with pytest.raises(IndexError, match="no trial 3 in a campaign of 3"):
         campaign.replay(3)
+
+
+def test_a_law_may_follow_a_motion_instead_of_a_gait() -> None:
+    """Then there is no gait to judge it by."""
+    robot, gait = walking.bravo7(), walking.gait()
+    motion = gait.motion(robot)
+    law = hs.ComputedTorque(robot, motion)
+    assert law.motion is motion
+    trial = replace(cases.walks(), controller=law)
+    campaign = hs.Campaign(trial, {"ground.friction": [0.75]}, duration=0.1, draw=Draw.GRID)
+    (outcome,) = campaign.run(workers=1).outcomes
+    assert outcome.status == "completed", outcome.message
+    assert campaign.gait(0) is None
+    assert campaign.replay(0).summary(gait=campaign.gait(0)).duration_s == pytest.approx(0.1)
 
 
 def test_what_a_trial_cannot_begin_with_is_its_result() -> None:

@@ -78,6 +78,31 @@ def test_of_a_block_that_kills_workers_of_a_cluster_only_the_trial_is_lost() -> 
     assert client.submitted == 3 + 2 * 5  # 32 = 2⁵ trials are halved five times
 
 
+class UncompletedJobError(RuntimeError):
+    """What submitit raises of a job that died, or was cancelled."""
+
+
+@dataclass
+class Cancelled:
+    """Cancels jobs with trial 40, when it is alone a few times only."""
+
+    left: int
+
+    def __call__(self, block: Any) -> bool:
+        if 40 in block.numbers and self.left > 0:
+            self.left -= len(block.numbers) == 1
+            raise UncompletedJobError("cancelled")
+        return False
+
+
+@pytest.mark.parametrize(("times", "lost"), [(2, False), (3, True)])
+def test_a_job_that_was_cancelled_is_no_death_of_its_trial(times: int, lost: bool) -> None:
+    alone = made().run(workers=1).outcomes
+    found = made().run(executor=Client(Cancelled(times))).outcomes
+    assert (found[40].status == "crashed") is lost
+    assert (repr(found) == repr(alone)) is not lost
+
+
 def test_what_is_no_death_ends_the_campaign() -> None:
     class Lost(Client):
         def submit(self, *_: Any, **__: Any) -> Any:
@@ -88,9 +113,6 @@ def test_what_is_no_death_ends_the_campaign() -> None:
 
 
 def test_deaths_are_told_by_the_names_that_libraries_give_them() -> None:
-    class UncompletedJobError(RuntimeError):
-        pass
-
     class PreemptedError(UncompletedJobError):
         pass
 

@@ -11,7 +11,7 @@ from experiments.engine_comparison.synthetic import made_up
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
-from heelstrike.experiments.engine_comparison.page import engines_page
+from heelstrike.experiments.engine_comparison.page import _pushes, engines_page
 
 BELOW, BALL = "cube below the angle of friction", "ball bouncing, e = 0.9"
 DULL, OURS = "takes no coefficient of restitution", "heelstrike, event-driven"
@@ -119,3 +119,16 @@ def test_it_says_which_push_each_stands(page: str) -> None:
     section = "## Largest push under FootstepFeedback"
     assert row(page, section, "MuJoCo")[1:] == ["defaults", "90 (94)", "≥ 240"]
     assert row(page, section, "ODE")[1:] == ["defaults", "ODE is not installed", "–"]
+
+
+def test_its_command_has_the_settings_and_the_period_of_the_pushes(tmp_path: Path) -> None:
+    file = tmp_path / "pushes-FootstepFeedback-every-4-ms.json"
+    unpushed = {"recovered": 0.0, "failed": 0.0, "trials": 1, "unit": "N s"}
+    rows = [PUSHES["rows"][0] | {"largest": unpushed}]
+    file.write_text(json.dumps(PUSHES | {"rows": rows}))
+    section = _pushes(file)
+    assert (
+        "--controller FootstepFeedback --engines NAME --settings defaults --period 0.004 "
+        "--largest-push" in section
+    )
+    assert "does not walk unpushed" in section

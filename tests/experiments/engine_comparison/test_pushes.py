@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -10,15 +11,23 @@ import numpy as np
 import pytest
 import walking
 from experiments.engine_comparison.our_engine import OurPeer
+from rich.console import Console
 
 import heelstrike as hs
+from heelstrike.analysis.stability.largest import Largest
 from heelstrike.experiments.engine_comparison import pushes as module
+from heelstrike.experiments.engine_comparison.entries import ENTRIES
 from heelstrike.experiments.engine_comparison.pushes import (
     STEP,
+    UNPUSHED,
+    PushRow,
+    PushTable,
     compare_pushes,
     pushed,
+    since,
     stands,
     stands_by_ours,
+    stands_in,
     told_the_past,
 )
 from heelstrike.experiments.engine_comparison.walk import TRUTH, Walk
@@ -26,9 +35,10 @@ from heelstrike.experiments.engine_comparison.walking import seen, walk_in
 from heelstrike.experiments.engines import Scenario
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.sim import Run, TimeStepping
+from heelstrike.sim.closed_sets import RunStatus
 
 TOO_MUCH = 600.0
-"""Impulse (N s) that throws a robot of some 40 kg over."""
+"""Impulse (N s) that throws a robot of 75 kg over."""
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +95,47 @@ def test_a_push_can_be_too_much(walk: Walk) -> None:
     assert stands_by_ours(walk, method, 1.0, 0.0)
     assert not stands_by_ours(walk, method, 1.0, TOO_MUCH)
     push, until = pushed(walk, TOO_MUCH)
-    assert not stands(walk, walk.ours(method, pushes=[push], until=until), push)
+    fallen = walk.ours(method, pushes=[push], until=until)
+    assert not stands(walk, since(fallen, push.end), push)
+
+
+def test_ours_is_judged_by_what_engines_know(walk: Walk, past: Run) -> None:
+    """From the end of the push on, as the runs of engines that take over then."""
+    push, _ = pushed(walk, 20.0)
+    lived = walk.ours(TRUTH, pushes=[push], until=push.end + 0.6)
+    cut = since(lived, push.end)
+    assert cut.time[0] == pytest.approx(push.end)
+    assert len(cut.position) == len(cut.time) == np.sum(lived.time >= push.end - 1e-9)
+    assert cut.events
+    assert len(cut.events) < len(lived.events)
+    assert all(event.time >= push.end - 1e-9 for event in cut.events)
+
+
+def test_a_walk_that_fell_before_the_push_ended_stands_it_in_no_engine(
+    walk: Walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fell(self: Walk, push: hs.Push) -> Run:
+        return replace(short, status=RunStatus.FELL)
+
+    short = walk.ours(TimeStepping(step=STEP), until=0.01)
+    monkeypatch.setattr(Walk, "past", fell)
+    assert not stands_in(walk, ENTRIES["mujoco"], {}, {}, 1.0, 20.0)
+
+
+def test_the_past_of_a_push_is_the_same_for_all_engines(walk: Walk) -> None:
+    push, _ = pushed(walk, 0.0)
+    assert walk.past(push) is walk.past(push)
+
+
+LEAST = Largest(recovered=0.0, failed=0.0, trials=1, unit="N s")
+
+
+def test_of_a_walk_that_fails_unpushed_it_is_said() -> None:
+    row = PushRow("a", "A", "defaults", "forward", LEAST, "")
+    console = Console(width=120)
+    with console.capture() as told:
+        console.print(PushTable("bravo7", (row,)))
+    assert UNPUSHED in told.get()
 
 
 def test_rows_of_engines_are_kept_and_say_why_there_is_nothing(

@@ -331,3 +331,124 @@ def test_robots_that_it_does_not_know_are_refused(tmp_path: Path) -> None:
     file.write_text("time,right_hip\n" + "".join(f"{i},0\n" for i in range(9)))
     with pytest.raises(GaitError, match="no column 'position right_knee'"):
         load_robot_log(file, walking.bravo7())
+
+
+def a_table(path: Path, columns: dict[str, np.ndarray]) -> Path:
+    rows = zip(*(each.tolist() for each in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_a_table_of_an_event_driven_run_has_rows_at_one_time(tmp_path: Path) -> None:
+    gait = walking.gait()
+    run = hs.simulate(
+        walking.bravo7(), hs.ComputedTorque(walking.bravo7(), gait), state=gait.initial_state,
+        duration=1.1 * gait.step_duration, method=hs.EventDriven(),
+    )  # fmt: skip
+    assert np.any(np.diff(run.time) == 0.0)
+    run.save(tmp_path / "run.csv")
+    read, own = load_robot_log(tmp_path / "run.csv", walking.bravo7()), RobotLog.of(run)
+    for name in ("time", "joints", "torque", "force", "trunk"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(own, name), err_msg=name)
+
+
+def slide_and_hinge() -> hs.Robot:
+    build = hs.RobotBuilder("cart")
+    build.slide("rail", None, direction=(1.0, 0.0), link="cart", mass=1.0, torque=9.0)
+    build.hinge("pole", "cart", link="rod", mass=0.2, inertia=0.01, torque=9.0)
+    return build.build()
+
+
+def of_cart() -> dict[str, np.ndarray]:
+    time = np.linspace(0.0, 1.0, 20)
+    return {"time": time, "rail": time, "pole": 2.0 * time, "torque rail": time,
+            "torque pole": time}  # fmt: skip
+
+
+def test_degrees_are_of_hinges_only(tmp_path: Path) -> None:
+    columns = of_cart()
+    file = a_table(tmp_path / "cart.csv", columns)
+    log = load_robot_log(file, slide_and_hinge(), unit="deg")
+    np.testing.assert_allclose(log.joints[:, 0], columns["rail"], rtol=1e-15)
+    np.testing.assert_allclose(log.joints[:, 1], np.radians(columns["pole"]), rtol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["pole [mm]", "rail [deg]", "torque pole [s]"])
+def test_units_of_another_kind_are_refused(tmp_path: Path, name: str) -> None:
+    plain = name.partition(" [")[0]
+    columns = {name if each == plain else each: of for each, of in of_cart().items()}
+    with pytest.raises(GaitError, match="its unit must be one of"):
+        load_robot_log(a_table(tmp_path / "cart.csv", columns), slide_and_hinge())
+
+
+@pytest.mark.parametrize("lacks", ["position root_z", "contact_force right_foot_heel tangent"])
+def test_some_columns_of_forces_or_of_the_trunk_are_not_enough(tmp_path: Path, lacks: str) -> None:
+    robot, log = walking.bravo7(), measured_walk()
+    assert log.force is not None
+    assert log.trunk is not None
+    columns = {"time": log.time}
+    columns |= dict(zip(robot.joint_names[3:], log.joints.T, strict=True))
+    columns |= {f"torque {n}": t for n, t in zip(robot.actuator_names, log.torque.T, strict=True)}
+    columns |= {f"position {n}": t for n, t in zip(robot.joint_names[:3], log.trunk.T, strict=True)}
+    for i, point in enumerate(robot.contact_names):
+        for k, component in enumerate(("normal", "tangent")):
+            columns[f"contact_force {point} {component}"] = log.force[:, i, k]
+    whole = load_robot_log(a_table(tmp_path / "all.csv", columns), robot)
+    assert whole.force is not None
+    del columns[lacks]
+    with pytest.raises(GaitError, match=f"no column '{lacks}'"):
+        load_robot_log(a_table(tmp_path / "some.csv", columns), robot)
+
+
+def test_a_run_on_a_slope_is_refused() -> None:
+    robot = walking.bravo7()
+    run = hs.simulate(
+        robot, state=robot.standing(hs.Ground()), duration=0.01, ground=hs.Ground(slope=0.05)
+    )
+    with pytest.raises(hs.SimulationError, match="level ground"):
+        hs.identify(robot, run)
+
+
+def of_textbook(count: int = 300) -> RobotLog:
+    """A pendulum of 0.9 kg m and 0.41 kg m² without friction."""
+    time, angle, _, acceleration = swinging(count)
+    torque = 0.41 * acceleration + GRAVITY * 0.9 * np.sin(angle)
+    return RobotLog(time, angle[:, None], torque[:, None])
+
+
+FINE = of_textbook()
+BROKEN = {
+    "log must be a RobotLog or a Run, got dict": {"time": FINE.time},
+    "the log's joints must have shape": replace(FINE, joints=FINE.joints[:, 0]),
+    "the log's torque must have shape": replace(FINE, torque=FINE.torque[:-1]),
+    "the log's joints has no number in row 7": replace(
+        FINE, joints=np.where(np.arange(300) == 7, np.nan, FINE.joints.T).T
+    ),
+    "does not go on in row 1": replace(FINE, time=FINE.time[::-1]),
+    "the log has 9 rows": of_textbook(9),
+    "at least 10 are wanted in each second": of_textbook(20),
+    "joint 'pivot' reads the same all along": replace(FINE, joints=0.0 * FINE.joints + 0.3),
+}
+
+
+@pytest.mark.parametrize("words", BROKEN)
+def test_what_is_no_log_of_the_robot_is_refused(words: str) -> None:
+    with pytest.raises(hs.SimulationError, match=words):
+        hs.identify(pendulum(), BROKEN[words])  # type: ignore[arg-type]
+
+
+def test_delays_are_shorter_than_half_a_piece_and_one_at_the_bound_is_told() -> None:
+    exact = {"encoder_noise": 1e-6, "torque_noise": 1e-3, "knots": 0.02}
+    with pytest.raises(hs.SimulationError, match="longest piece of the motion lasts"):
+        hs.identify(pendulum(), FINE, longest_delay=0.6, **exact)
+    late = 20  # samples of 2 ms, which torques are told too early
+    log = of_textbook(1500)
+    early = RobotLog(log.time[late:], log.joints[late:], log.torque[:-late])
+    ahead = RobotLog(log.time[:-late], log.joints[:-late], log.torque[late:])
+    for each in (early, ahead):
+        found = hs.identify(pendulum(), each, longest_delay=0.004, **exact)
+        assert abs(found.delay) == 0.004
+        assert any("give a larger longest_delay" in line for line in found.hidden)
+    found = hs.identify(pendulum(), log, longest_delay=0.004, **exact)
+    assert not any("longest_delay" in line for line in found.hidden)

@@ -106,6 +106,9 @@ def test_what_is_no_such_gait_is_refused() -> None:
     robot, gait = rabbit()
     with pytest.raises(hs.GaitError, match="moves the joints"):
         gait.motion(walking.bravo7())
+    heavier = replace(robot, model=robot.model.replaced(mass=1.1 * robot.model.mass))
+    with pytest.raises(hs.GaitError, match="with other numbers"):
+        gait.motion(heavier)
     running = hs.optimize_motion(
         robot,
         [hs.ContactPhase("right_tibia", duration=0.2, pieces=4), hs.ContactPhase(duration=0.15)],

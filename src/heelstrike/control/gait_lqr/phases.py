@@ -112,23 +112,25 @@ class PhasedOrbit:
 
     @cached_property
     def jumps(self) -> list[Floats]:
-        """What becomes of errors where each phase ends, the last one's seen in the mirror."""
-        phases = list(self.motion.phases)
-        mirrored = self.motion.repeat is Repeat.MIRRORED
-        first = mirrored_phase(self.robot, self.motion, phases[0]) if mirrored else phases[0]
-        after = [*phases[1:], first]
+        """What becomes of errors where each phase ends, the last one's seen in the mirror.
+
+        After the last phase of a motion that never repeats there is none.
+        """
+        phases = self.motion.phases
         torques = [self.torques(p, np.zeros(1))[0] for p in range(len(phases))]
-        start = torques[0]
-        if mirrored:
+        found = [self._jump(p, phases[p + 1], torques[p + 1]) for p in range(len(phases) - 1)]
+        if self.motion.repeat is Repeat.NEVER:
+            return found
+        first, start = phases[0], torques[0]
+        if self.motion.repeat is Repeat.MIRRORED:
             assert self.robot.mirror is not None
+            first = mirrored_phase(self.robot, self.motion, first)
             driven = self.robot.mirror.among(self.robot.model.actuator_joint)
             start = driven.sign * start[driven.joint]
-        last = len(phases) - 1
-        found = []
-        for p, (following, torque) in enumerate(zip(after, [*torques[1:], start], strict=True)):
-            jump = self._jump(p, following, torque)
-            found.append(exchanged(self.robot, jump) if mirrored and p == last else jump)
-        return found
+        last = self._jump(len(phases) - 1, first, start)
+        if self.motion.repeat is Repeat.MIRRORED:
+            last = exchanged(self.robot, last)
+        return [*found, last]
 
     def _jump(self, p: int, following: MotionPhase, torque: Floats) -> Floats:
         """Errors just after a phase by those just before: the mean of all orders of touchdowns."""
@@ -173,7 +175,8 @@ class PhasedOrbit:
             raise ControllerError(
                 f"{self.robot.contact_names[slowest]!r} comes down at {speeds[slowest]:.2g} m/s at "
                 f"the end of phase {p + 1}: of what comes down slowly small errors decide when. "
-                "Design the motion with landing_speed=0.1"
+                "Design the motion by hs.optimize_motion(..., landing_speed=0.1), or follow it "
+                "with hs.ComputedTorque"
             )
         if len(fresh) > TOGETHER:
             raise ControllerError(

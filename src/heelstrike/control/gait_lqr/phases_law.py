@@ -60,6 +60,8 @@ class Memory(PhaseClock):
 
     level: float = cell(float)
     """How high the ground is where the robot came down last (m)."""
+    levelled: int = cell(int)
+    """Whether that is known yet."""
     landed: int = cell(int)
     """Whether it is past that impact."""
     error: Floats = array("2 nv")
@@ -99,12 +101,32 @@ def find_errors(
     error[0], error[1] = lower * x, lower * z
 
 
+@kernel
+def first_level(contacts: Contacts, parameters: Parameters, phase: int) -> float:
+    """How high the ground is under the nearest point that stands; its lowest if none does."""
+    level, nearest, stands = np.inf, np.inf, False
+    for i in range(contacts.gap.shape[0]):
+        gap = contacts.gap[i]
+        x = contacts.position[i, 0] - gap * contacts.normal[i, 0]
+        z = contacts.position[i, 1] - gap * contacts.normal[i, 1]
+        height = parameters.up[0] * x + parameters.up[1] * z
+        if parameters.stands[phase, 2 * i] == 1:
+            if gap < nearest:
+                level, nearest, stands = height, gap, True
+        elif not stands:
+            level = min(level, height)
+    return level
+
+
 @controller
 def motion_lqr(
     t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
     parameters: Parameters, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques of the law above."""
+    if memory.levelled == 0:
+        memory.level = first_level(contacts, parameters, memory.phase)
+        memory.levelled = 1
     touched = advance_phase(t, contacts, parameters, memory)
     if touched >= 0:
         x, z = contacts.position[touched, 0], contacts.position[touched, 1]

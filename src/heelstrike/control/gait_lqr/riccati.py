@@ -69,6 +69,6 @@ def over_all_steps(jump: Floats, sweep: Callable[[Floats], tuple[Floats, Kept]])
             return kept
         before = size
     raise ControllerError(
-        "no regulator stabilises this walk: its motors do not control all of its errors. "
-        "Design another gait"
+        "no regulator stabilises this: the motors do not control all errors. Design another gait "
+        "or motion"
     )

@@ -39,7 +39,7 @@ from heelstrike.experiments.campaigns.trials import (
     run_block,
     trial_digest,
 )
-from heelstrike.experiments.campaigns.workers import is_death
+from heelstrike.experiments.campaigns.workers import is_death, is_sure
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.sim.run import Run
@@ -397,6 +397,10 @@ class Campaign:
         )
 
 
+TRIES = 3
+"""How often a worker of a cluster must die of a single trial until that is its outcome: jobs are
+cancelled, too."""
+
 Done = tuple[Block, list[Outcome]]
 
 
@@ -469,7 +473,7 @@ def _by_others(executor: Any, blocks: Iterable[Block]) -> Iterator[Done]:
                 if not is_death(error):
                     raise
                 block, _ = waiting.popleft()
-                yield block, _by_halves(partial(_together, worker), block, error)
+                yield block, _again(worker, block, error, died=1)
     finally:
         for _, future in waiting:
             if hasattr(future, "cancel"):
@@ -489,15 +493,22 @@ def _alone(make: Callable[[], Any], block: Block) -> list[Outcome]:
         worker.shutdown()
 
 
-def _together(worker: Any, block: Block) -> list[Outcome]:
-    """Work on a block with an executor that goes on when a worker dies; if so, on each half."""
+def _together(worker: Any, block: Block, died: int = 0) -> list[Outcome]:
+    """Work on a block with an executor that goes on when a worker dies, as some did before."""
     try:
         found: list[Outcome] = worker.submit(run_block, block).result()
         return found
     except Exception as error:
         if isinstance(error, BrokenExecutor) or not is_death(error):
             raise
-        return _by_halves(partial(_together, worker), block, error)
+        return _again(worker, block, error, died + 1)
+
+
+def _again(worker: Any, block: Block, error: Exception, died: int) -> list[Outcome]:
+    """Work again on a block that workers died of: on each half, on a single trial several times."""
+    if len(block.numbers) == 1 and died < TRIES and not is_sure(error):
+        return _together(worker, block, died)
+    return _by_halves(partial(_together, worker), block, error)
 
 
 def _by_halves(

@@ -13,6 +13,10 @@ from heelstrike.errors import SimulationError
 DEATHS = ("BrokenExecutor", "KilledWorker", "UncompletedJobError")
 """Errors by which executors of Python, Dask and submitit say that a worker died of its work."""
 
+SURE = ("KilledWorker",)
+"""Those raised after several workers died of the same work. A job of submitit is also called
+uncompleted when somebody cancels it or its time is over."""
+
 
 def is_death(error: BaseException) -> bool:
     """Whether an error says that a worker died, of whatever executor; none need be installed.
@@ -22,7 +26,22 @@ def is_death(error: BaseException) -> bool:
     error : BaseException
         What ``result()`` raised.
     """
-    return any(kind.__name__ in DEATHS for kind in type(error).__mro__)
+    return _is_called(error, DEATHS)
+
+
+def is_sure(error: BaseException) -> bool:
+    """Whether an error says that several workers died of the same work.
+
+    Parameters
+    ----------
+    error : BaseException
+        What ``result()`` raised.
+    """
+    return _is_called(error, SURE)
+
+
+def _is_called(error: BaseException, names: tuple[str, ...]) -> bool:
+    return any(kind.__name__ in names for kind in type(error).__mro__)
 
 
 def process_pool(processes: int) -> Callable[[], ProcessPoolExecutor]:

@@ -13,7 +13,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
-from heelstrike.experiments.engine_comparison.pushes import DIRECTIONS
+from heelstrike.experiments.engine_comparison.pushes import DIRECTIONS, UNPUSHED
 from heelstrike.experiments.engine_comparison.settings import best_settings
 from heelstrike.experiments.engine_comparison.tables import BY_ITSELF, WALKING, short
 
@@ -301,20 +301,24 @@ def _peaks(walks: Mapping[str, Any]) -> str:
 
 
 def _pushes(file: Path) -> str:
-    law = file.stem.removeprefix("pushes-")
+    law, _, often = file.stem.removeprefix("pushes-").partition("-every-")
+    period = f" --period {1e-3 * float(often.removesuffix('-ms')):g}" if often else ""
     found = json.loads(file.read_text(encoding="utf-8"))
     told: dict[tuple[str, str], dict[str, str]] = {}
     for row in found["rows"]:
         cells = told.setdefault((row["title"], row["settings"]), {})
         cells[row["direction"]] = row["reason"] or _largest(row["largest"])
+    called = f", called every {often.replace('-', ' ')}" if often else ""
+    settings = ",".join(dict.fromkeys(row["settings"] for row in found["rows"]))
     return (
-        f"## Largest push under {law}\n\nOn the trunk, in the middle of the third step, for 0.1 s, "
+        f"## Largest push under {law}{called}\n\n"
+        "On the trunk, in the middle of the third step, for 0.1 s, "
         "in N s: the largest that the robot survives, with all smaller ones that were tried, and "
         "in brackets the smallest that it does not. Each engine takes over when the push ends, "
         "with the state of heelstrike's event-driven run and a law that remembers what came "
         "before. Steps of 1 ms. "
         f"`heelstrike compare {found['robot']} --controller {law} --engines NAME "
-        "--largest-push`.\n\n"
+        f"--settings {settings}{period} --largest-push`.\n\n"
         + _table(
             ["engine", "settings", *DIRECTIONS],
             [
@@ -328,6 +332,8 @@ def _pushes(file: Path) -> str:
 def _largest(found: Mapping[str, Any]) -> str:
     if found["failed"] is None:
         return f"≥ {short(found['recovered'])}"
+    if found["failed"] == 0.0:
+        return UNPUSHED
     return f"{short(found['recovered'])} ({short(found['failed'])})"
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from heelstrike.analysis.stability.largest import Largest, largest
 from heelstrike.analysis.told_summary import plain
 from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
+from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
 from heelstrike.experiments.engine_comparison.entries import Entry, entries_called
 from heelstrike.experiments.engine_comparison.kept import KeptRows
 from heelstrike.experiments.engine_comparison.settings import DEFAULTS, settings_of
@@ -36,9 +37,11 @@ from heelstrike.robot import Robot, State
 from heelstrike.sim import Controller, Push, Run, TimeStepping
 from heelstrike.sim.controller.law import Law
 from heelstrike.sim.method import Method
+from heelstrike.sim.run import QUANTITIES
+from heelstrike.tolerances import SAME_ROW
 
-STEP, CONTROL_PERIOD = 1e-3, 2e-3
-"""Step of the engines, and seconds between two calls of the controller."""
+STEP = 1e-3
+"""Step of the engines (s)."""
 UNDISTURBED, PHASE = 2, 0.5
 """Steps before the push, and the part of the next one that is done when it begins."""
 LASTING = 0.1
@@ -49,6 +52,9 @@ MOST, STRIDES, HALVINGS = 240.0, 8, 3
 """Largest impulse tried (N s), and how the largest that is stood is searched for."""
 DIRECTIONS: Mapping[str, float] = {"forward": 1.0, "backward": -1.0}
 """Where it goes, and the sign of its force."""
+
+UNPUSHED = "does not walk unpushed"
+"""What is said where a walk fails without a push."""
 
 OURS: Mapping[str, Method] = {
     "event-driven": TRUTH,
@@ -101,6 +107,8 @@ class PushTable:
             table.add_column(heading)
         for row in self.rows:
             found = row.reason if row.largest is None else str(row.largest)
+            if row.largest is not None and row.largest.failed == 0.0:
+                found = UNPUSHED
             table.add_row(row.title, row.settings, row.direction, found)
         return table
 
@@ -117,6 +125,7 @@ def compare_pushes(
     most: float = MOST,
     strides: int = STRIDES,
     halvings: int = HALVINGS,
+    control_period: float = CONTROL_PERIOD,
     folder: Path | str | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> PushTable:
@@ -144,6 +153,8 @@ def compare_pushes(
     strides, halvings : int
         Impulses tried upwards to it, and how often the stride in which the walk first fails is
         halved.
+    control_period : float
+        Seconds between two calls of the controller.
     folder : path, optional
         Where rows are kept as they come, to go on from there.
     progress : callable, optional
@@ -160,7 +171,7 @@ def compare_pushes(
         If there is no engine of a name, or a number is not positive.
     """
     entries = entries_called(engines)
-    walk = Walk(robot, controller, gait, UNDISTURBED, CONTROL_PERIOD, friction, 60.0)
+    walk = Walk(robot, controller, gait, UNDISTURBED, control_period, friction, 60.0)
     versions = peers(load=False)
     kept = KeptRows(folder if walk.can_be_told else None, walk.entries())
     asked: list[tuple[str, str, str, Any, Callable[[float], bool]]] = []
@@ -230,12 +241,31 @@ def stands(walk: Walk, run: Run, push: Push) -> bool:
     walk : Walk
         What was pushed.
     run : Run
-        What became of it, from the end of the push on or from before it.
+        What became of it, from the end of the push on.
     push : Push
         The push.
     """
     speed = walk.gait.step_length / walk.gait.step_duration
     return bool(recovery(run, pushed=(push.start, push.end), normal_speed=speed, after=SETTLED))
+
+
+def since(run: Run, begin: float) -> Run:
+    """Return a run without what was before a time: all that an engine knows that takes over then.
+
+    Parameters
+    ----------
+    run : Run
+        The run, which lasts that long.
+    begin : float
+        When (s).
+    """
+    later = run.time >= begin - SAME_ROW
+    return replace(
+        run,
+        time=run.time[later],
+        **{name: getattr(run, name)[later] for name in QUANTITIES},
+        events=tuple(event for event in run.events if event.time >= begin - SAME_ROW),
+    )
 
 
 def stands_by_ours(walk: Walk, method: Method, sign: float, impulse: float) -> bool:
@@ -253,7 +283,8 @@ def stands_by_ours(walk: Walk, method: Method, sign: float, impulse: float) -> b
         N s, at least 0.
     """
     push, until = pushed(walk, sign * impulse)
-    return stands(walk, walk.ours(method, pushes=[push], until=until), push)
+    run = walk.ours(method, pushes=[push], until=until)
+    return run.time[-1] >= push.end and stands(walk, since(run, push.end), push)
 
 
 def stands_in(
@@ -283,7 +314,9 @@ def stands_in(
         If the engine is missing, ends, hangs or refuses.
     """
     push, until = pushed(walk, sign * impulse)
-    past = walk.ours(TRUTH, pushes=[push], until=push.end)
+    past = walk.past(push)
+    if not past.completed:
+        return False
     start = Start(
         told_the_past(walk, past), State(past.position[-1], past.velocity[-1]), push.end, until
     )

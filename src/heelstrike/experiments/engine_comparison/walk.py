@@ -11,7 +11,7 @@ from typing import Any
 from heelstrike.contact.ground import Ground
 from heelstrike.experiments.engine_comparison.entries import Entry
 from heelstrike.experiments.engine_comparison.figures import WalkFigures, walk_figures
-from heelstrike.experiments.engine_comparison.walking import walk_in
+from heelstrike.experiments.engine_comparison.walking import asked_of, walk_in
 from heelstrike.experiments.engines.packages import PACKAGES, compared
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.scenario import Scenario
@@ -24,7 +24,6 @@ from heelstrike.reader_process import ReaderProcess
 from heelstrike.robot import Robot, State
 from heelstrike.robot.files.robot_json import robot_entries
 from heelstrike.sim import Controller, EventDriven, Run, simulate
-from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.law import Law
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import Push
@@ -62,6 +61,9 @@ class Walk:
     :func:`compare_engines`."""
     processes: dict[str, ReaderProcess] = field(default_factory=dict)
     """Processes of the engines that have walked, by their names."""
+
+    pasts: dict[Push, Run] = field(default_factory=dict)
+    """What was until the end of each push, the same for all engines."""
 
     def close(self) -> None:
         """End the processes of the engines."""
@@ -121,11 +123,16 @@ class Walk:
             )
         )
 
+    def past(self, push: Push) -> Run:
+        """Walk by the truth until a push ends."""
+        if push not in self.pasts:
+            self.pasts[push] = self.ours(TRUTH, pushes=[push], until=push.end)
+        return self.pasts[push]
+
     def asked(self) -> Any:
         """Return the controller as it is asked from Python, with a memory of its own."""
-        if isinstance(self.controller, Law):
-            return AskedLaw(self.robot, self.controller, compiled=True)
-        return deepcopy(self.controller)
+        own = self.controller
+        return asked_of(self.robot, own if isinstance(own, Law) else deepcopy(own))
 
     def by(self, method: Method, truth: Run) -> WalkFigures:
         """Walk by a method of ours, and measure it.

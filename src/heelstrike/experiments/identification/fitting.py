@@ -68,7 +68,8 @@ class Fit:
     delay: float
     """Of the motors (s)."""
     delay_deviation: float
-    """Its standard deviation (s); zero if it was not looked for."""
+    """Its standard deviation (s); zero if it was not looked for, NaN if a longer one than
+    those looked for is likelier."""
     misfit: float
     """Sum of squares over its expectation: about 1 where noise is what it is said to be."""
     degrees: int
@@ -139,12 +140,18 @@ class Fitting:
                 least, part = away, 1.0
                 covariance = np.asarray(np.linalg.inv(matrix), np.float64)
                 step = -covariance @ right
+                held = self._goes_beyond(there[size:], step[size:])
+                if held:  # the others are looked for with the longest delay
+                    covariance = np.zeros((free, free))
+                    covariance[:size, :size] = np.linalg.inv(matrix[:size, :size])
+                    step = -covariance @ right
                 deviation = np.sqrt(np.diag(covariance))
                 if np.all(np.abs(step) <= SETTLED_FIT * deviation):
                     degrees = found.rows - free - sum(piece.size for piece in self._pieces)
                     return Fit(
                         there[:size], covariance[:size, :size], float(there[size:].sum()),
-                        float(deviation[size:].sum()), squares / degrees, degrees,
+                        np.nan if held else float(deviation[size:].sum()),
+                        squares / degrees, degrees,
                         tuple(piece.compared for piece in self._pieces),
                     )  # fmt: skip
                 start = there, [(each.coefficients, each.change(step)) for each in self._pieces]
@@ -156,6 +163,10 @@ class Fitting:
             "the parameters do not settle: the motion does not fit the robot. Look whether columns "
             "have the right units and signs, and whether the feet stand flat"
         )
+
+    def _goes_beyond(self, delay: Floats, step: Floats) -> bool:
+        """Whether a delay, if there is one, is at the end of those looked for, and goes on."""
+        return bool(np.any((np.abs(delay) >= self.longest) & (delay * step > 0.0)))
 
     def _evaluated(self, values: Floats, there: Floats) -> _Normal:
         """Return the normal equations of the parameters at some of them."""

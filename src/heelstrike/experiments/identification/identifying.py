@@ -11,13 +11,14 @@ from heelstrike.errors import SimulationError
 from heelstrike.experiments.identification.base_parameters import BaseParameters, base_parameters
 from heelstrike.experiments.identification.equations import Equations
 from heelstrike.experiments.identification.fitting import Fit, Fitting, Noise
+from heelstrike.experiments.identification.measured import measured_by
 from heelstrike.experiments.identification.sliding import (
     GroundFriction,
     ground_friction,
     may_slide,
     sliding,
 )
-from heelstrike.experiments.identification.standing import Piece, pieces_of
+from heelstrike.experiments.identification.standing import LEAST_SAMPLES, Piece, pieces_of
 from heelstrike.experiments.identification.unknowns import Unknowns
 from heelstrike.experiments.people.splines import Splines
 from heelstrike.field_texts import dataclass
@@ -89,7 +90,7 @@ class Identified:
     delay: float
     """Of the motors (s); NaN if it was not looked for."""
     delay_deviation: float
-    """Its standard deviation (s)."""
+    """Its standard deviation (s); NaN if the delay is at the end of those looked for."""
     friction: GroundFriction
     """What is told of the ground."""
     hidden: tuple[str, ...]
@@ -107,7 +108,7 @@ class Identified:
 
     def __str__(self) -> str:
         lines = [str(each) for each in self.numbers if each.told]
-        if not math.isnan(self.delay):
+        if not (math.isnan(self.delay) or math.isnan(self.delay_deviation)):
             half = 1e3 * COVERING * self.delay_deviation
             lines.append(f"delay of the motors: {1e3 * self.delay:.4g} ± {half:.2g} ms")
         lines.append(str(self.friction))
@@ -192,19 +193,18 @@ def identify(
             raise SimulationError(f"{name} must be a positive number, got {noise}")
     if not 0.0 <= longest_delay < math.inf:
         raise SimulationError(f"longest_delay must be zero or more, got {longest_delay}")
-    measured = RobotLog.of(log) if isinstance(log, Run) else log
+    measured = measured_by(robot, log)
     equations = Equations(robot)
     pieces = pieces_of(equations, measured, force_noise)
-    encoder = _encoder_noise(measured, pieces, knots, encoder_noise)
+    names = robot.joint_names[equations.first :]
+    encoder = _encoder_noise(measured, pieces, knots, encoder_noise, names)
     slides = sliding(equations, measured, encoder, force_noise)
     friction = ground_friction(equations, measured, slides, force_noise)
     moving = may_slide(equations, measured, slides, friction)
     pieces = pieces_of(equations, measured, force_noise, moving)
     if not pieces:
-        raise SimulationError(
-            "the robot never stands flat on one foot with the other in the air for long enough; "
-            "only there its equations are known. Look whether joints have the right units and signs"
-        )
+        raise SimulationError(_why_none(equations))
+    pieces = _with_commands(measured, pieces, longest_delay)
     feet = sorted({piece.foot for piece in pieces}, key=str)
     forces = measured.force is not None and bool(equations.first)
     base = base_parameters(equations, feet, ground=forces)
@@ -213,7 +213,13 @@ def identify(
         equations, measured, pieces, base, Noise(encoder, torque_noise, force_noise),
         knots=knots, longest_delay=longest_delay,
     )  # fmt: skip
-    fit = fitting.solve(known)
+    try:
+        fit = fitting.solve(known)
+    except np.linalg.LinAlgError as error:
+        raise SimulationError(
+            f"the equations of this motion have no single answer ({error}): it does not fit the "
+            "robot, or a noise is told much too small. Look whether columns have the right units"
+        ) from error
     covariance = fit.covariance * _surprise(fit)
     numbers = _numbers(equations.unknowns, base, known, fit, covariance)
     return Identified(
@@ -222,29 +228,74 @@ def identify(
         delay=fit.delay if longest_delay > 0.0 else math.nan,
         delay_deviation=fit.delay_deviation * math.sqrt(_surprise(fit)),
         friction=friction,
-        hidden=tuple(_hidden(equations.unknowns, base, numbers)),
+        hidden=(
+            *_hidden(equations.unknowns, base, numbers),
+            *_cut_short(fit),
+        ),
         misfit=fit.misfit,
         seconds=float(sum(measured.time[p.end - 1] - measured.time[p.first] for p in pieces)),
-        joints=robot.joint_names[equations.first :],
+        joints=names,
         torque=fit.torque,
     )
 
 
+def _why_none(equations: Equations) -> str:
+    """Why there is no piece of a motion in which the equations are known."""
+    if not equations.first:
+        return f"there are too few samples: at least {LEAST_SAMPLES} are wanted in each second"
+    return (
+        "the robot never stands flat on one foot with the other in the air for long enough; "
+        "only there its equations are known. Look whether joints have the right units and signs, "
+        f"and whether there are {LEAST_SAMPLES} samples in the time on one foot"
+    )
+
+
+def _with_commands(
+    log: RobotLog, pieces: tuple[Piece, ...], longest_delay: float
+) -> tuple[Piece, ...]:
+    """Return the pieces in which commands act whatever the delay: none from beyond their ends."""
+    lasting = [float(log.time[piece.end - 1] - log.time[piece.first]) for piece in pieces]
+    found = [
+        piece for piece, lasts in zip(pieces, lasting, strict=True) if lasts > 2.0 * longest_delay
+    ]
+    if not found:
+        raise SimulationError(
+            f"longest_delay is {longest_delay:g} s, and the longest piece of the motion lasts "
+            f"{max(lasting):.3g} s: give less than half of that"
+        )
+    return tuple(found)
+
+
+def _cut_short(fit: Fit) -> list[str]:
+    """Say that a longer delay is likelier than all that were looked for."""
+    if not math.isnan(fit.delay_deviation):
+        return []
+    return [
+        f"delay of the motors: {1e3 * fit.delay:.4g} ms is at the end of those looked for; give a "
+        "larger longest_delay"
+    ]
+
+
 def _encoder_noise(
-    log: RobotLog, pieces: tuple[Piece, ...], knots: float, given: float | None
-) -> Floats:
+    log: RobotLog, pieces: tuple[Piece, ...], knots: float, given: float | None,
+    names: tuple[str, ...],
+) -> Floats:  # fmt: skip
     """Return noise of encoders, (k,): what smooth motions leave, if it is not given."""
     if given is not None:
         return np.full(log.joints.shape[1], given)
     squares, count = np.zeros(log.joints.shape[1]), 0
+    moves = np.zeros(log.joints.shape[1])
     for piece in pieces:
         time, joints = log.time[piece.first : piece.end], log.joints[piece.first : piece.end]
         splines = Splines(time - time[0], knots)
         squares += np.sum((joints - splines.values(splines.fitted(joints))) ** 2, axis=0)
         count += len(time) - splines.size
-    if pieces and count < 1:
+        moves = np.maximum(moves, np.ptp(joints, axis=0))
+    if pieces and not moves.all():
+        name = names[int(np.argmin(moves))]
         raise SimulationError(
-            "there are too few samples to tell the noise of the encoders; say encoder_noise"
+            f"joint {name!r} reads the same all along, which does not tell the noise of its "
+            "encoder; give encoder_noise"
         )
     return np.sqrt(np.maximum(squares / max(count, 1), np.finfo(float).tiny))
 

@@ -12,6 +12,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import forward_kinematics, point_position
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.experiments.identification.equations import Equations
+from heelstrike.experiments.people.splines import DEGREE
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.recordings.robot_log import RobotLog
 from heelstrike.robot.model import Floats, Model
@@ -25,6 +26,8 @@ LONGEST = 1.0
 """About how long (s) a piece is at most: the work grows with the square of that."""
 PRESSED = 5.0
 """Standard deviations of a measured force by which a contact point presses."""
+LEAST_SAMPLES = 2 * DEGREE
+"""Least samples of a piece: its splines have fewer coefficients then."""
 EDGE = 0.01
 """Time (s) at either end of a piece that is left out: the ends of impacts."""
 
@@ -69,12 +72,16 @@ def pieces_of(
 
 
 def _parted(time: Floats, piece: Piece) -> list[Piece]:
-    """Part a piece into some that are short enough."""
+    """Part a piece into some that are short enough; without those of too few samples."""
     lasts = float(time[piece.end - 1] - time[piece.first])
     ends = time[piece.first] + np.linspace(0.0, lasts, max(round(lasts / LONGEST), 1) + 1)
     rows = np.searchsorted(time[piece.first : piece.end], ends[1:-1]) + piece.first
     bounds = [piece.first, *rows.tolist(), piece.end]
-    return [Piece(piece.foot, first, end) for first, end in pairwise(bounds)]
+    return [
+        Piece(piece.foot, first, end)
+        for first, end in pairwise(bounds)
+        if end - first >= LEAST_SAMPLES
+    ]
 
 
 @kernel

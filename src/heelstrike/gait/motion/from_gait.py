@@ -51,6 +51,11 @@ def motion_of_gait(robot: Robot, gait: Gait) -> Motion:
         If the gait is of another robot, or has several phases.
     """
     gait.check_joints(robot)
+    if gait.fingerprint != fingerprint(robot):
+        raise GaitError(
+            f"this gait was designed for robot {gait.robot!r} with other numbers than robot "
+            f"{robot.name!r} has. Use that robot, or design a new gait with optimize_gait."
+        )
     refuse_loops(robot, "a motion of all coordinates", GaitError)
     mirror = robot.mirror
     if len(gait.phases) != 1 or len(gait.phases[0].contacts) != 1 or mirror is None:
@@ -84,7 +89,7 @@ def motion_of_gait(robot: Robot, gait: Gait) -> Motion:
     )
     return Motion(
         robot=gait.robot,
-        fingerprint=fingerprint(robot),
+        fingerprint=gait.fingerprint,
         phases=(phase,),
         repeat=Repeat.MIRRORED,
         distance=gait.step_length,

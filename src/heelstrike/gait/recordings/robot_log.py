@@ -3,23 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from heelstrike.errors import GaitError
+from heelstrike.errors import GaitError, SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.recordings.lines import Name
 from heelstrike.gait.recordings.table import Table, read_table
-from heelstrike.gait.recordings.units import UNITS, check_unit, plain
+from heelstrike.gait.recordings.units import (
+    ANGLES,
+    FORCES,
+    LENGTHS,
+    TORQUES,
+    UNITS,
+    check_unit,
+    plain,
+)
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.run import Run
 from heelstrike.tolerances import SAME_ROW
-from heelstrike.wording import meant
+from heelstrike.wording import meant, some_of
 
 ROOT = 3
 """Coordinates of a trunk that floats: x, z and pitch."""
 COMPONENTS = ("normal", "tangent")
+SLIDING_MOTOR = (*FORCES, *TORQUES)
+"""Units of the column of a motor that pushes along a slide: tables of runs call all of them N m."""
+SHOWN = 6
+"""Missing columns that a message names."""
+
+Kind = tuple[str, ...]
+"""Units of one kind, ours first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +72,21 @@ class RobotLog:
         RobotLog
             Joints, torques, forces of the ground if there are contact points, and the trunk if
             it floats; time begins at zero.
+
+        Raises
+        ------
+        SimulationError
+            If the robot stands on ground that is not level: gravity and forces would have other
+            directions than a robot on level ground measures.
         """
+        ground = run.ground
+        if run.robot.floating and (
+            ground.shape is not None or np.ptp(ground.model().vertices[:, 1])
+        ):
+            raise SimulationError(
+                "numbers of a robot are told from its motion on level ground; this run is on other "
+                "ground. Simulate it on hs.Ground(friction=...)"
+            )
         later = np.diff(run.time, append=np.inf) > SAME_ROW
         q, first = run.position[later], root_size(run.robot)
         return cls(
@@ -78,8 +109,9 @@ def load_robot_log(
     """Read what a robot measured from a table, as that of a run (``run.save("run.csv")``).
 
     Columns are ``position JOINT`` or ``JOINT``, ``torque MOTOR``, and the time. Where there are
-    ``contact_force POINT normal`` and ``tangent`` of all contact points, and ``position`` of the
-    trunk's x, z and pitch, these are read too. Units may stand in brackets.
+    ``contact_force POINT normal`` and ``tangent`` of all contact points, or ``position`` of the
+    trunk's x, z and pitch, these are read too. Units may stand in brackets. Of several rows at one
+    time, as tables of runs have at events, the last counts.
 
     Parameters
     ----------
@@ -90,7 +122,8 @@ def load_robot_log(
     rate : float, optional
         Rows a second, where the file has no times.
     unit : str
-        Of joints whose columns name none: ``"rad"`` or ``"deg"``; rad by default.
+        Of hinges, and of the trunk's pitch, whose columns name none: ``"rad"`` or ``"deg"``; rad by
+        default. What slides is in m.
 
     Returns
     -------
@@ -100,11 +133,13 @@ def load_robot_log(
     Raises
     ------
     GaitError
-        If it is no such file, or a column or a number is missing; the message has the place.
+        If it is no such file, a column or a number is missing, or a unit is of another kind; the
+        message has the place.
     """
     check_unit(unit)
-    table = read_table(path, gaps=True)
+    table = _last_of_each_time(read_table(path, gaps=True))
     first = root_size(robot)
+    turns = robot.model.axis[:, 0] != 0.0
     motor_of = dict(zip(robot.model.actuator_joint.tolist(), robot.actuator_names, strict=True))
     joints = [
         _needed(table, [f"position {name}", name, motor_of.get(first + j, name)])
@@ -114,24 +149,27 @@ def load_robot_log(
         _needed(table, [f"torque {motor}", f"{motor} torque", f"torque {robot.joint_names[joint]}"])
         for joint, motor in motor_of.items()
     ]
-    trunk = [_there(table, [f"position {name}"]) for name in robot.joint_names[:first]]
-    forces = [
-        _there(table, [f"contact_force {name} {component}"])
-        for name in robot.contact_names
-        for component in COMPONENTS
-    ]
+    trunk = _all_or_none(table, [f"position {name}" for name in robot.joint_names[:first]])
+    forces = _all_or_none(
+        table,
+        [
+            f"contact_force {name} {component}"
+            for name in robot.contact_names
+            for component in COMPONENTS
+        ],
+    )
     time = table.time(rate)
-    force = None
-    if forces and min(forces) >= 0:
-        force = _columns(table, forces, "").reshape(len(time), robot.nc, 2)
-    root = None
-    if first and min(trunk) >= 0:
-        root = np.hstack([_columns(table, trunk[:2], ""), _columns(table, trunk[2:], unit)])
+    force = root = None
+    if forces:
+        force = _columns(table, forces, [FORCES] * len(forces))
+        force = force.reshape(len(time), robot.nc, 2)
+    if trunk:
+        root = _columns(table, trunk, _kinds(turns[:first], ANGLES, LENGTHS), unit)
     used = {table.column("time"), *joints, *torques, *trunk, *forces}
     return RobotLog(
         time=time,
-        joints=_columns(table, joints, unit),
-        torque=_columns(table, torques, ""),
+        joints=_columns(table, joints, _kinds(turns[first:], ANGLES, LENGTHS), unit),
+        torque=_columns(table, torques, _kinds(turns[list(motor_of)], TORQUES, SLIDING_MOTOR)),
         force=force,
         trunk=root,
         ignored=tuple(name for k, name in enumerate(table.written) if k not in used),
@@ -154,8 +192,59 @@ def _needed(table: Table, names: Sequence[str]) -> int:
     return column
 
 
-def _columns(table: Table, columns: Sequence[int], unit: str) -> Floats:
-    """Return columns in our units; of angles that name none in a given one."""
-    scale = [UNITS[table.units[k] or unit or "rad"] for k in columns]
+def _all_or_none(table: Table, names: Sequence[str]) -> list[int]:
+    """Return the columns of several names; none if there is none of them.
+
+    Raises
+    ------
+    GaitError
+        If there are some of them only.
+    """
+    columns = [_there(table, [name]) for name in names]
+    missing = [repr(name) for name, k in zip(names, columns, strict=True) if k < 0]
+    if len(missing) == len(names):
+        return []
+    if missing:
+        there = next(table.written[k] for k in columns if k >= 0)
+        raise GaitError(
+            f"{table.path}: there is {there!r}, but no column {some_of(missing, SHOWN)}: all of "
+            "these are wanted, or none. Add them, or leave the others out"
+        )
+    return columns
+
+
+def _last_of_each_time(table: Table) -> Table:
+    """Return the table without rows that stand at the time of the next one."""
+    column = table.column("time")
+    if column < 0:
+        return table
+    steps = np.diff(table.values[:, column], append=np.inf) * UNITS[table.units[column] or "s"]
+    kept = ~((steps >= 0.0) & (steps <= SAME_ROW))
+    places = tuple(place for place, keeps in zip(table.places, kept, strict=True) if keeps)
+    return replace(table, values=table.values[kept], places=places)
+
+
+def _kinds(turns: NDArray[np.bool_], turning: Kind, sliding: Kind) -> list[Kind]:
+    """Return the units of what turns and of what slides, one by one."""
+    return [turning if each else sliding for each in turns]
+
+
+def _columns(table: Table, columns: Sequence[int], kinds: Sequence[Kind], unit: str = "") -> Floats:
+    """Return columns in our units; of angles that name none in a given one.
+
+    Raises
+    ------
+    GaitError
+        If a number is missing, or a column is in a unit of another kind.
+    """
+    scale = []
+    for k, kind in zip(columns, kinds, strict=True):
+        given = table.units[k]
+        if given and given not in kind:
+            raise GaitError(
+                f"{table.path}: column {table.written[k]!r} is in {given}; its unit must be one of "
+                f"{', '.join(kind)}"
+            )
+        scale.append(UNITS[given or (unit if kind is ANGLES else "") or kind[0]])
     found: Floats = table.whole([table.names[k] for k in columns]) * scale
     return found

@@ -16,7 +16,10 @@ UNITS = {
 
 
 ANGLES = ("rad", "deg", "degrees")
-"""Units of angles."""
+LENGTHS = ("m", "cm", "mm")
+FORCES = ("n",)
+TORQUES = ("n m",)
+"""ANGLES, LENGTHS, FORCES, TORQUES: Units of each kind, ours first."""
 
 
 def check_unit(unit: str) -> None:
