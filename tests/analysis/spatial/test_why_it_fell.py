@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,10 @@ import pytest
 from live_humanoid import humanoid
 
 import heelstrike as hs
-from heelstrike.analysis.diagnosis.symptoms import Cause
+from heelstrike.analysis.diagnosis.symptoms import BRIEF, Cause
 from heelstrike.analysis.spatial.diagnosis import first_cause_in_space, spatial_limits
 from heelstrike.experiments.space import hold
-from heelstrike.sim.spatial.run import SpatialRun
+from heelstrike.sim.spatial.run import RECORDED, SpatialRun
 from heelstrike.view.spatial.verdict import judge_in_space
 
 
@@ -76,3 +77,24 @@ def test_one_that_stands_has_limits_and_no_cause(robot: hs.SpatialRobot, tmp_pat
     page = run.save_html(tmp_path / "run.html").read_text()
     assert verdict.headline in re.sub(r"&#x27;|&#39;", "'", page)
     assert "How close to each limit" in page
+
+
+def test_a_fall_late_in_a_long_run_is_seen_as_early_as_in_a_short_one(
+    robot: hs.SpatialRobot,
+) -> None:
+    """The same push after 13 s: the same cause as after 0.3 s, as long after the push."""
+    short = run_of(robot, (260.0, 0.0, 0.0), friction=2.0)
+    late = 13.0
+    stood = np.concatenate((np.arange(0.0, late, 1e-3), late + short.time))
+    rows = np.concatenate(
+        (np.zeros(len(stood) - len(short.time), dtype=int), range(len(short.time)))
+    )
+    run = replace(
+        short, time=stood, pushes=(replace(short.pushes[0], start=late + 0.3),),
+        **{name: getattr(short, name)[rows] for name in RECORDED},
+    )  # fmt: skip
+    early, found = first_cause_in_space(short), first_cause_in_space(run)
+    assert early is not None
+    assert found is not None
+    assert found.cause is Cause.TIPPED_FORWARD
+    assert found.time == pytest.approx(late + early.time, abs=BRIEF)
