@@ -20,6 +20,7 @@ from heelstrike.sim.spatial.record import SpatialEventKind
 from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.view.live.session import Session
 from heelstrike.view.live.stage import GivenStage, Stage
+from heelstrike.view.spatial.live import SPACE
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +104,24 @@ def test_joints_are_moved_and_the_robot_stands_again(robot: hs.SpatialRobot) -> 
     assert shown.seen[at] == 0.4
     assert "no joint" in ask(session, "pose", joint="tail", value=0.0)
     assert "no slider" in ask(session, "pose", joint="root", value=0.0)
+
+
+def test_a_joint_is_moved_on_a_box_as_on_the_ground(robot: hs.SpatialRobot) -> None:
+    """The plane is 0.2 m below: the robot stays on its box, and stands in nothing."""
+    box = hs.Box(center=(0.0, 0.0, 0.1), size=(2.0, 2.0, 0.2))
+    start = robot.reference_state()
+    start.q[2] += 0.2
+    simulation = hs.Simulation(
+        robot, hs.HoldPosture(robot, kp=300.0, kd=8.0), state=start,
+        ground=hs.SpatialGround(boxes=(box,)),
+    )  # fmt: skip
+    simulation.advance(0.01)
+    before = simulation.state.q[2]
+    for angle in (0.2, -0.2):
+        state = SPACE.moved(simulation, "left_ankle_joint", angle)
+        simulation.state = state
+        assert float(simulation.contacts.gap.min()) == pytest.approx(0.0, abs=1e-9)
+        assert 0.0 < state.q[2] - before < 0.1
 
 
 def test_friction_acts_at_once_and_events_are_told(robot: hs.SpatialRobot) -> None:
