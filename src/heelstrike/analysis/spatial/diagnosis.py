@@ -29,6 +29,7 @@ from heelstrike.analysis.diagnosis.symptoms import (
     full_torque,
     spells,
 )
+from heelstrike.analysis.spatial.friction import face_friction, foot_friction
 from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.support import pushing_in_space
 from heelstrike.analysis.spatial.zero_moment_point import (
@@ -72,11 +73,12 @@ def spatial_limits(run: SpatialRun, *, until: float = math.inf) -> tuple[Limit, 
 
 def _limits(run: SpatialRun, shown: Rows) -> Iterator[Limit]:
     time, robot, model = run.time, run.robot, run.robot.model
+    friction = face_friction(run)
     for foot in robot.feet:
-        share = foot_friction(run, foot.contacts)
+        share, coefficient = foot_friction(run, friction, foot.contacts)
         if (found := largest(time, share, shown)) is not None:
             k, used, reached = found
-            mu = run.ground.friction
+            mu = coefficient[k]
             detail = f"{used * mu:.3g} of {mu:.3g} at {time[k]:.3g} s"
             name = f"friction of the {foot.name.replace('_', ' ')}"
             yield Limit(name, "friction", used, float(time[k]), reached, detail)
@@ -123,17 +125,6 @@ def _room(polygon: Floats) -> float:
     length = np.linalg.norm(edge, axis=1)
     apart = np.linalg.norm(np.cross(edge, away), axis=1) / np.where(length > 0.0, length, np.inf)
     return float(apart[length > 0.0].min())
-
-
-def foot_friction(run: SpatialRun, contacts: tuple[int, ...]) -> Floats:
-    """Share (nt,) of the friction of some contact points together that is used; NaN in the air."""
-    own = list(contacts)
-    force = run.contact_force[:, own]
-    allowed = (force[..., 0] * run.robot.model.friction_scale[own]).sum(axis=1)
-    allowed = allowed * run.ground.friction
-    sideways = np.linalg.norm(force[..., 1:].sum(axis=1), axis=-1)
-    pressed = allowed > 1e-6 * run.robot.weight
-    return np.where(pressed, sideways / np.where(pressed, allowed, 1.0), np.nan)
 
 
 def first_cause_in_space(run: SpatialRun) -> Fall | None:
@@ -199,12 +190,14 @@ def _slips(run: SpatialRun, height: float, pace: float) -> Iterator[Symptom]:
     pressed = pushing_in_space(run)
     speed = np.where(pressed, np.linalg.norm(run.slip, axis=-1), 0.0)
     held = np.diff(run.time, append=run.time[-1:])
+    friction = face_friction(run)
     for foot in run.robot.feet:
         fastest = speed[:, list(foot.contacts)].max(axis=1)
         for a, b in _lasting(run.time, fastest > SLOW * height / pace, 0.0):
             slid = float((fastest[a : b + 1] * held[a : b + 1]).sum())
             if slid >= SLID * height:
-                told = {"distance_m": slid, "friction": run.ground.friction}
+                _, coefficient = foot_friction(run, friction, foot.contacts)
+                told = {"distance_m": slid, "friction": float(coefficient[a])}
                 yield Symptom(
                     Cause.SLIPPED, float(run.time[a]), float(run.time[b]), foot.name, told
                 )
