@@ -197,7 +197,8 @@ def _slips(run: SpatialRun, height: float, pace: float) -> Iterator[Symptom]:
             slid = float((fastest[a : b + 1] * held[a : b + 1]).sum())
             if slid >= SLID * height:
                 _, coefficient = foot_friction(run, friction, foot.contacts)
-                told = {"distance_m": slid, "friction": float(coefficient[a])}
+                known = np.isfinite(coefficient[a])
+                told = {"distance_m": slid} | ({"friction": float(coefficient[a])} if known else {})
                 yield Symptom(
                     Cause.SLIPPED, float(run.time[a]), float(run.time[b]), foot.name, told
                 )
