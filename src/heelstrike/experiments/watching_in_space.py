@@ -17,9 +17,9 @@ from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.spatial.placing import placed_in_space
 from heelstrike.sim.spatial.simulation import SpatialSimulation
-from heelstrike.view.live.dimension import Dimension
+from heelstrike.view.live.dimension import LiveDimension
 from heelstrike.view.live.stage import Control, Stage, friction_control, step_control, step_of
-from heelstrike.view.spatial.live import SPACE
+from heelstrike.view.spatial.live import LIVE_SPACE
 
 STEEPEST = 20.0
 """Degrees."""
@@ -81,9 +81,9 @@ class SpaceStage(Stage):
             law.make(robot, first.step)
 
     @property
-    def dimension(self) -> Dimension:
+    def dimension(self) -> LiveDimension:
         """Space."""
-        return SPACE
+        return LIVE_SPACE
 
     def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:
         """Robot, controller, friction, slope, height, method and step."""

@@ -20,7 +20,7 @@ from heelstrike.sim.spatial.record import SpatialEventKind
 from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.view.live.session import Session
 from heelstrike.view.live.stage import GivenStage, Stage
-from heelstrike.view.spatial.live import SPACE
+from heelstrike.view.spatial.live import LIVE_SPACE
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +118,7 @@ def test_a_joint_is_moved_on_a_box_as_on_the_ground(robot: hs.SpatialRobot) -> N
     simulation.advance(0.01)
     before = simulation.state.q[2]
     for angle in (0.2, -0.2):
-        state = SPACE.moved(simulation, "left_ankle_joint", angle)
+        state = LIVE_SPACE.moved(simulation, "left_ankle_joint", angle)
         simulation.state = state
         assert float(simulation.contacts.gap.min()) == pytest.approx(0.0, abs=1e-9)
         assert 0.0 < state.q[2] - before < 0.1

@@ -11,7 +11,7 @@ import numpy as np
 
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.field_texts import dataclass
-from heelstrike.view.live.dimension import Dimension, dimension_of
+from heelstrike.view.live.dimension import LiveDimension, dimension_of
 
 if TYPE_CHECKING:
     from heelstrike.view.live.dimension import AnyGround, AnySimulation, Outline
@@ -58,11 +58,11 @@ class Stage(ABC):
     """Makes the simulation that is watched, of the values of its controls."""
 
     @property
-    def dimension(self) -> Dimension:
+    def dimension(self) -> LiveDimension:
         """That of its robots; the plane by default."""
-        from heelstrike.view.live.plane import PLANE
+        from heelstrike.view.live.plane import LIVE_PLANE
 
-        return PLANE
+        return LIVE_PLANE
 
     @abstractmethod
     def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:
@@ -131,7 +131,7 @@ class GivenStage(Stage):
         self._controls = (friction_control(friction_of(ground), boxes_apart=own),)
 
     @property
-    def dimension(self) -> Dimension:
+    def dimension(self) -> LiveDimension:
         """That of its robot."""
         return dimension_of(self._simulation.robot)
 

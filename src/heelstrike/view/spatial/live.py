@@ -16,14 +16,15 @@ from heelstrike.sim.push import Push, pushes_on
 from heelstrike.sim.spatial.record import SpatialEventKind
 from heelstrike.sim.spatial.run import RECORDED, SpatialEvent, SpatialRun
 from heelstrike.sim.spatial.simulation import SpatialSimulation
-from heelstrike.sim.spatial.space import SPACE as LOOK
-from heelstrike.view.live.dimension import Dimension
+from heelstrike.sim.spatial.space import SPACE
+from heelstrike.view.live.dimension import LiveDimension
 from heelstrike.view.live.light import certified_light
 from heelstrike.view.live.plane import SEEN_TO_STAND
-from heelstrike.view.spatial.events import OF_POINTS, kind_in_space, place_in_space
+from heelstrike.view.spatial.events import OF_POINTS
 from heelstrike.view.spatial.forces import force_groups
 from heelstrike.view.spatial.live_frames import SpatialLayout
 from heelstrike.view.spatial.scene import scene_in_space
+from heelstrike.view.style import in_words
 
 MOST_LIFTS, ON_GROUND = 40, 1e-10
 """How often a robot is lifted or lowered, and the gap (m) with which it is on the ground."""
@@ -31,7 +32,7 @@ LEAST_UP = 0.1
 """Vertical part of the normal of a face with which a robot that is in a wall is lifted."""
 
 
-class Space(Dimension):
+class Space(LiveDimension):
     """Robots in space."""
 
     name = "space"
@@ -68,7 +69,7 @@ class Space(Dimension):
         )
         state, ground = State(q, now.v), simulation.ground
         if robot.floating and robot.nc:
-            gap, _ = LOOK.gaps(robot, state, ground)
+            gap, _ = SPACE.gaps(robot, state, ground)
             if stands(simulation) or gap.min() < 0.0:
                 _onto_ground(robot, state, ground)
         return state
@@ -83,11 +84,11 @@ class Space(Dimension):
 
     def words_of(self, event: SpatialEvent) -> str:
         """Return the kind of an event as people write it."""
-        return kind_in_space(event)
+        return event.kind_in_words
 
     def place_of(self, event: SpatialEvent, robot: SpatialRobot) -> str:
         """Name the contact point or joint at which an event happened."""
-        return place_in_space(event, robot)
+        return in_words(event.place(robot))
 
     def shown_at(self, event: SpatialEvent, robot: SpatialRobot) -> int:
         """Index of the force that is drawn of the contact point of an event."""
@@ -104,7 +105,7 @@ def stands(simulation: SpatialSimulation) -> bool:
 def _onto_ground(robot: SpatialRobot, state: State, ground: SpatialGround) -> None:
     """Lift a robot out of the ground, or lower it until it meets it, boxes too."""
     for _ in range(MOST_LIFTS):
-        gap, up = LOOK.gaps(robot, state, ground)
+        gap, up = SPACE.gaps(robot, state, ground)
         lowest = int(np.argmin(gap))
         if abs(gap[lowest]) < ON_GROUND:
             return
@@ -113,4 +114,4 @@ def _onto_ground(robot: SpatialRobot, state: State, ground: SpatialGround) -> No
         state.q[2] -= gap[lowest] / along
 
 
-SPACE = Space()
+LIVE_SPACE = Space()

@@ -21,10 +21,10 @@ from heelstrike.view.page.page import MOST_EVENTS, MOST_PHASES, check_page
 from heelstrike.view.page.provenance import versions
 from heelstrike.view.page.rows import MOST_ROWS, Rows, rows_about
 from heelstrike.view.page.verdict import Verdict, happened
-from heelstrike.view.spatial.events import OF_POINTS, kind_in_space, place_in_space
+from heelstrike.view.spatial.events import OF_POINTS
 from heelstrike.view.spatial.scene import moving_columns, scene_in_space, spatial_plots
 from heelstrike.view.spatial.verdict import judge_in_space
-from heelstrike.view.style import view_errors
+from heelstrike.view.style import in_words, view_errors
 from heelstrike.whole_file import write_whole
 
 LARGEST = 1_400_000
@@ -177,8 +177,8 @@ def _described(event: SpatialEvent, run: SpatialRun) -> dict[str, Any]:
     of_a_point = event.kind in OF_POINTS
     return {
         "time": event.time,
-        "kind": kind_in_space(event),
-        "where": place_in_space(event, run.robot),
+        "kind": event.kind_in_words,
+        "where": in_words(event.place(run.robot)),
         "contact": event.contact if of_a_point else -1,
         "impulse": event.impulse[0] if of_a_point else 0.0,
         "unit": "N s" if of_a_point else "",
