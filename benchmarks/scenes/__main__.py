@@ -70,6 +70,12 @@ def main() -> None:
         if others - {options.family}:
             parser.error(f"{options.out} has scenes of another family: {', '.join(sorted(others))}")
         known = set(SCHEMES) if options.family == SPACE else set(METHODS)
+        if not known.intersection(options.methods):
+            parser.error(
+                f"no method of {', '.join(options.methods)} takes scenes of family "
+                f"{options.family}: there {'are' if len(known) > 1 else 'is'} "
+                f"{', '.join(sorted(known))}"
+            )
         for one in campaign(
             options.out,
             [name for name in options.methods if name in known],

@@ -85,11 +85,12 @@ def judge_rows(rows: Any, controller: Any = None) -> Findings:
     return found
 
 
-def unexplained_steps(rows: Any) -> Array:
-    """Return the indices of steps whose momentum nothing explains, the worst first."""
+def unexplained_steps(rows: Any) -> tuple[Array, Array]:
+    """Return the indices of steps whose momentum nothing explains, the worst first, and how far."""
     broken = _Steps(rows, None).unexplained()
     worst: Array = np.argsort(-broken)
-    return worst[broken[worst] > BALANCE]
+    worst = worst[broken[worst] > BALANCE]
+    return worst, broken[worst]
 
 
 class _Steps:

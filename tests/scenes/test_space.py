@@ -111,6 +111,18 @@ def test_what_is_wrong_is_objected_to(
     assert law in setting.judge(wrong).broken()
 
 
+def test_steps_that_are_left_out_are_told(sliding: tuple[SpaceSetting, Any]) -> None:
+    """A step out of balance in a run with one step in parts: one is left out, and how large."""
+    setting, run = sliding
+    assert setting.judge(run).figures["steps left out"] == 0
+    velocity = run.velocity.copy()
+    velocity[20:] *= 1.0 + 1e-4
+    halved = dataclasses.replace(run.certificates, halved=1)
+    found = setting.judge(dataclasses.replace(run, velocity=velocity, certificates=halved))
+    assert found.figures["steps left out"] == 1
+    assert found.figures["largest of them"] > 1e-7
+
+
 def test_a_jump_in_free_flight_is_seen() -> None:
     """Where nothing is near, positions go where the velocity leads; by 1e-7 m elsewhere is seen."""
     for seed in range(200):

@@ -75,28 +75,39 @@ class SpaceSetting:
         return hs.simulate(robot, law, duration=duration, **given)
 
     def judge(self, run: Any) -> Findings:
-        """Judge a run of it; steps that were taken in parts have no record of the parts."""
+        """Judge a run of it; steps that were taken in parts have no record of the parts.
+
+        Which they were is not recorded: as many steps as that, the least explained, are left out.
+        How many and how far they are from balance is told.
+        """
         found = Findings()
         terrain = self.scene.terrain()
-        for part in _without_halved(run, terrain):
+        parts, left_out = _without_halved(run, terrain)
+        found.figures["steps left out"] = len(left_out)
+        found.figures["largest of them"] = float(left_out.max(initial=0.0))
+        for part in parts:
             found.take(judge_rows(SpatialRows(part, terrain)))
         certified = np.array([float(run.certificates.uncertified)])
         found.look("steps not certified", certified, 0.5, run.time)
         return found
 
 
-def _without_halved(run: Any, terrain: Terrain) -> list[Any]:
-    """Return a run in pieces between as many unexplained steps as were taken in parts."""
+def _without_halved(run: Any, terrain: Terrain) -> tuple[list[Any], Array]:
+    """Return a run in pieces between as many unexplained steps as were taken in parts.
+
+    And how far from balance each of those steps is.
+    """
     count = run.certificates.halved
     if not count or len(run.time) < 3:
-        return [run]
-    ends = np.sort(unexplained_steps(SpatialRows(run, terrain))[:count]).tolist()
+        return [run], np.zeros(0)
+    worst, broken = unexplained_steps(SpatialRows(run, terrain))
+    ends = np.sort(worst[:count]).tolist()
     edges = [0, *(row + 1 for row in ends), len(run.time)]
     return [
         replace(run, **{name: getattr(run, name)[a:b] for name in ("time", *RECORDED)})
         for a, b in pairwise(edges)
         if b > a + 1
-    ]
+    ], broken[:count]
 
 
 class _Held:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.model import Floats
-from heelstrike.sim.run import Run
+from heelstrike.robot.model import Floats, Integers
+from heelstrike.sim.run import AnyRun, Run
 
 
 def torque_cost(run: Run, *, start: float = -np.inf, end: float = np.inf) -> float:
@@ -54,35 +53,33 @@ def actuator_power(run: Run) -> Floats:
     return np.asarray(mean_over_intervals(run, run.torque) * 0.5 * (speed[:-1] + speed[1:]))
 
 
-def torque_bounds(run: Run) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+def torque_bounds(run: AnyRun, driven: Integers) -> tuple[Floats, Floats]:
     """Least and largest torque (nt, nu) that the motors can give in each row.
 
     They are the limits of the robot, and the speed-torque line where a motor has one.
 
     Parameters
     ----------
-    run : Run
+    run : Run or SpatialRun
         The run.
+    driven : (nu,) int
+        Index of the velocity that each actuator drives: `actuator_joint` of the model of a robot
+        in the plane, `actuator_velocity` in space.
 
     Returns
     -------
     lower, upper : (nt, nu) float
         N m, N of a slide; infinite without a limit.
-    by_speed : (nt, nu) bool
-        Whether it is the speed that limits the torque of the sign that the motor gave.
     """
     model = run.robot.model
-    joints = model.actuator_joint
     lower = np.broadcast_to(model.torque_lower, run.torque.shape)
     upper = np.broadcast_to(model.torque_upper, run.torque.shape)
-    stall = model.stall_torque[joints]
+    stall = model.stall_torque[driven]
     with np.errstate(invalid="ignore"):
         drag = np.where(
-            np.isfinite(stall), stall / model.no_load_speed[joints] * run.velocity[:, joints], 0.0
+            np.isfinite(stall), stall / model.no_load_speed[driven] * run.velocity[:, driven], 0.0
         )
-    slowest, fastest = np.maximum(lower, -stall - drag), np.minimum(upper, stall - drag)
-    by_speed = np.where(run.torque < 0.0, slowest > lower, fastest < upper)
-    return slowest, fastest, by_speed
+    return np.maximum(lower, -stall - drag), np.minimum(upper, stall - drag)
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,9 @@ def robots_named(
     first: Any = load_robot(names[0], **options | {"dimension": dimension})
     if not isinstance(first, SpatialRobot):
         return {}, {names[0]: first}
-    others = {name: load_robot(name, dimension=3, **options) for name in names[1:]}
+    # Options say how files are read; of built-in robots only one that comes first means them.
+    own = {name: {} if name in builtin_robots() else options for name in names[1:]}
+    others: Any = {name: load_robot(name, dimension=3, **how) for name, how in own.items()}
     return {names[0]: first, **others}, {}
 
 

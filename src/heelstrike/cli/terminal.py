@@ -68,6 +68,7 @@ _OPTIONS = {
     "projected=True": "--projected",
     "xacro=True": "--xacro",
     'mirror="average"': "--mirror",
+    "leave out mirror, or use dimension=2": "leave out --mirror",
     'forward="y"': "--forward y",
     "package_path=…": "--package-path",
 }

@@ -10,15 +10,16 @@ import numpy as np
 
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.spatial.ground import SpatialGround
+from heelstrike.errors import ControllerError
 from heelstrike.experiments.space import HOLD, LIMP, SpatialLaw, holds
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.spatial.placing import placed_in_space
 from heelstrike.sim.spatial.simulation import SpatialSimulation
-from heelstrike.view.live.dimension import Dimension
+from heelstrike.view.live.dimension import LiveDimension
 from heelstrike.view.live.stage import Control, Stage, friction_control, step_control, step_of
-from heelstrike.view.spatial.live import SPACE
+from heelstrike.view.spatial.live import LIVE_SPACE
 
 STEEPEST = 20.0
 """Degrees."""
@@ -70,19 +71,27 @@ class SpaceStage(Stage):
     ) -> None:
         self._robots, self._methods, self._method_names = dict(robots), methods, method_names
         self._first = first
+        robot = next(iter(self._robots.values()))
         for law in first.laws:
-            law.make(next(iter(self._robots.values())), first.step)
+            if law is HOLD and not robot.nu:
+                raise ControllerError(
+                    f"HoldPosture needs motors, and robot {robot.name!r} has none: leave the "
+                    "controller out"
+                )
+            law.make(robot, first.step)
 
     @property
-    def dimension(self) -> Dimension:
+    def dimension(self) -> LiveDimension:
         """Space."""
-        return SPACE
+        return LIVE_SPACE
 
     def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:
         """Robot, controller, friction, slope, height, method and step."""
         names = tuple(self._robots)
         name = values.get("robot", names[0])
-        laws = tuple(self._laws(self._robots[name]))
+        robot = self._robots[name]
+        laws = tuple(self._laws(robot))
+        drop = Control("above", "drop from", 0.0, high=HIGHEST, step=0.01, unit="m")
         first = self._first
         steepest = max(STEEPEST, abs(first.slope))
         return (
@@ -92,7 +101,7 @@ class SpaceStage(Stage):
             Control(
                 "slope", "slope", first.slope, low=-steepest, high=steepest, step=0.5, unit="°"
             ),
-            Control("above", "drop from", 0.0, high=HIGHEST, step=0.01, unit="m"),
+            *((drop,) if robot.floating else ()),
             Control("method", "method", first.method, self._method_names),
             step_control(first.step),
         )
@@ -117,7 +126,7 @@ class SpaceStage(Stage):
     def outline(self, values: Mapping[str, Any]) -> tuple[SpatialRobot, State, SpatialGround]:
         """Put the robot where it will begin."""
         robot, ground = self._robots[values["robot"]], self.ground(values)
-        return robot, placed_in_space(robot, ground, above=values["above"]), ground
+        return robot, placed_in_space(robot, ground, above=values.get("above", 0.0)), ground
 
     def ground(self, values: Mapping[str, Any], simulation: Any = None) -> SpatialGround:
         """Make the ground of a slope and a friction; of a simulation that goes on, its friction."""
@@ -129,4 +138,5 @@ class SpaceStage(Stage):
     def _laws(self, robot: SpatialRobot) -> dict[str, SpatialLaw]:
         """Laws that are offered for a robot, those first that were asked for."""
         stock = (HOLD, LIMP) if holds(robot) else (LIMP,)
-        return {law.name: law for law in (*self._first.laws, *stock)}
+        asked = (law for law in self._first.laws if law is not HOLD or robot.nu)
+        return {law.name: law for law in (*asked, *stock)}

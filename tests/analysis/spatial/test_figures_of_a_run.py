@@ -11,6 +11,7 @@ import pytest
 
 import heelstrike as hs
 from heelstrike.analysis.spatial import summarize_in_space
+from heelstrike.analysis.spatial.friction import face_friction
 from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 
@@ -49,6 +50,31 @@ def test_the_figures_of_a_slide(slide: hs.sim.spatial.SpatialRun) -> None:
     assert told["solver"]["solves"] == slide.solver.solves
     for word in ("distance", "slip", "penetration", "computing time"):
         assert word in str(summary)
+
+
+def test_friction_is_that_of_the_box_under_a_point(tmp_path: Path) -> None:
+    """It slides on a box of μ = 0.2 over ground of 0.9, until it hits a wall, where none counts."""
+    path = tmp_path / "block.xml"
+    path.write_text(BLOCK)
+    robot = hs.load_robot(path, dimension=3)
+    state = robot.reference_state()
+    state.q[2] += 0.1
+    state.v[0] = 0.4
+    boxes = (
+        hs.Box(center=(0.0, 0.0, 0.05), size=(2.0, 2.0, 0.1), friction=0.2),
+        hs.Box(center=(0.3, 0.0, 0.5), size=(0.37, 2.0, 1.0), friction=0.5),
+    )
+    run = hs.simulate(
+        robot, state=state, duration=0.1, ground=hs.SpatialGround(friction=0.9, boxes=boxes)
+    )
+    friction = face_friction(run)[:, run.contact_point[0, :, 2] < 0.11]  # the upper meet the wall
+    np.testing.assert_array_equal(friction[0], 0.2)
+    at_wall = np.isnan(friction).any(axis=1)
+    hit = run.world_force[..., 0].sum(axis=1) < -0.3 * robot.weight  # more than friction
+    assert hit.any()
+    assert at_wall[hit].all()
+    assert not at_wall[: int(np.argmax(at_wall))].any()
+    assert run.summary().friction_use_max == pytest.approx(1.0, abs=1e-6)
 
 
 def test_the_zero_moment_point_of_a_slide(slide: hs.sim.spatial.SpatialRun) -> None:

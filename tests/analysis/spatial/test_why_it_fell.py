@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,13 @@ import pytest
 from live_humanoid import humanoid
 
 import heelstrike as hs
-from heelstrike.analysis.diagnosis.symptoms import Cause
+from heelstrike.analysis.diagnosis.symptoms import BRIEF, Cause
 from heelstrike.analysis.spatial.diagnosis import first_cause_in_space, spatial_limits
+from heelstrike.errors import ViewError
 from heelstrike.experiments.space import hold
-from heelstrike.sim.spatial.run import SpatialRun
+from heelstrike.sim.spatial.run import RECORDED, SpatialRun
+from heelstrike.view.page.verdict import happened
+from heelstrike.view.spatial.page import page_in_space
 from heelstrike.view.spatial.verdict import judge_in_space
 
 
@@ -76,3 +80,73 @@ def test_one_that_stands_has_limits_and_no_cause(robot: hs.SpatialRobot, tmp_pat
     page = run.save_html(tmp_path / "run.html").read_text()
     assert verdict.headline in re.sub(r"&#x27;|&#39;", "'", page)
     assert "How close to each limit" in page
+
+
+def test_a_fall_late_in_a_long_run_is_seen_as_early_as_in_a_short_one(
+    robot: hs.SpatialRobot,
+) -> None:
+    """The same push after 13 s: the same cause as after 0.3 s, as long after the push."""
+    short = run_of(robot, (260.0, 0.0, 0.0), friction=2.0)
+    late = 13.0
+    stood = np.concatenate((np.arange(0.0, late, 1e-3), late + short.time))
+    rows = np.concatenate(
+        (np.zeros(len(stood) - len(short.time), dtype=int), range(len(short.time)))
+    )
+    run = replace(
+        short, time=stood, pushes=(replace(short.pushes[0], start=late + 0.3),),
+        **{name: getattr(short, name)[rows] for name in RECORDED},
+    )  # fmt: skip
+    early, found = first_cause_in_space(short), first_cause_in_space(run)
+    assert early is not None
+    assert found is not None
+    assert found.cause is Cause.TIPPED_FORWARD
+    assert found.time == pytest.approx(late + early.time, abs=BRIEF)
+
+
+def test_a_run_at_a_limit_is_not_told_that_nothing_needs_to_change(robot: hs.SpatialRobot) -> None:
+    run = run_of(robot, (0.0, 30.0, 0.0))
+    headline = judge_in_space(run).headline
+    assert "No limit is reached" in headline
+    assert "nothing needs to change" in headline
+    slack = run.torque.copy()
+    slack[40] = robot.model.torque_upper
+    headline = judge_in_space(replace(run, torque=slack)).headline
+    assert "First limit reached" in headline
+    assert "nothing needs to change" not in headline
+
+
+@pytest.mark.parametrize(
+    ("quantity", "cause"),
+    [("torque", Cause.TORQUE_LIMIT), ("stop_torque", Cause.JOINT_STOP), ("slip", Cause.SLIPPED)],
+)
+def test_causes_that_are_no_tips(robot: hs.SpatialRobot, quantity: str, cause: Cause) -> None:
+    """A record that shows one of them before it ends in a fall, and nothing else."""
+    stands = run_of(robot, (0.0, 0.0, 0.0))
+    last = int(np.searchsorted(stands.time, 0.5))
+    short = {name: getattr(stands, name)[:last] for name in ("time", *RECORDED)}
+    short[quantity] = short[quantity].copy()
+    where = {
+        "torque": (robot.actuator_index("neck"), 5.0, "neck"),
+        "stop_torque": (int(robot.model.first_velocity[robot.joint_index("neck")]), 1.0, "neck"),
+        "slip": (list(robot.feet[0].contacts), 1.0, robot.feet[0].name),
+    }
+    place, value, name = where[quantity]
+    short[quantity][300:, place] = value
+    fall = first_cause_in_space(replace(stands, **short, status=hs.RunStatus.FELL))
+    assert fall is not None
+    assert fall.cause is cause
+    assert fall.where == name
+    assert fall.time == pytest.approx(short["time"][300])
+
+
+def test_what_happened_at_one_time_is_told_whole(robot: hs.SpatialRobot) -> None:
+    """Pushes on links by index, and two things at one time, each in a row of the page."""
+    run = run_of(robot, (260.0, 0.0, 0.0), friction=2.0)
+    push = replace(run.pushes[0], link=robot.link_names.index("trunk"))
+    run = replace(run, pushes=(push, push))
+    rows = happened(judge_in_space(run), run)
+    assert [what for _, what in rows].count("a push of 260 N on the trunk, for 0.1 s") == 2
+    assert page_in_space(run).count("a push of 260 N on the trunk") >= 2
+    assert [time for time, _ in rows] == sorted(time for time, _ in rows)
+    with pytest.raises(ViewError, match=r"in space: run\.save_html"):
+        hs.report([run], "report.html")  # type: ignore[list-item]

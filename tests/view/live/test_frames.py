@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -46,6 +47,19 @@ def test_a_frame_holds_the_row() -> None:
     energy = field(layout, frames, "energy")
     np.testing.assert_allclose(energy[:, 0] + energy[:, 1], energy[:, 2])
     assert np.isnan(field(layout, frames, "push")).all()
+
+
+def test_feet_on_one_side_are_told_apart() -> None:
+    """Both feet of the left of a robot of four are not "left"."""
+    robot = hs.load_robot("bravo7")
+    names = ("rear_left_foot", "front_left_foot")
+    feet = tuple(dataclasses.replace(f, name=n) for f, n in zip(robot.feet, names, strict=True))
+    four = SimpleNamespace(feet=feet)
+    layout = Layout(robot)
+    plain = [trace.label for trace in layout.of_feet("used", "", "1").traces]
+    assert plain == ["right", "left"]
+    layout.robot = four
+    assert [t.label for t in layout.of_feet("used", "", "1").traces] == ["rear left", "front left"]
 
 
 def test_an_impact_between_two_frames_is_seen_with_its_impulse() -> None:

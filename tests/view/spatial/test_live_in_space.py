@@ -20,6 +20,7 @@ from heelstrike.sim.spatial.record import SpatialEventKind
 from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.view.live.session import Session
 from heelstrike.view.live.stage import GivenStage, Stage
+from heelstrike.view.spatial.live import LIVE_SPACE
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +106,24 @@ def test_joints_are_moved_and_the_robot_stands_again(robot: hs.SpatialRobot) -> 
     assert "no slider" in ask(session, "pose", joint="root", value=0.0)
 
 
+def test_a_joint_is_moved_on_a_box_as_on_the_ground(robot: hs.SpatialRobot) -> None:
+    """The plane is 0.2 m below: the robot stays on its box, and stands in nothing."""
+    box = hs.Box(center=(0.0, 0.0, 0.1), size=(2.0, 2.0, 0.2))
+    start = robot.reference_state()
+    start.q[2] += 0.2
+    simulation = hs.Simulation(
+        robot, hs.HoldPosture(robot, kp=300.0, kd=8.0), state=start,
+        ground=hs.SpatialGround(boxes=(box,)),
+    )  # fmt: skip
+    simulation.advance(0.01)
+    before = simulation.state.q[2]
+    for angle in (0.2, -0.2):
+        state = LIVE_SPACE.moved(simulation, "left_ankle_joint", angle)
+        simulation.state = state
+        assert float(simulation.contacts.gap.min()) == pytest.approx(0.0, abs=1e-9)
+        assert 0.0 < state.q[2] - before < 0.1
+
+
 def test_friction_acts_at_once_and_events_are_told(robot: hs.SpatialRobot) -> None:
     session, shown = watching(standing(robot))
     go_on(session, 0.05)
@@ -182,3 +201,34 @@ def test_a_law_of_the_plane_is_told_what_it_is_called_with(
     first = FirstInSpace(method="time-stepping", laws=[spatial_law_called(f"{law}:make")])
     with pytest.raises(ControllerError, match="is called with a robot, which it does not take"):
         SpaceStage({"small.xml": robot}, method_called, METHODS_IN_SPACE, first)
+
+
+def test_what_a_robot_cannot_do_is_not_offered(robot: hs.SpatialRobot, tmp_path: Path) -> None:
+    """Hold a posture without motors, be dropped without floating."""
+    path = tmp_path / "swing.xml"
+    path.write_text(
+        '<mujoco model="swing"><worldbody><body name="arm" pos="0 0 1"><joint name="pivot" '
+        'axis="0 1 0"/><geom type="sphere" size="0.05" pos="0.1 0 -0.3" mass="1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    swing = hs.load_robot(path, dimension=3)
+    first = FirstInSpace(method="time-stepping", laws=[spatial_law_called("HoldPosture")])
+    with pytest.raises(ControllerError, match="has none"):
+        SpaceStage({"swing": swing}, method_called, METHODS_IN_SPACE, first)
+    stage = SpaceStage({"small": robot, "swing": swing}, method_called, METHODS_IN_SPACE, first)
+    assert "above" in stage.fitted({})
+    values = stage.fitted({"robot": "swing"})
+    assert "above" not in values
+    offered = {control.name: control for control in stage.controls(values)}
+    assert offered["controller"].options == ("no torque",)
+    assert stage.simulation(values, lambda words: None).robot is swing
+
+
+def test_the_friction_shown_is_that_of_the_ground_and_not_of_a_box(robot: hs.SpatialRobot) -> None:
+    box = hs.Box(center=(3.0, 0.0, 0.1), size=(1.0, 1.0, 0.2), friction=0.1)
+    ground = hs.SpatialGround(friction=0.8, boxes=(box,))
+    (control,) = GivenStage(standing(robot, ground=ground)).controls({})
+    assert control.value == 0.8
+    assert "but for boxes" in control.label
+    (control,) = GivenStage(standing(robot)).controls({})
+    assert control.label == "friction μ"

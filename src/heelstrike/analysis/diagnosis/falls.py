@@ -10,13 +10,10 @@ from heelstrike.analysis.diagnosis.symptoms import Cause, Symptom, Walk, find_sy
 from heelstrike.field_texts import dataclass
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.push import Push
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import AnyRun, Run
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
-    from heelstrike.sim.spatial.run import SpatialRun
-
-    AnyRun = Run | SpatialRun
 
 RECOVERED = 1.5
 """Steps without a symptom after which a robot has recovered from what was before."""

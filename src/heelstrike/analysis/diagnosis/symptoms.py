@@ -30,7 +30,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.sole import has_length, soles
 from heelstrike.sim.closed_sets import RunStatus
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import AnyRun, Run
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
@@ -207,21 +207,8 @@ class Walk:
 
     @cached_property
     def full_torque(self) -> tuple[Rows, Floats, Rows]:
-        """Where motors give all that they can, that bound, and whether their speed sets it.
-
-        Each (nt, nu), the bound in N m.
-        """
-        run = self.run
-        lower, upper, _ = torque_bounds(run)
-        # Beyond the speed without load both bounds have one sign: then a motor can only brake.
-        with np.errstate(invalid="ignore"):
-            least = run.torque <= lower + (1.0 - REACHED) * np.abs(lower)
-            most = run.torque >= upper - (1.0 - REACHED) * np.abs(upper)
-        bound = np.where(most | (~least & (run.torque >= 0.0)), upper, lower)
-        full = np.isfinite(bound) & (least | most)
-        model = run.robot.model
-        by_speed = np.where(bound == upper, upper < model.torque_upper, lower > model.torque_lower)
-        return full, bound, by_speed
+        """Where motors give all that they can; see :func:`full_torque`."""
+        return full_torque(self.run, self.run.robot.model.actuator_joint)
 
     @cached_property
     def tilt(self) -> Floats:
@@ -265,6 +252,24 @@ class Walk:
         return bool(np.isfinite(self.tilt).any())
 
 
+def full_torque(run: AnyRun, driven: Integers) -> tuple[Rows, Floats, Rows]:
+    """Where motors give all that they can, that bound, and whether their speed sets it.
+
+    Each (nt, nu), the bound in N m; see :func:`~heelstrike.analysis.actuation.torque_bounds` for
+    what they drive.
+    """
+    lower, upper = torque_bounds(run, driven)
+    # Beyond the speed without load both bounds have one sign: then a motor can only brake.
+    with np.errstate(invalid="ignore"):
+        least = run.torque <= lower + (1.0 - REACHED) * np.abs(lower)
+        most = run.torque >= upper - (1.0 - REACHED) * np.abs(upper)
+    bound = np.where(most | (~least & (run.torque >= 0.0)), upper, lower)
+    full = np.isfinite(bound) & (least | most)
+    model = run.robot.model
+    by_speed = np.where(bound == upper, upper < model.torque_upper, lower > model.torque_lower)
+    return full, bound, by_speed
+
+
 def find_symptoms(walk: Walk) -> tuple[Symptom, ...]:
     """Find what goes wrong in a run, in the order in which it began.
 
@@ -276,12 +281,12 @@ def find_symptoms(walk: Walk) -> tuple[Symptom, ...]:
     return tuple(sorted(found, key=lambda each: each.time))
 
 
-def _spells(run: Run, mask: NDArray[np.bool_], brief: float = BRIEF) -> list[tuple[int, int]]:
+def spells(time: Floats, mask: Rows, brief: float = BRIEF) -> list[tuple[int, int]]:
     """First and last rows of the stretches in which something holds, short breaks left out."""
     rows = np.flatnonzero(mask)
     if not len(rows):
         return []
-    ends = np.flatnonzero((np.diff(rows) > 1) & (np.diff(run.time[rows]) > brief))
+    ends = np.flatnonzero((np.diff(rows) > 1) & (np.diff(time[rows]) > brief))
     return list(
         zip(rows[np.append(0, ends + 1)].tolist(), rows[np.append(ends, -1)].tolist(), strict=True)
     )
@@ -295,7 +300,7 @@ def _slips(walk: Walk) -> Iterator[Symptom]:
     friction = friction_coefficient(run)
     for foot in run.robot.feet:
         contacts = list(foot.contacts)
-        for first, last in _spells(run, np.asarray(sliding[:, contacts].any(axis=1))):
+        for first, last in spells(run.time, np.asarray(sliding[:, contacts].any(axis=1))):
             after = min(last + 1, len(slid) - 1)
             distance = float((slid[after] - slid[first])[contacts].max())
             inside = slice(first, last + 1)
@@ -319,7 +324,7 @@ def _tips(walk: Walk) -> Iterator[Symptom]:
     """
     run, edge = walk.run, walk.edge
     lost = np.asarray(~(edge == FLAT).any(axis=1))
-    for first, last in _spells(run, lost):
+    for first, last in spells(run.time, lost):
         on = edge[first][edge[first] != NOTHING_PUSHES]
         if run.time[last] - run.time[first] < ROLLING or not len(on) or abs(on.sum()) != len(on):
             continue
@@ -395,7 +400,7 @@ def _torques_at_limits(walk: Walk) -> Iterator[Symptom]:
     run, error = walk.run, walk.error
     full, bound, by_speed = walk.full_torque
     for i, name in enumerate(run.robot.actuator_names):
-        for first, last in _spells(run, full[:, i], 0.5 * HELD):
+        for first, last in spells(run.time, full[:, i], 0.5 * HELD):
             held = float(run.time[last] - run.time[first])
             missed = np.nan
             if error is not None:
@@ -429,7 +434,7 @@ def _joints_at_stops(walk: Walk) -> Iterator[Symptom]:
             planned = float(np.minimum(*ends).min())
         if abs(planned) < CLEAR_OF_STOP * (room if np.isfinite(room) else 1.0):
             continue  # its gait goes there, and not beyond
-        for first, last in _spells(run, pressed):
+        for first, last in spells(run.time, pressed):
             if run.time[last] - run.time[first] < HELD:
                 continue
             yield Symptom(
@@ -448,7 +453,7 @@ def _legs_that_fold(walk: Walk) -> Iterator[Symptom]:
         length = np.hypot(*(hip - places[:, i]).T)
         share = length / length[0]
         folded = walk.carrying[:, i] & (share < SHORTENING)
-        for first, last in _spells(run, folded):
+        for first, last in spells(run.time, folded):
             shortest = float(share[first : last + 1].min())
             if shortest < SHORT_LEG:
                 yield Symptom(
@@ -463,7 +468,7 @@ def _runaways(walk: Walk) -> Iterator[Symptom]:
     for i, name in enumerate(run.robot.actuator_names):
         speed = run.velocity[:, run.robot.model.actuator_joint[i]]
         driven = (np.abs(speed) * walk.pace > BEGINS_TO_RUN) & (run.torque[:, i] * speed > 0.0)
-        for first, last in _spells(run, driven, 0.25 * HELD):
+        for first, last in spells(run.time, driven, 0.25 * HELD):
             fastest = float(np.abs(speed[first : last + 1]).max())
             if fastest * walk.pace > RUNAWAY:
                 yield Symptom(
@@ -484,7 +489,7 @@ def _departures(walk: Walk) -> Iterator[Symptom]:
     let = (away > LEAVES) & (run.torque * error >= 0.0) & ~full
     found = []
     for i, name in enumerate(run.robot.actuator_names):
-        for first, last in _spells(run, let[:, i], 0.5 * HELD):
+        for first, last in spells(run.time, let[:, i], 0.5 * HELD):
             if away[first : last + 1, i].max() < MISSED or _is_pushed(run, float(run.time[first])):
                 continue
             soon = run.time[first : last + 1] <= run.time[first] + 4.0 * HELD
@@ -517,7 +522,7 @@ def _ends(walk: Walk) -> Iterator[Symptom]:
         yield Symptom(Cause.CONTROLLER, end, end)
     elif run.status in (RunStatus.DIVERGED, RunStatus.SOLVER_FAILED):
         speed = np.abs(run.velocity[:, run.robot.model.actuator_joint]).max(axis=1, initial=0.0)
-        wild = _spells(run, ~(speed * walk.pace <= WILD))
+        wild = spells(run.time, ~(speed * walk.pace <= WILD))
         begin = wild[-1][0] if wild and wild[-1][1] == len(run.time) - 1 else len(run.time) - 1
         yield Symptom(Cause.NUMERICAL, float(run.time[begin]), end)
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.analysis.actuation import torque_bounds
 from heelstrike.analysis.diagnosis.falls import SUNK, Fall, fall_of
 from heelstrike.analysis.diagnosis.limits import (
-    REACHED,
     Limit,
     largest,
     limit_of_range,
@@ -26,7 +26,10 @@ from heelstrike.analysis.diagnosis.symptoms import (
     STEP_OF_HEIGHT,
     Cause,
     Symptom,
+    full_torque,
+    spells,
 )
+from heelstrike.analysis.spatial.friction import face_friction, foot_friction
 from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.support import pushing_in_space
 from heelstrike.analysis.spatial.zero_moment_point import (
@@ -40,8 +43,8 @@ from heelstrike.sim.spatial.run import SpatialRun
 
 Rows = NDArray[np.bool_]
 
-MOST_LOOKED_AT = 600
-"""Rows of a run in which the zero moment point is looked for."""
+LOOKED_AT = 600
+"""Rows of a run in which the zero moment point is looked for: more in a long run."""
 AT_THE_EDGE = 2e-3
 """Distance of the zero moment point from the edge of the support polygon at which a robot tips, in
 heights of the centre of mass."""
@@ -70,11 +73,12 @@ def spatial_limits(run: SpatialRun, *, until: float = math.inf) -> tuple[Limit, 
 
 def _limits(run: SpatialRun, shown: Rows) -> Iterator[Limit]:
     time, robot, model = run.time, run.robot, run.robot.model
+    friction = face_friction(run)
     for foot in robot.feet:
-        share = foot_friction(run, foot.contacts)
+        share, coefficient = foot_friction(run, friction, foot.contacts)
         if (found := largest(time, share, shown)) is not None:
             k, used, reached = found
-            mu = run.ground.friction
+            mu = coefficient[k]
             detail = f"{used * mu:.3g} of {mu:.3g} at {time[k]:.3g} s"
             name = f"friction of the {foot.name.replace('_', ' ')}"
             yield Limit(name, "friction", used, float(time[k]), reached, detail)
@@ -87,7 +91,7 @@ def _limits(run: SpatialRun, shown: Rows) -> Iterator[Limit]:
         inside, when = 1e3 * max(float(zmp.margin[k]), 0.0), float(time[rows[k]])
         detail = f"{inside:.3g} mm from the edge of the support polygon at {when:.3g} s"
         yield Limit("zero moment point", "zero moment point", used, when, reached, detail)
-    lower, upper = torque_ends(run)
+    lower, upper = torque_bounds(run, model.actuator_velocity)
     for i, name in enumerate(robot.actuator_names):
         k = int(model.actuator_velocity[i])
         hinge = int(model.joint_kind[model.velocity_joint[k]]) != SLIDE
@@ -105,7 +109,9 @@ def _limits(run: SpatialRun, shown: Rows) -> Iterator[Limit]:
 
 def _looked_at(run: SpatialRun) -> tuple[Integers, SpatialZeroMomentPoint]:
     """Rows in which the zero moment point is looked for, evenly spread, and where it is."""
-    every = max(1, -(-len(run.time) // MOST_LOOKED_AT))
+    lasts = float(run.time[-1] - run.time[0])
+    most = max(LOOKED_AT, int(lasts / (0.5 * BRIEF)))  # no further apart than a tip is looked for
+    every = max(1, -(-len(run.time) // most))
     rows = np.arange(0, len(run.time), every)
     return rows, spatial_zero_moment_point(run, rows)
 
@@ -119,29 +125,6 @@ def _room(polygon: Floats) -> float:
     length = np.linalg.norm(edge, axis=1)
     apart = np.linalg.norm(np.cross(edge, away), axis=1) / np.where(length > 0.0, length, np.inf)
     return float(apart[length > 0.0].min())
-
-
-def foot_friction(run: SpatialRun, contacts: tuple[int, ...]) -> Floats:
-    """Share (nt,) of the friction of some contact points together that is used; NaN in the air."""
-    own = list(contacts)
-    force = run.contact_force[:, own]
-    allowed = (force[..., 0] * run.robot.model.friction_scale[own]).sum(axis=1)
-    allowed = allowed * run.ground.friction
-    sideways = np.linalg.norm(force[..., 1:].sum(axis=1), axis=-1)
-    pressed = allowed > 1e-6 * run.robot.weight
-    return np.where(pressed, sideways / np.where(pressed, allowed, 1.0), np.nan)
-
-
-def torque_ends(run: SpatialRun) -> tuple[Floats, Floats]:
-    """Least and largest torque (nt, nu) of each motor, at the speed that it has, in N m."""
-    model = run.robot.model
-    k = model.actuator_velocity
-    stall, fastest = model.stall_torque[k], model.no_load_speed[k]
-    with np.errstate(invalid="ignore"):
-        drag = np.where(np.isfinite(stall), stall / fastest * run.velocity[:, k], 0.0)
-    return (
-        np.maximum(model.torque_lower, -stall - drag), np.minimum(model.torque_upper, stall - drag)
-    )  # fmt: skip
 
 
 def first_cause_in_space(run: SpatialRun) -> Fall | None:
@@ -189,26 +172,16 @@ def _symptoms(run: SpatialRun, height: float, pace: float, center: Floats) -> It
         yield Symptom(Cause.CONTROLLER, end, end)
     yield from _slips(run, height, pace)
     yield from _tips(run, height, center)
-    lower, upper = torque_ends(run)
     model = run.robot.model
+    full, bound, by_speed = full_torque(run, model.actuator_velocity)
     for i, name in enumerate(run.robot.actuator_names):
-        torque = run.torque[:, i]
-        ends = np.where(torque < 0.0, lower[:, i], upper[:, i])
-        full = (
-            np.isfinite(ends) & (torque * ends > 0.0) & (np.abs(torque) >= REACHED * np.abs(ends))
-        )
-        for a, b in _stretches(time, full, HELD_UNSEEN):
-            still = model.torque_upper[i] if torque[a] > 0.0 else model.torque_lower[i]
-            slower = abs(ends[a]) < REACHED * min(abs(still), model.stall_torque[
-                model.actuator_velocity[i]
-            ])  # fmt: skip
-            cause = Cause.SPEED_LIMIT if slower else Cause.TORQUE_LIMIT
-            told = {"limit_Nm": float(abs(ends[a])), "missed_rad": 0.0}
+        for a, b in _lasting(time, full[:, i], HELD_UNSEEN):
+            cause = Cause.SPEED_LIMIT if by_speed[a, i] else Cause.TORQUE_LIMIT
+            told = {"limit_Nm": float(bound[a, i]), "missed_rad": 0.0}
             yield Symptom(cause, float(time[a]), float(time[b]), name, told)
     for joint, name in enumerate(run.robot.joint_names):
-        first = int(model.first_velocity[joint])
-        pressed = np.abs(run.stop_torque[:, first]) > 0.0
-        for a, b in _stretches(time, pressed, HELD_UNSEEN):
+        pressed = (run.stop_torque[:, model.velocity_joint == joint] != 0.0).any(axis=1)
+        for a, b in _lasting(time, pressed, HELD_UNSEEN):
             yield Symptom(Cause.JOINT_STOP, float(time[a]), float(time[b]), name)
 
 
@@ -217,12 +190,15 @@ def _slips(run: SpatialRun, height: float, pace: float) -> Iterator[Symptom]:
     pressed = pushing_in_space(run)
     speed = np.where(pressed, np.linalg.norm(run.slip, axis=-1), 0.0)
     held = np.diff(run.time, append=run.time[-1:])
+    friction = face_friction(run)
     for foot in run.robot.feet:
         fastest = speed[:, list(foot.contacts)].max(axis=1)
-        for a, b in _stretches(run.time, fastest > SLOW * height / pace, 0.0):
+        for a, b in _lasting(run.time, fastest > SLOW * height / pace, 0.0):
             slid = float((fastest[a : b + 1] * held[a : b + 1]).sum())
             if slid >= SLID * height:
-                told = {"distance_m": slid, "friction": run.ground.friction}
+                _, coefficient = foot_friction(run, friction, foot.contacts)
+                known = np.isfinite(coefficient[a])
+                told = {"distance_m": slid} | ({"friction": float(coefficient[a])} if known else {})
                 yield Symptom(
                     Cause.SLIPPED, float(run.time[a]), float(run.time[b]), foot.name, told
                 )
@@ -234,7 +210,7 @@ def _tips(run: SpatialRun, height: float, center: Floats) -> Iterator[Symptom]:
     time = run.time[rows]
     with np.errstate(invalid="ignore"):
         edge = zmp.margin < AT_THE_EDGE * height
-    for a, b in _stretches(time, edge, ROLLING):
+    for a, b in _lasting(time, edge, ROLLING):
         moved = center[rows[b]] - zmp.polygon[a].mean(axis=0)
         heading = _heading(run, int(rows[a]))
         ahead = moved[0] * heading[0] + moved[1] * heading[1]
@@ -256,14 +232,6 @@ def _heading(run: SpatialRun, row: int) -> Floats:
     return ahead / size if size > 0.0 else np.array([1.0, 0.0])
 
 
-def _stretches(time: Floats, holds: Rows, least: float) -> list[tuple[int, int]]:
-    """First and last rows of stretches that last (s), breaks of a moment left out."""
-    rows = np.flatnonzero(holds)
-    if not len(rows):
-        return []
-    breaks = np.flatnonzero(np.diff(time[rows]) > BRIEF)
-    first = rows[np.concatenate(([0], breaks + 1))]
-    last = rows[np.concatenate((breaks, [len(rows) - 1]))]
-    return [
-        (int(a), int(b)) for a, b in zip(first, last, strict=True) if time[b] - time[a] >= least
-    ]
+def _lasting(time: Floats, holds: Rows, least: float) -> list[tuple[int, int]]:
+    """First and last rows of the stretches in which something holds so long (s)."""
+    return [(a, b) for a, b in spells(time, holds) if time[b] - time[a] >= least]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from heelstrike.analysis.spatial.friction import face_friction, foot_friction
 from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.support import pushing_in_space
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
@@ -47,8 +48,8 @@ class SpatialSummary(ToldSummary):
     zmp_margin_min_m: float
     """Least distance of the zero moment point to the edges of the support polygon."""
     friction_use_max: float
-    """Largest |f_t| / (μ f_n) of all contact points together on the plane of the ground; NaN where
-    boxes have a friction of their own."""
+    """Largest |f_t| / (μ f_n) of all contact points together, each with the friction of the plane
+    or box under it; rows in which one is at a wall, too, do not count."""
     slip_max_m: float
     """Largest distance that a contact point slid while pressed, over the whole run."""
     penetration_max_m: float
@@ -171,15 +172,8 @@ def _slip(run: SpatialRun) -> float:
 
 def _friction_use(run: SpatialRun) -> float:
     """Largest share of the friction that all points together had."""
-    if any(box.friction is not None for box in run.ground.boxes) or not run.robot.nc:
-        return UNKNOWN
-    allowed = run.contact_force[..., 0] * run.robot.model.friction_scale * run.ground.friction
-    total = allowed.sum(axis=1)
-    sideways = np.linalg.norm(run.contact_force[..., 1:].sum(axis=1), axis=-1)
-    pressed = pushing_in_space(run).any(axis=1) & (total > 0.0)
-    return (
-        float((sideways[pressed] / total[pressed]).max(initial=0.0)) if pressed.any() else UNKNOWN
-    )
+    share, _ = foot_friction(run, face_friction(run), range(run.robot.nc))
+    return float(np.fmax.reduce(share, initial=UNKNOWN))
 
 
 # What a person reads, in letters that the consoles of Windows have.

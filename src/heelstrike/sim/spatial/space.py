@@ -52,6 +52,7 @@ from heelstrike.sim.spatial.table import (
     WALL,
     most_rows_of,
 )
+from heelstrike.tolerances import STANDING_GAP
 
 
 class Space(Dimension):
@@ -275,6 +276,21 @@ class SpatialLook:
         own.q[:], own.v[:] = q, v
         _find()(self._robot.model, ground.model(), own)
         return own.contacts
+
+    def friction(self, ground: SpatialGround, q: Floats, v: Floats) -> Floats:
+        """Coefficient (nc,) of the face under each contact point; NaN of one that is at a wall too.
+
+        What a record has of such a point is the sum of two forces, each with its own cone.
+        """
+        own = spatial_mold(self._robot, walls=has_walls(ground)).cast()
+        find_state(
+            self._robot.model, ground.model(), q, v, own.equations, own.blocks, own.contacts,
+            own.feet,
+        )  # fmt: skip
+        table, points = own.blocks, slice(self._robot.nc)
+        at_wall = table.wall[points] >= 0
+        at_wall[at_wall] = table.gap[table.wall[points][at_wall]] <= STANDING_GAP
+        return np.where(at_wall, np.nan, table.friction[points])
 
     def at_contacts(self, ground: SpatialGround, memory: SpatialMemory) -> Contacts:
         """Return the contact points of the state now, with the forces of the step before."""

@@ -15,21 +15,19 @@ from heelstrike.view.live.layout import FrameLayout
 if TYPE_CHECKING:
     from heelstrike.contact.ground import Ground
     from heelstrike.contact.spatial.ground import SpatialGround
-    from heelstrike.robot.spatial.robot import SpatialRobot
-    from heelstrike.sim.run import Event, Run
+    from heelstrike.sim.dimension import AnyRobot
+    from heelstrike.sim.run import Event
     from heelstrike.sim.simulation import Simulation
-    from heelstrike.sim.spatial.run import SpatialEvent, SpatialRun
+    from heelstrike.sim.spatial.run import SpatialEvent
     from heelstrike.sim.spatial.simulation import SpatialSimulation
 
-    AnyRobot = Robot | SpatialRobot
     AnyGround = Ground | SpatialGround
-    AnyRun = Run | SpatialRun
     AnyEvent = Event | SpatialEvent
     AnySimulation = Simulation | SpatialSimulation
     Outline = tuple[AnyRobot, State, AnyGround]
 
 
-class Dimension(ABC):
+class LiveDimension(ABC):
     """Names and answers that depend on the dimension; all else of a live view is the same.
 
     Attributes
@@ -91,12 +89,12 @@ class Dimension(ABC):
         """Index of what the picture marks for an event, -1 for nothing."""
 
 
-def dimension_of(robot: Any) -> Dimension:
+def dimension_of(robot: Any) -> LiveDimension:
     """Return what a robot needs; what is for space is loaded by those who have such a robot."""
     if isinstance(robot, Robot):
-        from heelstrike.view.live.plane import PLANE
+        from heelstrike.view.live.plane import LIVE_PLANE
 
-        return PLANE
-    from heelstrike.view.spatial.live import SPACE
+        return LIVE_PLANE
+    from heelstrike.view.spatial.live import LIVE_SPACE
 
-    return SPACE
+    return LIVE_SPACE

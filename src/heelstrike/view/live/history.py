@@ -14,7 +14,8 @@ from heelstrike.sim.run import QUANTITIES
 from heelstrike.tolerances import SAME_ROW
 
 if TYPE_CHECKING:
-    from heelstrike.view.live.dimension import AnyEvent, AnyRun
+    from heelstrike.sim.run import AnyRun
+    from heelstrike.view.live.dimension import AnyEvent
 
 MOST_ROWS = 100_000
 """Rows that are kept; some 60 MB of bravo7."""

@@ -102,12 +102,14 @@ class FrameLayout(ABC):
         **ends: Any,
     ) -> Plot:  # fmt: skip
         """One panel with a curve for each foot."""
+        names = [side_of(foot.name) for foot in self.robot.feet]
+        if len(set(names)) < len(names):  # two on a side
+            names = [in_words(foot.name) for foot in self.robot.feet]
         traces = [
             Trace(
-                None, side_of(foot.name).removesuffix(" foot"), i, DASHED if i else 0,
-                at=self.begin[field] + i,
+                None, name.removesuffix(" foot"), i, DASHED if i else 0, at=self.begin[field] + i
             )
-            for i, foot in enumerate(self.robot.feet)
+            for i, name in enumerate(names)
         ]  # fmt: skip
         return Plot(title, unit, traces, limits, group="feet", **ends)
 

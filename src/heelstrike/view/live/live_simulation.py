@@ -9,11 +9,13 @@ from heelstrike.errors import SimulationError
 from heelstrike.sim.closed_sets import OnError
 from heelstrike.sim.push import Push
 from heelstrike.sim.simulation import CAN_GO_ON
-from heelstrike.view.live.dimension import Dimension, dimension_of
+from heelstrike.view.live.dimension import LiveDimension, dimension_of
 from heelstrike.view.live.stage import snapshot_of
 
 if TYPE_CHECKING:
-    from heelstrike.view.live.dimension import AnyGround, AnyRobot, AnyRun, AnySimulation
+    from heelstrike.sim.dimension import AnyRobot
+    from heelstrike.sim.run import AnyRun
+    from heelstrike.view.live.dimension import AnyGround, AnySimulation
 
 KEEP_EVERY = 0.25
 """Simulated seconds between two snapshots."""
@@ -31,7 +33,7 @@ class LiveSimulation:
     ----------
     simulation : Simulation or SpatialSimulation
         The simulation; its record is taken from it piece by piece.
-    dimension : Dimension, optional
+    dimension : LiveDimension, optional
         That of its robot.
 
     Attributes
@@ -40,7 +42,7 @@ class LiveSimulation:
         Link, point in its axes (m) and force (N) of what each viewer pulls at.
     """
 
-    def __init__(self, simulation: AnySimulation, dimension: Dimension | None = None) -> None:
+    def __init__(self, simulation: AnySimulation, dimension: LiveDimension | None = None) -> None:
         self.simulation: Any = simulation
         self._dimension = dimension or dimension_of(simulation.robot)
         if simulation.on_error is OnError.RAISE:  # nobody is there to catch it

@@ -16,7 +16,7 @@ from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import QUANTITIES, Event, Run
 from heelstrike.sim.simulation import Simulation
-from heelstrike.view.live.dimension import Dimension
+from heelstrike.view.live.dimension import LiveDimension
 from heelstrike.view.live.frames import Layout
 from heelstrike.view.live.light import light_of
 from heelstrike.view.page.events import contact_of, kind_in_words, place_of
@@ -26,7 +26,7 @@ SEEN_TO_STAND = 1e-3
 """Metres above the ground up to which a robot stands on it."""
 
 
-class Plane(Dimension):
+class Plane(LiveDimension):
     """Robots in the plane."""
 
     name = "plane"
@@ -83,4 +83,4 @@ class Plane(Dimension):
         return contact_of(event)
 
 
-PLANE = Plane()
+LIVE_PLANE = Plane()

@@ -19,7 +19,7 @@ from heelstrike.errors import HeelstrikeError
 from heelstrike.sim.push import Push
 from heelstrike.tolerances import SAME_ROW
 from heelstrike.view.live.board import Board
-from heelstrike.view.live.dimension import Dimension, dimension_of
+from heelstrike.view.live.dimension import LiveDimension, dimension_of
 from heelstrike.view.live.history import History
 from heelstrike.view.live.layout import FrameLayout
 from heelstrike.view.live.light import NOTHING_YET
@@ -28,7 +28,9 @@ from heelstrike.view.live.stage import Stage
 from heelstrike.view.style import in_words
 
 if TYPE_CHECKING:
-    from heelstrike.view.live.dimension import AnyEvent, AnyGround, AnyRobot, AnyRun, Outline
+    from heelstrike.sim.dimension import AnyRobot
+    from heelstrike.sim.run import AnyRun
+    from heelstrike.view.live.dimension import AnyEvent, AnyGround, Outline
 
 UPDATES = 64.0
 """Updates a second that are offered to viewers."""
@@ -80,7 +82,7 @@ class Session:
         rate: float = 1.0,
     ) -> None:
         self._board, self._stage, self._run = board, stage, run
-        self.dimension: Dimension = (
+        self.dimension: LiveDimension = (
             stage.dimension
             if stage is not None
             else dimension_of(None if run is None else run.robot)

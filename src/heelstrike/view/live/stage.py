@@ -11,7 +11,7 @@ import numpy as np
 
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.field_texts import dataclass
-from heelstrike.view.live.dimension import Dimension, dimension_of
+from heelstrike.view.live.dimension import LiveDimension, dimension_of
 
 if TYPE_CHECKING:
     from heelstrike.view.live.dimension import AnyGround, AnySimulation, Outline
@@ -58,11 +58,11 @@ class Stage(ABC):
     """Makes the simulation that is watched, of the values of its controls."""
 
     @property
-    def dimension(self) -> Dimension:
+    def dimension(self) -> LiveDimension:
         """That of its robots; the plane by default."""
-        from heelstrike.view.live.plane import PLANE
+        from heelstrike.view.live.plane import LIVE_PLANE
 
-        return PLANE
+        return LIVE_PLANE
 
     @abstractmethod
     def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:
@@ -107,7 +107,7 @@ class Stage(ABC):
         """
         if FRICTION not in values:
             return dict(values)
-        return {**values, FRICTION: float(np.min(simulation.ground.model().friction))}
+        return {**values, FRICTION: friction_of(simulation.ground)}
 
     @abstractmethod
     def ground(self, values: Mapping[str, Any], simulation: AnySimulation) -> AnyGround:
@@ -126,16 +126,17 @@ class GivenStage(Stage):
     def __init__(self, simulation: AnySimulation) -> None:
         self._simulation, self._begun = simulation, False
         self._start = snapshot_of(simulation)
-        friction = float(np.min(simulation.ground.model().friction))
-        self._controls = (friction_control(friction),)
+        ground = simulation.ground
+        own = any(box.friction is not None for box in getattr(ground, "boxes", ()))
+        self._controls = (friction_control(friction_of(ground), boxes_apart=own),)
 
     @property
-    def dimension(self) -> Dimension:
+    def dimension(self) -> LiveDimension:
         """That of its robot."""
         return dimension_of(self._simulation.robot)
 
     def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:  # noqa: ARG002
-        """The friction of the ground, everywhere."""
+        """The friction of the ground, everywhere but on boxes that have their own."""
         return self._controls
 
     def simulation(
@@ -168,11 +169,16 @@ def snapshot_of(simulation: AnySimulation) -> Any:
         return None
 
 
-def friction_control(value: float) -> Control:
-    """Return the control of the ground's friction."""
-    return Control(
-        FRICTION, "friction μ", value, low=0.0, high=max(1.5, value), step=0.01, at_once=True
-    )
+def friction_of(ground: AnyGround) -> float:
+    """Friction that the control of it shows: in space without that of boxes that have their own."""
+    friction = ground.model().friction
+    return float(friction[0] if hasattr(ground, "boxes") else np.min(friction))
+
+
+def friction_control(value: float, *, boxes_apart: bool = False) -> Control:
+    """Return the control of the ground's friction, from which some boxes may be left out."""
+    label = "friction μ, but for boxes with their own" if boxes_apart else "friction μ"
+    return Control(FRICTION, label, value, low=0.0, high=max(1.5, value), step=0.01, at_once=True)
 
 
 MILLISECONDS = " ms"

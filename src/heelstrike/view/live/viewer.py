@@ -23,9 +23,9 @@ from heelstrike.view.live.session import RATES, Session
 from heelstrike.view.live.stage import GivenStage, Stage
 
 if TYPE_CHECKING:
+    from heelstrike.sim.run import AnyRun
     from heelstrike.sim.spatial.run import SpatialRun
     from heelstrike.sim.spatial.simulation import SpatialSimulation
-    from heelstrike.view.live.dimension import AnyRun
 
 LOOK_EVERY = 0.1
 """Seconds between two looks whether Ctrl-C has come, which Windows keeps from what waits."""

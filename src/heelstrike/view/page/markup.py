@@ -16,12 +16,12 @@ def escaped(text: object) -> str:
     return html.escape(str(text), quote=True)
 
 
-def table(rows: Mapping[str, str], caption: str = "") -> str:
+def table(rows: Mapping[str, str] | Sequence[tuple[str, str]], caption: str = "") -> str:
     """Table of labels and values."""
     head = f"<caption>{escaped(caption)}</caption>" if caption else ""
     lines = (
         f'<tr><th scope="row">{escaped(label)}</th><td>{escaped(value)}</td></tr>'
-        for label, value in rows.items()
+        for label, value in (rows.items() if isinstance(rows, Mapping) else rows)
     )
     return f"<table>{head}<tbody>{''.join(lines)}</tbody></table>"
 

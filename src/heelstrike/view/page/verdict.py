@@ -18,15 +18,12 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import has_length, soles
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.push import Push
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import AnyRun, Run
 from heelstrike.view.style import in_words
 from heelstrike.wording import counted
 
 if TYPE_CHECKING:
     from heelstrike.robot.spatial.robot import SpatialRobot
-    from heelstrike.sim.spatial.run import SpatialRun
-
-    AnyRun = Run | SpatialRun
 
 SHOWN = 4
 """Links of the chain of a fall that its sentence has."""
@@ -113,20 +110,21 @@ def verdict_of(
     Verdict
         In words and numbers.
     """
-    if fall is None and found and math.isfinite(found[0].reached) and isinstance(run, Run):
+    reached = bool(found) and math.isfinite(found[0].reached)
+    if fall is None and reached and isinstance(run, Run):
         advice += (_no_reserve(found[0]),)
     good = walked_on(run, fall) and sound
     parts = [does]
     if fall is not None:
         parts.append(_why(run, fall))
-    elif found and math.isfinite(found[0].reached):
+    elif reached:
         parts.append(f"First limit reached: {found[0].name} at {found[0].reached:.3g} s.")
     elif found:
         closest = f"{found[0].name}, {found[0].detail} ({_percent(found[0].used)} used)"
         parts.append(f"No limit is reached. Tightest margin: {closest}.")
     if advice:
         parts.append(f"To change: {advice[0]}")
-    elif good:
+    elif good and not reached:
         parts.append(f"{NOTHING_TO_CHANGE}.")
     if good and (tried or isinstance(run, Run)):
         parts.append(f"{_what_was_tried(tried)}.")
@@ -160,6 +158,23 @@ def _why(run: AnyRun, fall: Fall) -> str:
     sentence += "".join(f", {_after(push, first.time)}" for push in fall.pushes[-1:])
     after = [FOLLOWS[each.cause] for each in fall.chain[1:SHOWN]]
     return sentence + (f"; then {', '.join(after)}." if after else ".")
+
+
+def happened(verdict: Verdict, run: AnyRun) -> list[tuple[float, str]]:
+    """Say what went wrong in a run, each with its time (s), in order; nothing if nothing did."""
+    if verdict.fall is None:
+        return []
+    rows = [(push.start, pushed(push, run.robot)) for push in verdict.fall.pushes]
+    rows += [(each.time, told(each, run.robot, when=False)) for each in verdict.fall.chain]
+    rows.append((verdict.fall.end, run.message))
+    return sorted(rows, key=lambda row: row[0])
+
+
+def pushed(push: Push, robot: Robot | SpatialRobot) -> str:
+    """Say how hard a push was, on what, and for how long."""
+    link = in_words(robot.link_names[push.place(robot)[0]])
+    newtons = math.hypot(*push.force)
+    return f"a push of {newtons:.3g} N on the {link}, for {push.duration:.3g} s"
 
 
 def _after(push: Push, time: float) -> str:
@@ -201,10 +216,10 @@ def told(symptom: Symptom, robot: Robot | SpatialRobot, *, when: bool = True) ->
     on_soles = isinstance(robot, Robot) and any(has_length(robot, sole) for sole in soles(robot))
     match symptom.cause:
         case Cause.SLIPPED:
-            return (
-                f"the {where} slides{at} by "
-                f"{number('distance_m', 1e3):.3g} mm, on a ground of friction {given['friction']}"
+            friction = (
+                f", on a ground of friction {given['friction']}" if "friction" in given else ""
             )
+            return f"the {where} slides{at} by {number('distance_m', 1e3):.3g} mm{friction}"
         case Cause.TIPPED_FORWARD | Cause.TIPPED_BACK | Cause.TIPPED_SIDEWAYS if in_space:
             side = "left" if number("left_m", 1.0) > 0.0 else "right"
             ways = {Cause.TIPPED_FORWARD: "forwards", Cause.TIPPED_BACK: "backwards"}

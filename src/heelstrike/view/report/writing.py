@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -19,14 +18,12 @@ from heelstrike.analysis.summary import summarize
 from heelstrike.analysis.support import step_times
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
-from heelstrike.robot.robot import Robot
-from heelstrike.sim.push import Push
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import AnyRun, Run
 from heelstrike.view.figures import FIGURES, plot
 from heelstrike.view.page.markup import data_block, document, escaped, grid, shipped, table
 from heelstrike.view.page.page import certificates, check_page, contents
 from heelstrike.view.page.provenance import provenance
-from heelstrike.view.page.verdict import NOTHING_TO_CHANGE, Verdict, judge, told
+from heelstrike.view.page.verdict import NOTHING_TO_CHANGE, Verdict, happened, judge
 from heelstrike.view.report.differences import differences
 from heelstrike.view.style import in_words, styled, view_errors
 from heelstrike.whole_file import write_whole
@@ -98,6 +95,11 @@ def report(
     target = check_page(path)
     named = _named(runs)
     for name, run in named.items():
+        if isinstance(run, AnyRun) and not isinstance(run, Run):
+            raise ViewError(
+                f"reports are of runs in the plane, and {name} is in space: run.save_html(path) "
+                "writes the page of this one, with its verdict"
+            )
         if not isinstance(run, Run):
             raise ViewError(f"a report is of runs, got {run!r}; load_run reads one from its file")
         if not len(run.time):
@@ -155,7 +157,7 @@ def _named(runs: Run | Mapping[str, Run] | Sequence[Run]) -> dict[str, Run]:
         raise ViewError(f"a report is of runs, got {runs!r}; load_run reads one from its file")
     named = dict(runs) if isinstance(runs, Mapping) else {}
     for run in () if isinstance(runs, Mapping) else runs:
-        method = run.method.name if isinstance(run, Run) else str(run)
+        method = run.method.name if isinstance(run, AnyRun) else str(run)
         name, several = method, 1
         while name in named:
             several += 1
@@ -214,14 +216,10 @@ def _happened(named: Mapping[str, Run], verdicts: Mapping[str, Verdict]) -> Iter
     for name, verdict in verdicts.items():
         if verdict.fall is None:
             continue
-        run = named[name]
-        rows = [(push.start, _pushed(push, run.robot)) for push in verdict.fall.pushes]
-        rows += [(each.time, told(each, run.robot, when=False)) for each in verdict.fall.chain]
-        rows.append((verdict.fall.end, run.message))
         cells = "".join(
             '<tr><th scope="row"><button type="button" '
             f'data-time="{time:.6f}">{time:.3f} s</button></th><td>{escaped(what)}</td></tr>'
-            for time, what in sorted(rows, key=lambda row: row[0])
+            for time, what in happened(verdict, named[name])
         )
         caption = "What happened, causes before consequences" + (
             f": {name}" if len(verdicts) > 1 else ""
@@ -230,12 +228,6 @@ def _happened(named: Mapping[str, Run], verdicts: Mapping[str, Verdict]) -> Iter
             f'<table class="happened"><caption>{escaped(caption)}</caption>'
             f"<tbody>{cells}</tbody></table>"
         )
-
-
-def _pushed(push: Push, robot: Robot) -> str:
-    link = in_words(robot.link_names[push.place(robot)[0]])
-    newtons = math.hypot(*push.force)
-    return f"a push of {newtons:.3g} N on the {link}, for {push.duration:.3g} s"
 
 
 def _tried(verdicts: Mapping[str, Verdict]) -> Iterator[str]:

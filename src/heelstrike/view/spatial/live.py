@@ -13,20 +13,26 @@ from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.push import Push, pushes_on
-from heelstrike.sim.spatial.placing import placed_in_space
 from heelstrike.sim.spatial.record import SpatialEventKind
 from heelstrike.sim.spatial.run import RECORDED, SpatialEvent, SpatialRun
 from heelstrike.sim.spatial.simulation import SpatialSimulation
-from heelstrike.view.live.dimension import Dimension
+from heelstrike.sim.spatial.space import SPACE
+from heelstrike.view.live.dimension import LiveDimension
 from heelstrike.view.live.light import certified_light
 from heelstrike.view.live.plane import SEEN_TO_STAND
-from heelstrike.view.spatial.events import OF_POINTS, kind_in_space, place_in_space
+from heelstrike.view.spatial.events import OF_POINTS
 from heelstrike.view.spatial.forces import force_groups
 from heelstrike.view.spatial.live_frames import SpatialLayout
 from heelstrike.view.spatial.scene import scene_in_space
+from heelstrike.view.style import in_words
+
+MOST_LIFTS, ON_GROUND = 40, 1e-10
+"""How often a robot is lifted or lowered, and the gap (m) with which it is on the ground."""
+LEAST_UP = 0.1
+"""Vertical part of the normal of a face with which a robot that is in a wall is lifted."""
 
 
-class Space(Dimension):
+class Space(LiveDimension):
     """Robots in space."""
 
     name = "space"
@@ -61,10 +67,12 @@ class Space(Dimension):
         q[robot.model.first_position[moved]] = np.clip(
             position, robot.model.lower[moved], robot.model.upper[moved]
         )
-        state, stood = State(q, now.v), stands(simulation)
-        lifted = placed_in_space(robot, simulation.ground, state=state)
-        rises = robot.floating and lifted.q[2] > q[2]
-        return lifted if stood or rises else state
+        state, ground = State(q, now.v), simulation.ground
+        if robot.floating and robot.nc:
+            gap, _ = SPACE.gaps(robot, state, ground)
+            if stands(simulation) or gap.min() < 0.0:
+                _onto_ground(robot, state, ground)
+        return state
 
     def light(self, run: SpatialRun) -> dict[str, str]:
         """Return the light of a run."""
@@ -76,11 +84,11 @@ class Space(Dimension):
 
     def words_of(self, event: SpatialEvent) -> str:
         """Return the kind of an event as people write it."""
-        return kind_in_space(event)
+        return event.kind_in_words
 
     def place_of(self, event: SpatialEvent, robot: SpatialRobot) -> str:
         """Name the contact point or joint at which an event happened."""
-        return place_in_space(event, robot)
+        return in_words(event.place(robot))
 
     def shown_at(self, event: SpatialEvent, robot: SpatialRobot) -> int:
         """Index of the force that is drawn of the contact point of an event."""
@@ -94,4 +102,16 @@ def stands(simulation: SpatialSimulation) -> bool:
     return float(np.min(simulation.contacts.gap, initial=np.inf)) < SEEN_TO_STAND
 
 
-SPACE = Space()
+def _onto_ground(robot: SpatialRobot, state: State, ground: SpatialGround) -> None:
+    """Lift a robot out of the ground, or lower it until it meets it, boxes too."""
+    for _ in range(MOST_LIFTS):
+        gap, up = SPACE.gaps(robot, state, ground)
+        lowest = int(np.argmin(gap))
+        if abs(gap[lowest]) < ON_GROUND:
+            return
+        # Down by no more than the gap: nothing is nearer than that. Out of a face at once.
+        along = max(float(up[lowest]), LEAST_UP) if gap[lowest] < 0.0 else 1.0
+        state.q[2] -= gap[lowest] / along
+
+
+LIVE_SPACE = Space()

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from heelstrike.analysis.spatial.friction import face_friction, friction_used
 from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.motion import centroidal_motion
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
@@ -19,6 +20,7 @@ from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push, pushes_on
 from heelstrike.sim.spatial.run import RECORDED, SpatialRun
+from heelstrike.sim.spatial.space import SpatialLook
 from heelstrike.view.live.layout import MOST_PUSHES, FrameLayout, acting_pushes, slider
 from heelstrike.view.page.curves import Plot, Trace
 from heelstrike.view.spatial.forces import (
@@ -67,6 +69,7 @@ class SpatialLayout(FrameLayout):
         each = _only(run, shown)
         motion, found = centroidal_motion(each), spatial_zero_moment_point(each)
         normal = each.contact_normal[:, self._first]
+        friction = face_friction(run, shown)[:, self._first]
         return self.table(len(shown), {
             "time": each.time,
             "position": each.position,
@@ -77,12 +80,12 @@ class SpatialLayout(FrameLayout):
             "place": forces.place,
             "force": forces.force,
             "normal": normal,
-            "friction": np.broadcast_to(self._friction(run.ground), forces.normal.shape),
+            "friction": friction,
             "push": self._pushes(each, run.time[every[:-1]], pushes),
             "torque": each.torque,
             "speed": motion.momentum[:, :3] / robot.total_mass,
             "margin": found.margin,
-            **self._of_feet(run.ground, forces, normal),
+            **self._of_feet(friction, forces, normal),
             "energy": np.column_stack(
                 (motion.kinetic, motion.potential, motion.kinetic + motion.potential)
             ),
@@ -96,7 +99,7 @@ class SpatialLayout(FrameLayout):
             "position": state.q,
             "center": spatial.center_of_mass(self.robot, state.q),
             "force": np.zeros((groups, 3)),
-            "friction": self._friction(ground),
+            "friction": SpatialLook(self.robot).friction(ground, state.q, state.v)[self._first],
             "torque": np.zeros(self.robot.nu),
         })  # fmt: skip
 
@@ -139,25 +142,16 @@ class SpatialLayout(FrameLayout):
             if kind in (HINGE, SLIDE)
         ]  # fmt: skip
 
-    def _friction(self, ground: SpatialGround) -> Floats:
-        """Friction of each group of contact points on the plane of a ground."""
-        scale = self.robot.model.friction_scale[self._first]
-        return np.asarray(ground.friction * scale)
-
-    def _of_feet(
-        self, ground: SpatialGround, forces: ShownForces, normal: Floats
-    ) -> dict[str, Floats]:
+    def _of_feet(self, friction: Floats, forces: ShownForces, normal: Floats) -> dict[str, Floats]:
         """Normal force of each foot, and the share of its friction that it uses."""
-        allowed = self._friction(ground) * forces.normal
         sideways = forces.force - forces.normal[..., None] * normal
         count, feet = len(forces.normal), len(self._foot)
-        pressing, used = np.zeros((count, feet)), np.full((count, feet), np.nan)
+        pressing, used = np.zeros((count, feet)), np.zeros((count, feet))
         for i, own in enumerate(self._foot):
             pressing[:, i] = forces.normal[:, own].sum(axis=1)
-            most = allowed[:, own].sum(axis=1)
-            bears = most > 1e-6 * self.robot.weight
-            total = np.linalg.norm(sideways[:, own].sum(axis=1), axis=-1)
-            used[bears, i] = total[bears] / most[bears]
+            used[:, i], _ = friction_used(
+                forces.normal[:, own], sideways[:, own], friction[:, own], 1e-6 * self.robot.weight
+            )
         return {"pressing": pressing, "used": used}
 
     def _pushes(self, each: SpatialRun, since: Floats, pushes: Iterable[Push]) -> Floats:

@@ -13,7 +13,6 @@ import numpy as np
 from heelstrike.analysis.spatial.summary import summarize_in_space
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
-from heelstrike.sim.push import Push
 from heelstrike.sim.spatial.record import SpatialEventKind
 from heelstrike.sim.spatial.run import SpatialEvent, SpatialRun
 from heelstrike.view.page.columns import TOLERANCE, packed
@@ -21,11 +20,11 @@ from heelstrike.view.page.markup import data_block, document, escaped, shipped, 
 from heelstrike.view.page.page import MOST_EVENTS, MOST_PHASES, check_page
 from heelstrike.view.page.provenance import versions
 from heelstrike.view.page.rows import MOST_ROWS, Rows, rows_about
-from heelstrike.view.page.verdict import Verdict, told
-from heelstrike.view.spatial.events import OF_POINTS, kind_in_space, place_in_space
+from heelstrike.view.page.verdict import Verdict, happened
+from heelstrike.view.spatial.events import OF_POINTS
 from heelstrike.view.spatial.scene import moving_columns, scene_in_space, spatial_plots
 from heelstrike.view.spatial.verdict import judge_in_space
-from heelstrike.view.style import view_errors
+from heelstrike.view.style import in_words, view_errors
 from heelstrike.whole_file import write_whole
 
 LARGEST = 1_400_000
@@ -114,19 +113,8 @@ def page_in_space(run: SpatialRun, *, command: str = "") -> str:
 
 def _what_happened(verdict: Verdict, run: SpatialRun) -> str:
     """What went wrong, causes before consequences; nothing of a run in which nothing did."""
-    if verdict.fall is None:
-        return ""
-    robot = run.robot
-    rows = {f"{push.start:.3f} s": _push(push) for push in verdict.fall.pushes}
-    for each in verdict.fall.chain:
-        rows[f"{each.time:.3f} s"] = told(each, robot, when=False)
-    rows[f"{verdict.fall.end:.3f} s"] = run.message
-    return table(rows, "What happened, causes before consequences")
-
-
-def _push(push: Push) -> str:
-    newtons = float(np.linalg.norm(push.force))
-    return f"a push of {newtons:.3g} N on {push.link}, for {push.duration:.3g} s"
+    rows = [(f"{time:.3f} s", what) for time, what in happened(verdict, run)]
+    return table(rows, "What happened, causes before consequences") if rows else ""
 
 
 def _limits(verdict: Verdict) -> str:
@@ -189,8 +177,8 @@ def _described(event: SpatialEvent, run: SpatialRun) -> dict[str, Any]:
     of_a_point = event.kind in OF_POINTS
     return {
         "time": event.time,
-        "kind": kind_in_space(event),
-        "where": place_in_space(event, run.robot),
+        "kind": event.kind_in_words,
+        "where": in_words(event.place(run.robot)),
         "contact": event.contact if of_a_point else -1,
         "impulse": event.impulse[0] if of_a_point else 0.0,
         "unit": "N s" if of_a_point else "",

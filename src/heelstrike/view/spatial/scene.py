@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from heelstrike.analysis.spatial.friction import face_friction
 from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 from heelstrike.contact.spatial.ground import SpatialGround
@@ -110,6 +111,7 @@ def moving_columns(run: SpatialRun, rows: Rows) -> dict[str, Floats]:
     forces = shown_forces(run, rows)
     floor = 1e-6 * max(run.robot.weight, 1e-300)
     pressed = forces.normal > floor
+    friction = face_friction(run, rows)
     columns = {
         "position": _continuous(run, rows),
         "center": motion.center_of_mass,
@@ -122,9 +124,7 @@ def moving_columns(run: SpatialRun, rows: Rows) -> dict[str, Floats]:
         columns[f"place {i}"] = np.where(ever[:, None], forces.place[:, i], np.nan)
         columns[f"force {i}"] = np.where(ever[:, None], forces.force[:, i], 0.0)
         columns[f"normal {i}"] = run.contact_normal[rows, group[0]]
-        columns[f"friction {i}"] = np.full(
-            len(rows), run.ground.friction * run.robot.model.friction_scale[group[0]]
-        )
+        columns[f"friction {i}"] = friction[:, group[0]]
     return columns
 
 

@@ -322,7 +322,7 @@ var HeelstrikeSpace = (() => {
     const scale = (WEIGHT_LENGTH * scene.size) / (scene.weight || Infinity);
     function drawCones({ context, camera, colors, frame }) {
       for (const { place, force, normal: up, friction } of frame.contacts) {
-        if (!known(place)) continue;
+        if (!known(place) || !Number.isFinite(friction)) continue;  // none of two faces at once
         const pressed = dot(force, up);
         if (!(pressed * scale > 0.01 * scene.size)) continue;
         const tall = Math.min(pressed * scale, CONE * scene.size), wide = friction * tall;

@@ -11,6 +11,7 @@ from heelstrike.analysis.spatial.diagnosis import first_cause_in_space, spatial_
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.view.page.verdict import Verdict, verdict_of
+from heelstrike.wording import counted
 
 TO_CHANGE = {
     Cause.SLIPPED: "more friction under the feet, or less push to the side.",
@@ -18,12 +19,14 @@ TO_CHANGE = {
     Cause.TORQUE_LIMIT: "stronger motors, or a posture that asks for less torque.",
     Cause.SPEED_LIMIT: "another reduction of the motor, or a slower motion.",
     Cause.CONTROLLER: "mend the controller: the message of the run says what is wrong with it.",
-    Cause.NUMERICAL: "a smaller step, as hs.TimeStepping(step=1e-4): this one found no way on.",
+    Cause.JOINT_STOP: "a wider range of the joint, or a motion that keeps away from its stop.",
 }
 """What would help, by the first cause."""
 TO_CHANGE |= dict.fromkeys(
     (Cause.TIPPED_BACK, Cause.TIPPED_SIDEWAYS), TO_CHANGE[Cause.TIPPED_FORWARD]
 )
+SMALLER = 10.0
+"""By how much a step is smaller that may find a way on."""
 UNKNOWN = "nothing is known that would help."
 
 
@@ -43,8 +46,17 @@ def judge_in_space(run: SpatialRun) -> Verdict:
     fall = first_cause_in_space(run)
     found = spatial_limits(run, until=math.inf if fall is None else fall.time)
     doubts = tuple(_doubts(run))
-    advice = doubts if fall is None else (*doubts, TO_CHANGE.get(fall.cause, UNKNOWN))
+    advice = doubts if fall is None else (*doubts, _to_change(run, fall))
     return verdict_of(run, fall, found, advice, (), (), does=_does(run, fall), sound=not doubts)
+
+
+def _to_change(run: SpatialRun, fall: Fall) -> str:
+    """What would help."""
+    if fall.cause is not Cause.NUMERICAL:
+        return TO_CHANGE.get(fall.cause, UNKNOWN)
+    step = getattr(run.method, "step_length", None)
+    smaller = f", as hs.TimeStepping(step={step / SMALLER:.3g})" if step else ""
+    return f"a smaller step{smaller}: this one found no way on."
 
 
 def _does(run: SpatialRun, fall: Fall | None) -> str:
@@ -62,8 +74,8 @@ def _does(run: SpatialRun, fall: Fall | None) -> str:
 def _doubts(run: SpatialRun) -> Iterator[str]:
     if run.certificates.uncertified:
         yield (
-            f"{run.certificates.uncertified} steps are certified to 1e-6 only, not to 1e-9: a "
-            "smaller step may do without them."
+            f"{counted(run.certificates.uncertified, 'step is', 'steps are')} certified to 1e-6 "
+            "only, not to 1e-9: a smaller step may do better."
         )
     if run.certificates.energy_gain > 0.0:
         yield (
