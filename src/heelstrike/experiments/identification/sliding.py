@@ -104,7 +104,7 @@ def ground_friction(
     pressing = float(np.sum(np.abs(surely) * scale * log.force[:, :, 0]))
     count = int(np.count_nonzero(surely))
     if not count:
-        return GroundFriction(math.nan, math.nan, 0, "for no foot slides")
+        return GroundFriction(math.nan, math.nan, 0, "for no foot slides for long")
     value = -float(np.sum(surely * log.force[:, :, 1])) / pressing
     deviation = force_noise * math.sqrt(count * (1.0 + value**2)) / pressing
     return GroundFriction(value, deviation, count)
