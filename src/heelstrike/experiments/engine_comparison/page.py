@@ -348,7 +348,7 @@ def _scenes(found: Mapping[str, Any]) -> str:
             told.append("–" if row["error"] is None else short(row["error"]))
         rows.append(told)
     listed = [
-        f"{k + 1}. {name}: {exact:.6g} {unit}; {words}."
+        f"{k + 1}. {name}: {f'{exact:.6g} {unit}'.rstrip()}; {words}."
         for k, (name, exact, unit, words) in enumerate(found["scenes"])
     ]
     why = dict.fromkeys(

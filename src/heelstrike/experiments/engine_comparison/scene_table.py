@@ -77,8 +77,9 @@ class SceneTable:
     def __rich__(self) -> Group:
         parts: list[Table | str] = []
         for name, exact, unit, words in self.scenes:
+            value = f"{exact:.6g} {unit}".rstrip()
             table = Table(
-                title=f"{name}: {exact:.6g} {unit}, {words}", title_justify="left",
+                title=f"{name}: {value}, {words}", title_justify="left",
                 box=SIMPLE_HEAD, show_edge=False,
             )  # fmt: skip
             table.add_column("engine")
