@@ -48,7 +48,9 @@ def test_a_robot_in_space_is_pushed_and_looked_at(tmp_path: Path) -> None:
         wait_until(lambda: differs(seen, still), "another side of it")
         assert seen.data("pushed") == 0.0
         turned = seen.picture()
-        wait_until(lambda: "look=" in seen.page.url, "an address of what is seen")
+        wait_until(
+            lambda: "look=" in seen.page.evaluate("location.href"), "an address of what is seen"
+        )
         with Page(chromium, viewer, first=False) as other:
             other.page.goto("about:blank")
             other.page.goto(seen.page.url)
