@@ -61,9 +61,8 @@ var HeelstrikeRecording = (() => {
     return low - 1;
   }
 
-  function read(run) {
-    const { scene, data, events } = run;
-    /* Time (n), and columns of n rows or, where all are the same, of one. */
+  /** Time (n), and columns of n rows or, where all are the same, of one. */
+  function table(data) {
     const time = new Float64Array(bytes(data.time)), count = data.rows;
     const columns = unpacked(data);
     const row = (name, k) => {
@@ -76,7 +75,12 @@ var HeelstrikeRecording = (() => {
       return rows === 1 ? new Float32Array(count).fill(values[0]) : values;
     };
     const rowAt = (t) => Math.max(0, before(time, t));
-    const start = time[0], end = time[count - 1];
+    return { time, count, row, curve, rowAt, start: time[0], end: time[count - 1] };
+  }
+
+  function read(run) {
+    const { scene, data, events } = run;
+    const { time, count, row, curve, rowAt, start, end } = table(data);
 
     function frameOf(k) {
       const frame = { time: time[k] };
@@ -177,5 +181,5 @@ var HeelstrikeRecording = (() => {
       reach: Math.max(1.05 * reach, 1e-3) };
   }
 
-  return { read, before, fit, unpacked, bytes };
+  return { read, table, before, fit };
 })();

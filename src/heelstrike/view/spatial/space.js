@@ -581,21 +581,8 @@ var HeelstrikeSpace = (() => {
   }
 
   function read(run) {
-    const { unpacked, bytes, before } = HeelstrikeRecording;
     const { scene, data } = run;
-    const time = new Float64Array(bytes(data.time)), count = data.rows;
-    const columns = unpacked(data);
-    const row = (name, k) => {
-      const { width, rows, values } = columns.get(name);
-      const first = rows === 1 ? 0 : k * width;
-      return values.subarray(first, first + width);
-    };
-    const curve = (name) => {
-      const { rows, values } = columns.get(name);
-      return rows === 1 ? new Float32Array(count).fill(values[0]) : values;
-    };
-    const rowAt = (t) => Math.max(0, before(time, t));
-    const start = time[0], end = time[count - 1];
+    const { time, count, row, curve, rowAt, start, end } = HeelstrikeRecording.table(data);
     const picture = stage(scene);
     let heard = null, heardBy = null;
 
