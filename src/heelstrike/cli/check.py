@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from heelstrike.cli.options import AsJson, Friction, Reading
+from heelstrike.cli.options import AsJson, Friction, MeasuredRobot, Rate, Reading, Unit
+from heelstrike.cli.planning import planar_robot_called
 from heelstrike.cli.terminal import FAILED, output, spoken, stage, this_command, wrote
 
 
@@ -20,15 +21,9 @@ def check(
         Path, typer.Argument(help="Table of text: a column a driven joint, and the time.")
     ],
     *,
-    robot: Annotated[
-        str, typer.Option(help="A built-in robot, or an MJCF, URDF or SDF file.")
-    ] = "bravo7",
-    rate: Annotated[
-        float | None, typer.Option(help="Rows a second, where there is no column of times.")
-    ] = None,
-    unit: Annotated[
-        str, typer.Option(help="Unit of columns that name none: rad or deg.", show_default="rad")
-    ] = "",
+    robot: MeasuredRobot = "bravo7",
+    rate: Rate = None,
+    unit: Unit = "",
     friction: Friction = 0.75,
     stiffness: Annotated[
         float | None,
@@ -61,16 +56,11 @@ def check(
     with stage("loading"):
         from heelstrike.experiments.checking import check_motion
         from heelstrike.gait.recordings.motion import load_recorded_motion
-        from heelstrike.robot import builtin_robots
-        from heelstrike.robot.library import load_planar_robot
         from heelstrike.view.page.page import check_page, save_html
 
         if page is not None:
             check_page(page)
-        built_in = robot in builtin_robots()
-        machine = (
-            load_planar_robot(robot) if built_in else load_planar_robot(robot, **how.keywords())
-        )
+        machine = planar_robot_called(robot, how)
         motion = load_recorded_motion(trajectory, machine, rate=rate, unit=unit)
     with stage("checking") as doing:
         found = check_motion(

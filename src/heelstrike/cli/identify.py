@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from heelstrike.cli.options import AsJson, Reading
+from heelstrike.cli.options import AsJson, MeasuredRobot, Rate, Reading, Unit
+from heelstrike.cli.planning import planar_robot_called
 from heelstrike.cli.terminal import output, spoken, stage, tell, wrote
 from heelstrike.wording import some_of
 
@@ -24,15 +25,9 @@ def identify(
         Path, typer.Argument(help="Table of text: time, joints, torques, perhaps contact forces.")
     ],
     *,
-    robot: Annotated[
-        str, typer.Option(help="A built-in robot, or an MJCF, URDF or SDF file.")
-    ] = "bravo7",
-    rate: Annotated[
-        float | None, typer.Option(help="Rows a second, where there is no column of times.")
-    ] = None,
-    unit: Annotated[
-        str, typer.Option(help="Of columns that name none: rad or deg.", show_default="rad")
-    ] = "",
+    robot: MeasuredRobot = "bravo7",
+    rate: Rate = None,
+    unit: Unit = "",
     encoder_noise: Annotated[
         float | None,
         typer.Option(help="Noise of the encoders in rad.", show_default="told by roughness"),
@@ -57,12 +52,9 @@ def identify(
         from heelstrike.experiments.identification import identify as told_by
         from heelstrike.experiments.identification.figure import draw_identified
         from heelstrike.gait.recordings.robot_log import load_robot_log
-        from heelstrike.robot import builtin_robots
-        from heelstrike.robot.library import load_planar_robot
         from heelstrike.view.style import save_figure
 
-        keywords = {} if robot in builtin_robots() else how.keywords()
-        machine = load_planar_robot(robot, **keywords)
+        machine = planar_robot_called(robot, how)
         log = load_robot_log(recording, machine, rate=rate, unit=unit)
     if log.ignored:
         tell(f"columns of no use: {some_of(log.ignored, SHOWN)}")

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from heelstrike.cli.options import AsJson, Friction, Reading, Steps
-from heelstrike.cli.planning import FIRST_TIME
+from heelstrike.cli.planning import FIRST_TIME, planar_robot_called
 from heelstrike.cli.terminal import FAILED, output, spoken, stage, tell, wrote
 
 
@@ -104,16 +104,9 @@ def mimic(
         from heelstrike.experiments.people import mimic as mimicked
         from heelstrike.experiments.people.writing import figures_of, write_mimicry
         from heelstrike.gait.recordings.saving import check_rate
-        from heelstrike.robot import builtin_robots
-        from heelstrike.robot.library import load_planar_robot
 
         check_rate(csv_rate, "--csv-rate")
-        machine = None
-        if robot is not None:
-            built_in = robot in builtin_robots()
-            machine = (
-                load_planar_robot(robot) if built_in else load_planar_robot(robot, **how.keywords())
-            )
+        machine = None if robot is None else planar_robot_called(robot, how)
     with stage("reading", when_slow=FIRST_TIME) as doing:
         found = mimicked(
             recording, robot=machine, mass=person.mass, height=person.height, speed=person.speed,

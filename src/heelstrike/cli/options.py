@@ -82,6 +82,15 @@ OWN_LAW = (
 )
 Steps = Annotated[int, typer.Option(min=1, help="Steps to walk.")]
 Step = Annotated[float, typer.Option(help="Time step in s of the methods that have one.")]
+Rate = Annotated[
+    float | None, typer.Option(help="Rows a second, where there is no column of times.")
+]
+Unit = Annotated[
+    str, typer.Option(help="Unit of columns that name none: rad or deg.", show_default="rad")
+]
+MeasuredRobot = Annotated[
+    str, typer.Option("--robot", help="A built-in robot, or an MJCF, URDF or SDF file.")
+]
 Friction = Annotated[float, typer.Option(help="Friction coefficient of the ground.")]
 OneMethod = Annotated[Method | None, typer.Option(help=METHOD, show_default=USUAL_METHOD)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else.")]

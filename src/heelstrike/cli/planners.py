@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from heelstrike.cli.options import AsJson, Friction, Reading, RobotName
+from heelstrike.cli.planning import planar_robot_called
 from heelstrike.cli.terminal import FAILED, output, spoken, stage, tell, wrote
 from heelstrike.cli.values import numbers_called
 
@@ -38,14 +39,11 @@ def planners(
     """
     with stage("loading"):
         from heelstrike.experiments.planners import compare_planners
-        from heelstrike.robot import builtin_robots
-        from heelstrike.robot.library import load_planar_robot
         from heelstrike.view.planner_figure import draw_planners
         from heelstrike.view.style import save_figure
         from heelstrike.whole_file import write_whole
 
-        built_in = robot in builtin_robots()
-        machine = load_planar_robot(robot, **({} if built_in else how.keywords()))
+        machine = planar_robot_called(robot, how)
         asked = numbers_called(speeds, "--speeds")
     with stage("walking") as doing:
         found = compare_planners(

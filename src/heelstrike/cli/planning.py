@@ -53,6 +53,14 @@ def spatial_law_asked(words: str) -> SpatialLaw:
     return law
 
 
+def planar_robot_called(name: str, how: Reading) -> Robot:
+    """Load a robot of the plane; options of reading are for files, not for built-in robots."""
+    from heelstrike.robot import builtin_robots
+    from heelstrike.robot.library import load_planar_robot
+
+    return load_planar_robot(name, **({} if name in builtin_robots() else how.keywords()))
+
+
 def robots_named(
     names: Sequence[str], dimension: int | None, how: Reading
 ) -> tuple[dict[str, SpatialRobot], dict[str, Robot]]:
