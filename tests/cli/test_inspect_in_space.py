@@ -14,13 +14,19 @@ ROBOT = """
 <geom type="box" size="0.1 0.2 0.3" mass="3"/></body></worldbody></mujoco>"""
 
 
-def test_words_data_and_no_picture(tmp_path: Path) -> None:
+def test_words_data_and_a_picture(tmp_path: Path) -> None:
     path = tmp_path / "one.xml"
     path.write_text(ROBOT, encoding="utf-8")
     said = CliRunner().invoke(app, ["inspect", str(path)])
     assert "one: 3 kg, in space, 7 positions, 6 velocities" in said.output
     found = json.loads(CliRunner().invoke(app, ["inspect", str(path), "--json"]).stdout)
     assert found["dimension"] == 3
-    drawn = CliRunner().invoke(app, ["inspect", str(path), "--out", str(tmp_path / "one.png")])
-    assert drawn.exit_code != 0
-    assert not (tmp_path / "one.png").exists()
+    picture = tmp_path / "one.png"
+    drawn = CliRunner().invoke(app, ["inspect", str(path), "--out", str(picture)])
+    assert drawn.exit_code == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    picture.unlink()
+    pushed = ["inspect", str(path), "--out", str(picture), "--ground", "slope:3"]
+    refused = CliRunner().invoke(app, pushed)
+    assert refused.exit_code != 0
+    assert not picture.exists()

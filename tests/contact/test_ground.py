@@ -100,7 +100,7 @@ def test_height_of_stairs() -> None:
         ({"slope": 2.0}, "slope"),
         ({"slope": 0.1, "profile": [[0, 0], [1, 0]]}, "not both"),
         ({"profile": [[0, 0]]}, "at least two corners"),
-        ({"profile": [[0, 0], [1, np.inf]]}, "finite"),
+        ({"profile": [[0, 0], [1, np.inf]]}, r"finite everywhere; corner 1 is \[1.0, inf\]"),
         ({"profile": [[1, 0], [0, 0]]}, "left to right"),
         ({"profile": [[0, 0], [0, 1], [1, 1]]}, "vertical"),
     ],

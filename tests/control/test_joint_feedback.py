@@ -43,6 +43,7 @@ def test_the_law_is_the_textbook_one() -> None:
     ("options", "words"),
     [
         ({"position": np.zeros((2, 6, 4))}, "polynomials"),
+        ({"position": np.zeros(9)}, r"each of the 6 motors, .* has shape \(9,\)"),
         ({"position": np.zeros(6), "kp": [1.0, 2.0]}, "kp must be"),
         ({"position": np.zeros(6), "kd": np.nan}, "kd must be"),
         ({"position": np.zeros(6), "kd": [1.0, 1.0, np.inf, 1.0, 1.0, 1.0]}, "kd must be"),

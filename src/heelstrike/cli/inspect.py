@@ -100,30 +100,25 @@ def look_at(
 ) -> None:
     """Print what was found of a robot, and draw it into a file."""
     from heelstrike.robot.inspection import facts
+    from heelstrike.robot.robot import Robot
     from heelstrike.robot.spatial.robot import SpatialRobot
     from heelstrike.view.drawing import robot_picture
     from heelstrike.view.terminal import terminal_drawing
 
     robot = inspection.robot
-    if isinstance(robot, SpatialRobot):
-        if picture is not None:
-            raise typer.BadParameter(
-                f"{robot.name} is a robot in space, and pictures are of the plane: leave it out, "
-                "or say --projected",
-                param_hint="--out",
-            )
-        if as_json:
-            typer.echo(json.dumps(facts(inspection), indent=2))
-        else:
-            output().print(Text(in_options(inspection.text())), soft_wrap=True)
-        return
+    if isinstance(robot, SpatialRobot) and (ground is not None or pushes):
+        raise typer.BadParameter(
+            f"{robot.name} is a robot in space; ground and pushes are drawn for planar robots "
+            "only: leave them out, or use --projected",
+            param_hint="--out",
+        )
     if robot is not None:
         for push in pushes:
             push.place(robot)
     if as_json:
         typer.echo(json.dumps(facts(inspection), indent=2))
     else:
-        drawing = "" if robot is None else terminal_drawing(robot)
+        drawing = terminal_drawing(robot) if isinstance(robot, Robot) else ""
         for text in (drawing if _has_letters_for(drawing) else "", in_options(inspection.text())):
             if text:
                 output().print(Text(text), soft_wrap=True)

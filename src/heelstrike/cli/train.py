@@ -111,7 +111,7 @@ def train(
         ]:  # fmt: skip
             verb = "is" if len(needless) == 1 else "are"
             raise SimulationError(
-                f"{', '.join(needless)} {verb} for walkers: add --task walk, or leave it out"
+                f"{', '.join(needless)} {verb} for the task walk: add --task walk, or leave it out"
             )
         else:
             learned = task_of(robot)

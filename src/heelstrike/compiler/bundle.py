@@ -727,8 +727,10 @@ def _check_shape(
         fits = fits and size == (factor * known + more if name else more)
     if not fits:
         wanted = ", ".join(map(str, member.shape))
-        told = ", ".join(f"{name} = {size}" for name, size in extents.items())
-        raise TypeError(f"{where} has shape {shape} instead of ({wanted}), where {told}")
+        named = [name for _, name, _ in member.extents if name]
+        told = ", ".join(f"{name} = {extents[name]}" for name in dict.fromkeys(named))
+        where_told = f", where {told}" if told else ""
+        raise TypeError(f"{where} has shape {shape} instead of ({wanted}){where_told}")
 
 
 @typeof_impl.register(Bundle)

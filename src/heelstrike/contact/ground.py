@@ -358,8 +358,12 @@ def _polyline(profile: ArrayLike) -> Floats:
             f"a ground profile is an array of at least two corners (x, z), got shape "
             f"{vertices.shape}"
         )
-    if not np.all(np.isfinite(vertices)):
-        raise SimulationError("a ground profile must be finite everywhere")
+    endless = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if endless.size:
+        raise SimulationError(
+            f"a ground profile must be finite everywhere; corner {endless[0]} is "
+            f"{vertices[endless[0]].tolist()}"
+        )
     steps = np.diff(vertices, axis=0)
     if np.any(steps[:, 0] < 0.0) or np.any(np.all(steps == 0.0, axis=1)):
         corner = int(np.flatnonzero((steps[:, 0] < 0.0) | np.all(steps == 0.0, axis=1))[0])

@@ -288,10 +288,16 @@ def pitch_of(robot: Robot) -> int:
     model = robot.model
     actuated = set(model.actuator_joint.tolist())
     unactuated = [j for j in range(robot.nv) if j not in actuated]
-    if not robot.floating or robot.mirror is None or len(robot.feet) != 2:
+    lacks = (
+        (not robot.floating, "its base is fixed"),
+        (len(robot.feet) != 2, f"it has {len(robot.feet)} feet"),
+        (robot.mirror is None, "its sides do not mirror each other"),
+    )
+    found = [reason for missing, reason in lacks if missing]
+    if found:
         raise ControllerError(
-            f"computed torque needs a floating robot with two mirrored feet; "
-            f"robot {robot.name!r} is not one"
+            "computed torque needs a robot with a free base and two feet that mirror each other. "
+            f"Robot {robot.name!r} is not one: {found[0]}"
         )
     if model.loops + model.couplings:
         _check_reach(robot)

@@ -117,11 +117,11 @@ class JointFeedback(Law):
 
 def _polynomials(name: str, value: ArrayLike, pieces: int, nu: int) -> Floats:
     polynomials = numbers_of(name, value)
-    if polynomials.ndim < 3:
+    if polynomials.ndim < 3 and polynomials.shape in ((), (1,), (nu,), (1, nu), (pieces, nu)):
         polynomials = np.broadcast_to(polynomials[..., None], (pieces, nu, 1))
-    if polynomials.shape[:2] != (pieces, nu):
+    if polynomials.ndim != 3 or polynomials.shape[:2] != (pieces, nu):
         raise ControllerError(
-            f"{name} must be ({nu},) or polynomials of shape ({pieces}, {nu}, m), got "
-            f"{np.shape(value)}"
+            f"{name} must have a number for each of the {nu} motors, shape ({nu},), or "
+            f"polynomials of shape ({pieces}, {nu}, m); it has shape {np.shape(value)}"
         )
     return polynomials

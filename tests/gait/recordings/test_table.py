@@ -43,7 +43,7 @@ def test_json_of_columns(tmp_path: Path) -> None:
         ("[1, 2]", "columns by name"),
         ("{", "line 1: no JSON"),
         ('{"a": [1, 2, 3, 4, 5, 6, 7, NaN]}', "NaN is no number"),
-        ('{"a": [1, 2, 3, 4, 5, 6, 7, 1e999]}', "too large"),
+        ('{"a": [1, 2, 3, 4, 5, 6, 7, 1e999]}', "'a', row 8: the number is too large"),
         ('{"a": [1, 2, 3, 4, 5, 6, 7, true]}', "'a', row 8: a number"),
         ('{"a": [1, 2]}', "at least 8 rows"),
         ('{"a": [1, 2, 3, 4, 5, 6, 7, 8], "b": [1]}', "'b' has 1 rows"),

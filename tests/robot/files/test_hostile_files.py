@@ -200,7 +200,7 @@ REFUSED: dict[str, tuple[Files, str]] = {
     "deep": (mjcf("", bodies(5000)), "more than 400 elements inside"),
     "corners that are no numbers": (
         mjcf("<asset><mesh name='m' vertex='{}'/></asset>".format("nan " * 300_000)),
-        "no finite number",
+        "not a finite number",
     ),
     "mesh that is not there": (
         mjcf('<asset><mesh file="gone.stl"/></asset>', WORLD.replace('size="0.1"', 'mesh="gone"')),

@@ -205,13 +205,21 @@ def test_drakes_planar_joint_begins_where_its_frames_meet() -> None:
     [
         (sdf().replace("0.02 0 -0.2", "0.02 junk -0.2"), r"line 2: <pose> is .*, not 6 numbers"),
         (sdf().replace("<mass>3</mass>", "<mass>-3</mass>"), r"<mass> is -3; .* less than 0"),
-        (sdf().replace("<mass>3</mass>", "<mass>nan</mass>"), "no finite number"),
+        (sdf().replace("<mass>3</mass>", "<mass>nan</mass>"), "not a finite number"),
         (sdf().replace("<mass>3", "<mass>3</mass><mass>3"), "two <mass>. Keep one"),
         (sdf().replace("<child>shin", "<child>foot"), "there is no link 'foot'"),
         (sdf().replace('type="continuous"', 'type="hinge"'), "of the type 'hinge'"),
         (sdf().replace("<lower>-1", "<lower>1"), "the range of joint 'hip' is empty"),
         (sdf().replace("0 -1 0</xyz>", "0 0 0</xyz>"), "no direction"),
-        (sdf(shin='<pose relative_to="shin">0 0 0 0 0 0</pose>'), "relative to itself"),
+        (sdf(shin='<pose relative_to="shin">0 0 0 0 0 0</pose>'), "'shin' is given relative to it"),
+        (
+            sdf(
+                shin='<pose relative_to="a">0 0 0 0 0 0</pose>',
+                more='<frame name="a"><pose relative_to="b">0 0 0 0 0 0</pose></frame>'
+                '<frame name="b"><pose relative_to="a">0 0 0 0 0 0</pose></frame>',
+            ),
+            "is given relative to itself, by way of",
+        ),
         (sdf(more="<include><uri>model://arm</uri></include>"), "not there"),
         (sdf(version="1.0"), "reads 1.2 to 1.12"),
         (sdf().replace("<model", "<model name='b'></model><model"), "here are 'b', 'leg'"),

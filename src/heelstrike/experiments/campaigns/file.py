@@ -223,6 +223,8 @@ def _distribution(given: Any, where: str) -> Any:
         made = known(*listed, **named)
         if not made.ppf(0.5) == made.ppf(0.5):
             raise ValueError(f"{numbers} are no numbers that it can have")
+    except SimulationError:
+        raise
     except (TypeError, ValueError) as error:
         raise SimulationError(f"{where}: {name}: {error}") from None
     return made

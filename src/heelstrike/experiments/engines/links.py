@@ -60,7 +60,7 @@ def links(robot: Robot, *, least_radius: float = 0.0) -> list[Link]:
     model = robot.model
     refuse_loops(robot, "what hands robots over to other engines", InvalidRunError)
     if np.any(model.friction_scale != 1.0):
-        raise InvalidRunError("this engine is not given friction of single contact points")
+        raise InvalidRunError("its points have friction scales, which this engine is not told")
     for name in ("stiffness", "dry_friction"):
         if np.any(getattr(model, name)):
             raise InvalidRunError(f"this engine is not given {name.replace('_', ' ')} of joints")

@@ -165,11 +165,11 @@ class MuJoCoPeer(Peer):
 
 def _spec(scenario: Scenario) -> Any:
     if scenario.robot.model.latches:
-        raise InvalidRunError("this engine is not given latches of joints")
+        raise InvalidRunError("its joints have latches, which this engine is not told")
     if scenario.robot.model.brakes:
-        raise InvalidRunError("this engine is not given brakes of joints")
+        raise InvalidRunError("its joints have brakes, which this engine is not told")
     if np.any(scenario.robot.model.friction_scale != 1.0):
-        raise InvalidRunError("this engine is not given friction of single contact points")
+        raise InvalidRunError("its points have friction scales, which this engine is not told")
     with tempfile.TemporaryDirectory() as folder:
         file = scenario.robot.save(Path(folder) / "robot.xml")
         spec = mujoco.MjSpec.from_file(str(file))

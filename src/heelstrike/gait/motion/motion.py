@@ -233,8 +233,9 @@ class Motion(ShownInNotebooks):
         """
         if self.fingerprint != fingerprint(robot):
             raise GaitError(
-                f"this motion was designed for robot {self.robot!r} with other numbers than robot "
-                f"{robot.name!r} has. Use that robot, or design a new motion."
+                f"this motion was designed for {self.robot!r} when its masses, lengths or other "
+                f"numbers were different from those of {robot.name!r} now. Load the robot that it "
+                "was designed for, or design a new motion."
             )
 
     @takes(GaitError)

@@ -41,6 +41,8 @@ def text_of(path: Name) -> str:
         if not file.is_file():
             raise GaitError(f"{path}: not a file; a recording is a table of text")
         return file.read_text(encoding="utf-8-sig")
+    except GaitError:
+        raise
     except (OSError, ValueError) as error:
         if isinstance(error, UnicodeDecodeError):
             raise GaitError(f"{path}: not a text file; a recording is a table of text") from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -245,16 +246,13 @@ def _from_json(path: Name, gaps: bool) -> Table:
         if len(each) != length:
             raise GaitError(f"{path}: column {name!r} has {len(each)} rows, others {length}")
         for row, number in enumerate(each):
-            missing = number is None and gaps
+            missing = gaps and number is None
             if not missing and (isinstance(number, bool) or not isinstance(number, int | float)):
                 raise GaitError(
                     f"{path}: column {name!r}, row {row + 1}: a number is wanted, got "
                     f"{str(number)[:40]!r}"
                 )
-    try:
-        values = np.array(list(columns.values()), dtype=np.float64).T
-    except OverflowError as error:
-        raise GaitError(f"{path}: a number is too large") from error
-    if not np.all(np.isfinite(values) | (gaps and np.isnan(values))):
-        raise GaitError(f"{path}: a number is too large")
+            if not missing and not abs(number) <= sys.float_info.max:
+                raise GaitError(f"{path}: column {name!r}, row {row + 1}: the number is too large")
+    values = np.array(list(columns.values()), dtype=np.float64).T
     return table_of(path, list(columns), values, (0,) * length, rate=rate)

@@ -260,16 +260,11 @@ def stated_bodies(
     path: Path | str, options: Options, text: str | None = None
 ) -> list[tuple[str, float, Floats]]:
     """Name, mass and inertia tensor of bodies; see `heelstrike.robot.files.reading.read_bodies`."""
-    import mujoco
-
     label = str(path)
     file = _screened(path, text, options, label)
-    try:
-        with _warnings_into([]), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            spec = _parsed(path, file, label, options.packages)
-    except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        raise _unreadable(label, error) from error
+    with _refusing(label), _warnings_into([]), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        spec = _parsed(path, file, label, options.packages)
     return _stated(spec)
 
 

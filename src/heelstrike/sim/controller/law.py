@@ -469,7 +469,8 @@ class Law:
         except TypeError as error:
             raise ControllerError(
                 f"the log of controller {self.function.name!r} does not fit robot "
-                f"{robot.name!r}: {error}"
+                f"{robot.name!r}: {error}. Sizes of arrays that are not the robot's are given "
+                "with the memory, by name"
             ) from error
 
     def reset(self) -> None:

@@ -136,8 +136,9 @@ def _refuse_what_is_no_number(element: Element, name: str, text: str, label: str
         return  # words: other readers judge them
     nan = any(map(math.isnan, numbers))
     if nan or (any(map(math.isinf, numbers)) and not name.endswith(_MAY_BE_ENDLESS)):
-        what = repr(element.get("name")) if element.get("name") else "no name"
+        called = f" {element.get('name')!r}" if element.get("name") else ""
+        line = getattr(element, "line", 0)
         raise RobotError(
-            f"{label}: {name!r} of <{element.tag}> ({what}) is {text[:60]!r}, which is no "
-            "finite number."
+            f"{label}: {f'line {line}: ' if line else ''}{name!r} of <{element.tag}>{called} is "
+            f"{text[:60]!r}, which is not a finite number."
         )

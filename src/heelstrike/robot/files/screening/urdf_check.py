@@ -174,8 +174,8 @@ def check_urdf_tree(root: Element, label: str) -> None:
             depths[below] = depth
     if max(depths.values(), default=0) > DEEPEST_LINK:
         raise RobotError(
-            f"{label}: more than {DEEPEST_LINK} joints from one link to the next in a chain, which "
-            "no robot needs."
+            f"{label}: a chain has more than {DEEPEST_LINK} joints, the most that is read. Shorten "
+            "it, or merge links that do not move against each other."
         )
 
 
@@ -235,7 +235,7 @@ def _check_numbers(
         raise RobotError(f"{what} is {text[:60]!r}, where {numbers} must be.")
     limit = element.tag == "limit"
     if any(math.isnan(value) or (math.isinf(value) and not limit) for value in values):
-        raise RobotError(f"{what} is {text[:60]!r}, which is no finite number.")
+        raise RobotError(f"{what} is {text[:60]!r}, which is not a finite number.")
     # Of the moments of inertia only the one about the plane's normal has to be one; see `inertias`.
     signed = element.tag in ("origin", "axis", "inertia") or name in ("lower", "upper")
     if not signed and name != "scale" and min(values) < 0.0:

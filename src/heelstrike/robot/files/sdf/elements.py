@@ -129,8 +129,8 @@ def numbers(element: Element, count: int, label: str, *, endless: bool = False) 
         wanted = "a number" if count == 1 else f"{count} numbers"
         raise error(element, label, f"<{element.tag}> is {text.strip()[:60]!r}, not {wanted}.")
     if np.isnan(values).any() or (np.isinf(values).any() and not endless):
-        raise error(element, label, f"<{element.tag}> is {text.strip()[:60]!r}, which is no finite "
-                    "number.")  # fmt: skip
+        raise error(element, label, f"<{element.tag}> is {text.strip()[:60]!r}, which is not a "
+                    "finite number.")  # fmt: skip
     return values
 
 

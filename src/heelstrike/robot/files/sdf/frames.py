@@ -31,7 +31,11 @@ class Frames:
             if name not in self.given:
                 raise error(asking, self.label, f"there is no frame or link {name[:60]!r}.")
             if name in way:
-                raise error(asking, self.label, f"frame {name[:60]!r} is given relative to itself.")
+                circle = [each[:60] for each in way[way.index(name) :]]
+                told = f"frame {circle[0]!r} is given relative to itself"
+                if len(circle) > 1:
+                    told += f", by way of {', '.join(map(repr, circle[1:]))}"
+                raise error(asking, self.label, f"{told}.")
             way.append(name)
             name = self.given[name][1]
         for each in reversed(way):
