@@ -162,7 +162,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         "```",
         "",
         f"It ran with heelstrike {settings.version}, {settings.method}, seed {settings.seed}, and "
-        "controllers called every millisecond, or every step if that is longer.",
+        "controllers called once a millisecond, or once a time step where that is longer.",
         "",
         f"![Largest disturbance by robot and controller, one panel for each disturbance]({link})",
         "",
@@ -196,18 +196,19 @@ def _measure(results: Results, share: float) -> list[str]:
     settings = results.settings
     return [
         "A size counts if the walk strictly recovers (`heelstrike.analysis.recovery`) from it and "
-        f"from every smaller size tried: up to {settings.strides} sizes upwards to the first "
-        f"failure, then {settings.halvings} bisections. ≥ means that the largest size tried was "
+        f"from every smaller size tried. Up to {settings.strides} growing sizes are tried until "
+        f"the walk fails, then {settings.halvings} bisections follow. ≥ means that the largest size tried was "
         "withstood, < that the smallest was not. Pushes begin at "
         f"{counted(settings.trials, 'phase', 'phases')} of a step, and rough ground has "
         f"{counted(settings.trials, 'shape', 'shapes')}, drawn from the seed, the same for all. "
         "The tables give the size withstood in all of them; with "
-        f"{SURE:.0%} confidence it is withstood at {share:.0%} of all phases or shapes at least. "
+        f"{SURE:.0%} confidence each size is withstood at {share:.0%} of all phases or shapes at "
+        "least. "
         "Everything else has one trial.",
         "",
-        "A controller is not disturbed if its undisturbed walk falls, leans by more than 0.6 rad, "
-        "or strays from its speed. Standing controllers meet pushes and masses only, and have no "
-        "price.",
+        "A controller is not tested further if its undisturbed walk falls, leans by more than "
+        "0.6 rad, or changes its speed. Standing controllers meet pushes and masses only, and have "
+        "no price.",
     ]
 
 
