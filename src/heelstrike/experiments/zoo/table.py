@@ -197,8 +197,8 @@ def _measure(results: Results, share: float) -> list[str]:
     return [
         "A size counts if the walk strictly recovers (`heelstrike.analysis.recovery`) from it and "
         f"from every smaller size tried. Up to {settings.strides} growing sizes are tried until "
-        f"the walk fails, then {settings.halvings} bisections follow. ≥ means that the largest size tried was "
-        "withstood, < that the smallest was not. Pushes begin at "
+        f"the walk fails, then {settings.halvings} bisections follow. ≥ means that the largest "
+        "size tried was withstood, < that the smallest was not. Pushes begin at "
         f"{counted(settings.trials, 'phase', 'phases')} of a step, and rough ground has "
         f"{counted(settings.trials, 'shape', 'shapes')}, drawn from the seed, the same for all. "
         "The tables give the size withstood in all of them; with "
