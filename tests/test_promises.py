@@ -139,7 +139,8 @@ def test_speeds_are_those_of_the_page() -> None:
 
 
 def test_precision_is_that_of_the_page() -> None:
-    sides = {cells[0]: cells for cells in rows(PERFORMANCE, "least computing to 0.0001 rad")}
+    table = rows(PERFORMANCE, "least computing time for an error of 0.0001 rad")
+    sides = {cells[0]: cells for cells in table}
     ours = 1e3 * float(sides["heelstrike"][2])
     bullet, dart, drake = (float(sides[name][3]) for name in ("Bullet", "DART", "Drake"))
     assert sides["MuJoCo"][1].startswith("not reached")

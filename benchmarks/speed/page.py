@@ -55,7 +55,7 @@ def instructions() -> str:
     kept = json.loads((ROOT / "benchmarks" / "instructions.json").read_text())
     beside = {name: f"{times:.2f}" for name, times in kept["times_sticking"].items()}
     counts = markdown(
-        ["scenario", "instructions a step", "times those it is beside"],
+        ["scenario", "instructions a step", "multiple of its counterpart"],
         [
             [name, f"{count:.0f}", beside.get(name, "")]
             for name, count in kept["instructions_a_step"].items()

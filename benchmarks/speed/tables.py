@@ -32,13 +32,20 @@ def _steps(part: dict[str, Any]) -> Iterator[Table]:
         setup = number(row.get("heelstrike_setup_us"))
         body.append([row["scenario"], *cells, setup, row["controller"]])
     yield Table(
-        f"µs a step of {1e3 * part['step_s']:g} ms, best of many, in turn (times as long as ours)",
-        ["scenario", "heelstrike", *engines.values(), "to set ours up", "control"],
+        f"µs a step of {1e3 * part['step_s']:g} ms, best of many (in brackets: multiple of "
+        "heelstrike's time)",
+        [
+            "scenario",
+            "heelstrike",
+            *engines.values(),
+            "heelstrike: set-up of a run (µs)",
+            "control",
+        ],
         body,
     )
     motions = ("standing", "walking", "falling", "lying")
     yield Table(
-        "times as long as ours, least to most of the robots",
+        "multiple of heelstrike's time, least to most of the robots",
         ["", *motions],
         [
             [title, *(_range(rows, name, each) for each in motions)]
@@ -75,8 +82,8 @@ def _range(rows: list[dict[str, Any]], engine: str, motion: str) -> str:
 
 def _stops(part: dict[str, Any]) -> Iterator[Table]:
     yield Table(
-        f"µs a step of {1e3 * part['step_s']:g} ms, best of many, in turn",
-        ["scenario", "µs", "times standing"],
+        f"µs a step of {1e3 * part['step_s']:g} ms, best of many",
+        ["scenario", "µs", "multiple of standing"],
         [[row["scenario"], number(row["us"]), number(row["times"])] for row in part["rows"]],
     )
 
@@ -105,7 +112,7 @@ def _precision(part: dict[str, Any]) -> Iterator[Table]:
     body += [[each["series"], each["knob"], each["reason"], "–"] for each in part["failures"]]
     yield Table(
         f"{part['scenario']}, {part['duration_s']:g} s: error in joint positions, and computing",
-        ["method", "setting", "error (rad)", "computing (s)"],
+        ["method", "setting", "error (rad)", "computing time (s)"],
         body,
     )
     goal = part["to_goal"]
@@ -120,8 +127,8 @@ def _precision(part: dict[str, Any]) -> Iterator[Table]:
         times = goal.get("times_less", {}).get(side)
         body.append([title, how, number(point["seconds"]), "" if times is None else number(times)])
     yield Table(
-        f"least computing to {part['goal_rad']:g} rad",
-        ["side", "how", "computing (s)", "times as long as ours"],
+        f"least computing time for an error of {part['goal_rad']:g} rad",
+        ["engine", "method", "computing time (s)", "multiple of heelstrike's"],
         body,
     )
 
@@ -143,7 +150,13 @@ def _threads(part: dict[str, Any]) -> Iterator[Table]:
     yield Table(
         f"{part['runs']} walks of {part['duration_s']:g} s, {part['steps']} steps, "
         f"{'identical' if part['same_for_all_threads'] else 'NOT THE SAME'} on all threads",
-        ["threads", "million steps a second", "speed-up", "MuJoCo", "its speed-up"],
+        [
+            "threads",
+            "million steps a second",
+            "speed-up",
+            "MuJoCo: million steps a second",
+            "speed-up of MuJoCo",
+        ],
         body,
     )
 
@@ -156,22 +169,26 @@ def _scaling(part: dict[str, Any]) -> Iterator[Table]:
     ):
         sides = {"heelstrike": "heelstrike", **engines}
         if any("pinocchio_part_us" in row for row in part[name]):
-            sides["pinocchio_part"] = "part of a step: Pinocchio ABA"
+            sides["pinocchio_part"] = "Pinocchio, forward dynamics alone"
         body = []
         for row in part[name]:
             cells = [row.get(f"{side}_invalid") or number(row.get(f"{side}_us")) for side in sides]
             body.append([str(row["size"]), *cells])
         slopes, crossing = part[f"{name}_slope"], part[f"{name}_crossover"]
-        body.append(["grows with the power", *(number(slopes.get(side)) for side in sides)])
-        found = ["" if side not in engines else str(crossing[side] or "nowhere") for side in sides]
-        body.append(["faster than heelstrike from", *found])
+        body.append(
+            ["cost grows as size to the power", *(number(slopes.get(side)) for side in sides)]
+        )
+        found = [
+            "" if side not in engines else str(crossing[side] or "never faster") for side in sides
+        ]
+        body.append(["faster than heelstrike from size", *found])
         yield Table(title, [name, *sides.values()], body)
 
 
 def _footprint(part: dict[str, Any]) -> Iterator[Table]:
     body = [
         ["import heelstrike", f"{part['import_s']:.3f} s"],
-        ["import to first step, compiled before", f"{part['warm_first_step_s']:.2f} s"],
+        ["import to first step, code already compiled", f"{part['warm_first_step_s']:.2f} s"],
     ]
     if "cold_first_step_s" in part:
         cold = f"{part['cold_first_step_s']:.1f} s"
@@ -182,8 +199,10 @@ def _footprint(part: dict[str, Any]) -> Iterator[Table]:
     if memory["before_MiB"] is not None:
         before, after = (f"{memory[f'{when}_MiB']:.0f} MiB" for when in ("before", "after"))
         body.append([f"peak memory after {memory['short_s']:g} s of walking", before])
-        body.append([f"after {memory['long_s']:g} s more, as many rows", after])
-    yield Table("to begin, and to go on", ["what", "measured"], body)
+        body.append(
+            [f"peak memory after {memory['long_s']:g} s more, with as many recorded rows", after]
+        )
+    yield Table("start-up, allocations and memory", ["what", "measured"], body)
 
 
 def _endurance(part: dict[str, Any]) -> Iterator[Table]:
@@ -202,14 +221,14 @@ def _endurance(part: dict[str, Any]) -> Iterator[Table]:
     share = part["shortcuts"] / max(part["solves"], 1)
     body.append(["answered by the modes of the step before, verified", f"{100 * share:.2f} %"])
     title = f"{part['steps']} steps of {part['runs']} walks under random pushes"
-    yield Table(title, ["what", "worst"], body)
+    yield Table(title, ["what", "number or worst value"], body)
 
 
 def _laws(part: dict[str, Any]) -> Iterator[Table]:
     least = part["a user's"]
     body = [[name, f"{each:.2f}", f"{each / least:.2f}"] for name, each in part.items()]
     title = "A step of 1 ms of bravo7 walking under computed torque, by who runs the law"
-    yield Table(title, ["law", "µs", "times a user's"], body)
+    yield Table(title, ["law", "µs", "multiple of a user's"], body)
 
 
 _MAKERS = {

@@ -90,13 +90,25 @@ shows the walks that fall. CONTRIBUTING says how to add an engine.
 
 The columns of the walks:
 
-- *tracking*: error from the gait, root mean square;
-- *error*: distance of all coordinates from the reference over the walk, root mean square;
-- *touchdown*: largest difference of a touchdown's time, which adds up the errors of all steps;
-- *noise*: difference of the ground force from its mean over 10 ms in single support, in percent of
-  the weight;
-- *energy*: energy that no work explains, where all forces are means over steps;
-- *peak*: largest force on a foot over a step, in weights.
+- *walks*: whether the robot takes all steps and stays up; if not, how many steps it took (a robot
+  that stumbles may take more than it was asked for);
+- *tracking*: error of the joints from the gait, root mean square;
+- *error*: difference of all coordinates from the reference over the walk, root mean square. A robot
+  that is late or displaced can follow its gait well and still have a large error;
+- *touchdown*: largest difference of a touchdown's time from the reference. A delay in one step
+  lasts to the end of the walk;
+- *impulse*: mean difference of the touchdown impulses from the reference;
+- *ZMP*: difference of the stance foot's zero moment point from the reference, root mean square;
+- *slip*, *depth*: longest way that a loaded contact point slides; deepest penetration;
+- *energy*: largest energy that appears or disappears without work. A dash marks engines that do not
+  report all contact forces as means over steps;
+- *noise*: difference of the ground force from its mean over 10 ms in single support, root mean
+  square, in percent of the weight;
+- *peak*: largest force on a foot, as a mean over a step, in multiples of the weight;
+- *step*: computing time of a step.
+
+ComputedTorque follows the gait without balancing, so errors of the contact can make the robot fall.
+FootstepFeedback corrects them by its footholds.
 """
 
 
@@ -168,8 +180,9 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
             [*theirs, *absent],
         )
         + "\nheelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
-        "its angle of friction, at defaults and a step of 1 ms. The last columns have the step "
-        "sizes, in ms, at which bravo7 takes all its steps under a controller.\n\n"
+        "its angle of friction, at defaults and a step of 1 ms; by Coulomb's law it is zero. The "
+        "last columns have the step sizes, in ms, at which bravo7 takes all its steps under a "
+        "controller.\n\n"
         + _table(headings, ours)
     )  # fmt: skip
 
@@ -237,6 +250,12 @@ def _figure(row: Mapping[str, Any], name: str, factor: float, walks: bool) -> st
     return short(factor * value)
 
 
+_WHY = (
+    'Why they did not walk ("completed": the simulation reached its end, but the robot took too '
+    "few steps or went down):"
+)
+
+
 def _walks(law: str, found: Mapping[str, Any]) -> str:
     columns = {**WALKING, **BY_ITSELF}
     rows = []
@@ -260,7 +279,7 @@ def _walks(law: str, found: Mapping[str, Any]) -> str:
         if not walks:
             reasons.append(f"- {title}, {row['settings']}: {row['figures']['ending']}.")
     headings = ["engine", "settings", "walks", *(heading for heading, _ in columns.values())]
-    said = "\nWhy they did not walk:\n\n" + "\n".join(reasons) + "\n" if reasons else ""
+    said = f"\n{_WHY}\n\n" + "\n".join(reasons) + "\n" if reasons else ""
     return (
         f"## {found['steps']} steps under {law}\n\nStep size {1e3 * shown:g} ms. Each row is "
         f"`heelstrike compare {found['robot']} --controller {name} --engines NAME "
@@ -290,12 +309,13 @@ def _peaks(walks: Mapping[str, Any]) -> str:
         )
     headings = ["engine", "settings"]
     headings += [f"peak, {1e3 * h:g} ms" for h in sizes]
-    headings += [f"s, {1e3 * h:g} ms" for h in sizes]
+    headings += [f"computing time (s), {1e3 * h:g} ms" for h in sizes]
     return (
-        "## Foot force over step size\n\nThe largest force on a foot over a step, in weights, of "
-        f"the same walk under {law}, and its computing time in s. With hard contact a touchdown is "
-        "an impulse within one step, so its force grows as the step shrinks. With soft contact the "
-        "force is that of the spring.\n\n"
+        "## Foot force over step size\n\nThe largest force on a foot (a mean over a step, in "
+        f"multiples of the weight) and the computing time of the same walk under {law}. With hard "
+        "contact a touchdown is an impulse within one step, so its force grows as the step "
+        "shrinks. With soft contact the force is that of the spring. Walks that fall are "
+        "included.\n\n"
         + _table(headings, rows)
     )  # fmt: skip
 
@@ -312,11 +332,12 @@ def _pushes(file: Path) -> str:
     settings = ",".join(dict.fromkeys(row["settings"] for row in found["rows"]))
     return (
         f"## Largest push under {law}{called}\n\n"
-        "On the trunk, in the middle of the third step, for 0.1 s, "
-        "in N s: the largest that the robot survives, with all smaller ones that were tried, and "
-        "in brackets the smallest that it does not. Each engine takes over when the push ends, "
-        "with the state of heelstrike's event-driven run and a law that remembers what came "
-        "before. Steps of 1 ms. "
+        "A push acts on the trunk for 0.1 s, in the middle of the third step. The table has the "
+        "largest impulse (N s) that the robot survives; it survives all smaller ones that were "
+        "tried, too. In brackets is the smallest impulse that it does not survive. heelstrike "
+        "simulates the walk to the end of the push, event-driven. From there each engine continues "
+        "with this state and the controller's memory, at steps of 1 ms. If an engine fails, its "
+        "message appears, with the time since the end of the push. Each row is "
         f"`heelstrike compare {found['robot']} --controller {law} --engines NAME "
         f"--settings {settings}{period} --largest-push`.\n\n"
         + _table(
@@ -335,6 +356,15 @@ def _largest(found: Mapping[str, Any]) -> str:
     if found["failed"] == 0.0:
         return UNPUSHED
     return f"{short(found['recovered'])} ({short(found['failed'])})"
+
+
+_SYMBOLS = (
+    "In these formulas β is the slope, μ the friction, v the speed at the start and ω a rate of "
+    "rotation. R is the distance of the body's centre from the corner, φ the angle of the line "
+    "between them from the vertical, α this angle when the block stands flat. I is the moment "
+    "of inertia, about the corner in 5 and 6, about the centre of the disc in 11 and 12. The "
+    "wheel has spokes of length r at angles of 2α on a slope γ."
+)
 
 
 def _scenes(found: Mapping[str, Any]) -> str:
@@ -357,11 +387,12 @@ def _scenes(found: Mapping[str, Any]) -> str:
         if row["error"] is None and "restitution" not in row["reason"]
     )
     return (
-        f"## Scenes with closed forms\n\nErrors at a step of {1e3 * found['step_s']:g} ms and "
-        f"{found['settings']}, in the units of these exact values:\n\n" + "\n".join(listed) + "\n\n"
+        "## Scenes with closed forms\n\nThe exact result of each scene:\n\n" + "\n".join(listed)
+        + f"\n\n{_SYMBOLS}\n\nThe table has the errors (simulated less exact, in the units above) "
+        f"at a step of {1e3 * found['step_s']:g} ms and {found['settings']}:\n\n"
         + _table(headings, rows)
-        + "\nA dash for a bouncing ball marks an engine without a coefficient of "
-        "restitution."
+        + "\nA dash for a bouncing ball marks an engine without a coefficient of restitution. An "
+        "error of many times the exact value means that the simulation diverged."
         + ("\n\n" + "\n".join(why) if why else "")
         + "\n"
     )  # fmt: skip
@@ -382,10 +413,12 @@ def _guards(found: Mapping[str, Any]) -> str:
             ]
         )  # fmt: skip
     return (
-        "## Guards\n\nTwo checks confirm that an engine has the same robot. In a flight of 0.1 s, "
-        "with all joints turning, the difference from heelstrike at steps of 1, 0.5 and 0.25 ms is "
-        "extrapolated to step zero (at most 1e-6, in single precision 1e-3). The forces on the "
-        "robot at rest must equal its weight to 1 %.\n\n"
+        "## Guards\n\nTwo checks confirm that an engine has the same robot. The first is a flight "
+        "of 0.1 s with all joints turning, at steps of 1, 0.5 and 0.25 ms. *flight* is the largest "
+        "difference of a coordinate from heelstrike (m, rad), and *order* the order of its "
+        "convergence. *extrapolated* is this difference extrapolated to step zero; it must be at "
+        "most 1e-6, or 1e-3 in single precision. The second is *weight*, the sum of the normal "
+        "forces on the robot at rest over its weight; it must be 1 to 1 %.\n\n"
         + _table(
             ["engine", "precision", "flight, 0.25 ms", "order", "extrapolated", "weight",
              "holds"],
