@@ -446,7 +446,9 @@ def test_a_simulation_that_has_been_going_shows_its_past() -> None:
     assert shown.course[0][0] == 0.0
     assert session.cursor == pytest.approx(0.4)
     ask(session, "seek", time=0.2)
-    assert "too long ago" in ask(session, "resume")  # from before it was watched
+    assert "the earliest instant that is kept" in ask(
+        session, "resume"
+    )  # from before it was watched
     ask(session, "reset")
     assert session.cursor == pytest.approx(0.4)
 

@@ -96,8 +96,16 @@ class Layer:
                   "recurrent_bias": (rows,)}  # fmt: skip
         wrong = rows == 0 or rows % GATES[self.kind] != 0
         if wrong or any(getattr(self, n).shape != wanted[n] for n in names[1:]):
-            shapes = {name: getattr(self, name).shape for name in names}
-            raise ControllerError(f"the shapes of a {self.kind} layer do not fit: {shapes}")
+            shapes = ", ".join(f"{name} {getattr(self, name).shape}" for name in names)
+            gates = f"{GATES[self.kind]} outputs" if GATES[self.kind] > 1 else "outputs"
+            rest = "".join(
+                f", {name} ({gates}{', outputs' if name == 'recurrent' else ''})"
+                for name in names[1:]
+            )
+            raise ControllerError(
+                f"the arrays of a {self.kind} layer must have the shapes weight ({gates}, inputs)"
+                f"{rest}; they have {shapes}"
+            )
 
     @property
     def inputs(self) -> int:

@@ -211,7 +211,10 @@ def _distribution(given: Any, where: str) -> Any:
     listed = numbers if isinstance(numbers, list) else []
     named = numbers if isinstance(numbers, dict) else {}
     if not (listed or named):
-        raise SimulationError(f"{where}: {name} has a list of numbers, or a table of named ones")
+        raise SimulationError(
+            f"{where}: {name} needs its numbers as a list, such as [low, high] of uniform, or as a "
+            "table with the names that scipy.stats gives them, such as { loc = 0.4, scale = 0.2 }"
+        )
     try:
         if name == "uniform" and listed:
             low, high = listed

@@ -239,8 +239,8 @@ def _forward(path: Name, places: Floats, names: Sequence[str], vertical: int) ->
     ahead[vertical] = 0.0
     if not np.any(ahead):
         raise GaitError(
-            f"{path}: which way the person walks is not told by heel and toe; say which axis is "
-            "forward"
+            f"{path}: the markers of heel and toe do not show which way the person walks; give the "
+            "axis that points forward (forward=, --forward-axis)"
         )
     axis = int(np.argmax(np.abs(ahead)))
     return axis, float(np.sign(ahead[axis]))

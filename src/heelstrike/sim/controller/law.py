@@ -469,8 +469,8 @@ class Law:
         except TypeError as error:
             raise ControllerError(
                 f"the log of controller {self.function.name!r} does not fit robot "
-                f"{robot.name!r}: {error}. Sizes of arrays that are not the robot's are given "
-                "with the memory, by name"
+                f"{robot.name!r}: {error}. Give sizes of your own when you make the law, as in "
+                f"{self.function.name}(memory={{'samples': 4}})"
             ) from error
 
     def reset(self) -> None:

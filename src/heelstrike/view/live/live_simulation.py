@@ -167,7 +167,11 @@ class LiveSimulation:
         if place < 0:
             raise SimulationError(
                 "it cannot go on from there: "
-                + ("that is too long ago" if times else "the controller takes no part in snapshots")
+                + (
+                    f"the earliest instant that is kept is {times[0]:.2f} s"
+                    if times
+                    else "the controller takes no part in snapshots"
+                )
             )
         del self._snapshots[place + 1 :]
         snapshot, known = self._snapshots[place]
