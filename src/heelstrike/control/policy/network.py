@@ -97,7 +97,7 @@ class Layer:
         wrong = rows == 0 or rows % GATES[self.kind] != 0
         if wrong or any(getattr(self, n).shape != wanted[n] for n in names[1:]):
             shapes = ", ".join(f"{name} {getattr(self, name).shape}" for name in names)
-            gates = f"{GATES[self.kind]} outputs" if GATES[self.kind] > 1 else "outputs"
+            gates = f"{GATES[self.kind]} × outputs" if GATES[self.kind] > 1 else "outputs"
             rest = "".join(
                 f", {name} ({gates}{', outputs' if name == 'recurrent' else ''})"
                 for name in names[1:]
