@@ -354,7 +354,7 @@ def _tips(walk: Walk) -> Iterator[Symptom]:
 def _pushed_over(walk: Walk) -> Iterator[Symptom]:
     """Find pushes that the robot cannot withstand on the feet that carry it, however strong it is.
 
-    A push moves the zero moment point by its moment over the force that the feet carry. Beyond
+    A push moves the zero moment point by its moment over the force that the feet carry then. Beyond
     their ends there is none: the robot tips, or what was to hold it gives way first.
     """
     run = walk.run
@@ -371,7 +371,10 @@ def _pushed_over(walk: Walk) -> Iterator[Symptom]:
         pressed = normal @ points / normal.sum()
         away = in_world(origin, angle, np.array(local)) - pressed
         moment = float(push.force[0] * away[1] - push.force[1] * away[0])
-        reached = float(pressed[0]) + moment / float(normal.sum())
+        carried = float(normal.sum()) - push.force[1]
+        if carried <= 0.0:
+            continue  # it is lifted
+        reached = float(pressed[0]) + moment / carried
         carrying = np.flatnonzero(walk.carrying[row]).tolist()
         ends = points[[i for foot in carrying for i in run.robot.feet[foot].contacts], 0]
         beyond = max(reached - float(ends.max()), float(ends.min()) - reached)
