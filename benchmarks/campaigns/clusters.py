@@ -44,7 +44,7 @@ def pool(_: Path) -> contextlib.AbstractContextManager[Any]:
 
 
 @contextlib.contextmanager
-def dask(_: Path) -> Iterator[Any]:
+def dask_cluster(_: Path) -> Iterator[Any]:
     """Client of a cluster of processes on this machine."""
     import distributed  # type: ignore[import-not-found]
 
@@ -68,7 +68,7 @@ def jobs(folder: Path) -> Iterator[Any]:
 
 
 EXECUTORS: dict[str, Callable[[Path], contextlib.AbstractContextManager[Any]]] = {
-    "own threads": own_threads, "pool of processes": pool, "Dask": dask, "submitit": jobs,
+    "own threads": own_threads, "pool of processes": pool, "Dask": dask_cluster, "submitit": jobs,
 }  # fmt: skip
 
 
@@ -103,6 +103,9 @@ def kill_schedulers(campaign: hs.Campaign, folder: Path, count: int, seed: int) 
 
     The campaign must end in words, and go on with the next scheduler.
     """
+    import dask  # type: ignore[import-not-found]
+
+    dask.config.set({"distributed.comm.timeouts.connect": "600s"})  # processes begin slowly
     rng, kept, kills, port = np.random.default_rng(seed), folder / "kept", 0, 8790
     told: set[str] = set()
     while True:

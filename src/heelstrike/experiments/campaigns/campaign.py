@@ -17,9 +17,9 @@ from typing import Any, Protocol
 from heelstrike.analysis.stability.largest import Largest, largest
 from heelstrike.analysis.stability.trial import ROWS, Trial
 from heelstrike.arguments import takes
-from heelstrike.errors import SimulationError
+from heelstrike.errors import HeelstrikeError, SimulationError
 from heelstrike.experiments.campaigns.outcome import CRASHED, Outcome
-from heelstrike.experiments.campaigns.parameters import Draw, Share, planned
+from heelstrike.experiments.campaigns.parameters import Draw, Share, planned, typical
 from heelstrike.experiments.campaigns.results import CampaignResults
 from heelstrike.experiments.campaigns.store import (
     Store,
@@ -174,7 +174,7 @@ class Campaign:
             raise SimulationError(f"the duration of trials must be positive, got {duration!r}")
         self.seed, self.draw = seed, draw
         self.plan = planned(parameters, draw, trials, seed)
-        check_parameters(self.trials, list(map(self.plan.of, self.plan.first_trials())))
+        check_parameters(self.trials, list(typical(parameters)))
         self._description = dict(description or {})
         self._bases = {
             name: inputs_digest(each, self.duration) for name, each in self.trials.items()
@@ -262,7 +262,7 @@ class Campaign:
                     seconds = perf_counter() - begin
                     show(Progress(len(self), finished, good, found, seconds))
         except Exception as error:
-            if not is_lost(error):
+            if isinstance(error, HeelstrikeError) or not is_lost(error):
                 raise
             raise SimulationError(
                 f"nobody works on the campaign any more: {error or type(error).__name__}. What was "
