@@ -49,7 +49,7 @@ def dask_cluster(_: Path) -> Iterator[Any]:
     import distributed  # type: ignore[import-not-found]
 
     with (
-        distributed.LocalCluster(  # type: ignore[no-untyped-call]
+        distributed.LocalCluster(
             n_workers=WORKERS, threads_per_worker=1, dashboard_address=None
         ) as cluster,
         distributed.Client(cluster) as client,
