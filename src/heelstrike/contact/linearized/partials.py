@@ -395,7 +395,7 @@ class Differentiated:
             raise SimulationError(
                 f"some {changed} of the robot was 0, 1 or -1 when its equations were "
                 "differentiated, and is another number now: the code is made for what it was. "
-                "Differentiate the equations of the changed model anew"
+                "Differentiate the equations of the changed model again"
             )
 
 
