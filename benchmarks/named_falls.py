@@ -11,8 +11,11 @@ prints how often each cause was named, by the cause that was built.
 
     python benchmarks/named_falls.py --random 220
 
-does two or three of these things at once, each as strong as it happens to be, and calls causes of a
-fall those without which the robot walks on; one that is told counts as right if it is one of them.
+does two or three of these things at once, each as strong as it happens to be. Which of them caused
+the fall is found by leaving some out: causes are the members of every smallest set that makes the
+robot fall by itself, and not without any one of its members (J. L. Mackie 1965, *Causes and
+conditions*: INUS conditions). If two things are each enough, both are causes. A fall is named
+rightly if what is told is one of them.
 """
 
 from __future__ import annotations
@@ -23,6 +26,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import cache
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -264,11 +268,11 @@ def told_cause(cause: Cause, seed: int) -> tuple[str, int]:
     return "no fall", MOST_DRAWS
 
 
-def random_fall(seed: int) -> tuple[str, set[Cause], int]:
-    """Draw a fall at random; return what is told of it, its causes and how often it was drawn.
+def random_fall(seed: int) -> tuple[hs.Run, set[Cause], int]:
+    """Draw a fall at random; return its run, its causes and how often it was drawn.
 
-    Two or three things at once are done to a walk, each as strong as it happens to be. Causes are
-    those without which the robot walks on. What falls in any case, or for nothing, is drawn again.
+    Two or three things at once are done to a walk, each as strong as it happens to be. What does
+    not fall is drawn again.
     """
     rng = np.random.default_rng([seed, len(KINDS)])
     kinds = [cause for cause in KINDS if cause not in OF_THEIR_OWN]
@@ -283,15 +287,20 @@ def random_fall(seed: int) -> tuple[str, set[Cause], int]:
         touched = [name for each in done.values() for name in touches(each)]
         if len(set(touched)) < len(touched):
             continue  # two grounds, or two pushes: one would hide the other
-        told = told_of(list(done.values()))
-        if not told:
-            continue
-        causes = {
-            cause for cause in done
-            if not told_of([each for other, each in done.items() if other is not cause])
-        }  # fmt: skip
-        if causes:
-            return told, causes, draws
+        run = case_of(*done.values()).run(on_error="stop")
+        if told_of(run):
+            return run, causes_among(done), draws
+
+
+def causes_among(done: Mapping[Cause, Changes]) -> set[Cause]:
+    """Return what is part of a smallest set that makes the robot fall by itself."""
+    enough: list[set[Cause]] = [set(done)]
+    for count in range(len(done) - 1, 0, -1):
+        for some in combinations(done, count):
+            if told_of(case_of(*(done[cause] for cause in some)).run(on_error="stop")):
+                enough.append(set(some))
+    smallest = [each for each in enough if not any(other < each for other in enough)]
+    return set().union(*smallest)
 
 
 def touches(changes: Changes) -> list[str]:
@@ -299,23 +308,25 @@ def touches(changes: Changes) -> list[str]:
     return [*(changes.keys() - {"numbers"}), *changes.get("numbers", {})]
 
 
-def told_of(done: list[Changes]) -> str:
-    """Tell why a walk falls to which something is done; nothing if it does not."""
-    found = first_cause(case_of(*done).run(on_error="stop"), walking.gait())
+def told_of(run: hs.Run) -> str:
+    """Tell why a walk falls; nothing if it does not."""
+    found = first_cause(run, walking.gait())
     return "" if found is None else str(found)
 
 
 def at_random(count: int, seed: int, *, show: bool) -> None:
     """Draw falls at random, and print how many are named rightly."""
-    right = draws = 0
+    right = draws = alone = 0
     for number in range(seed, seed + count):
-        told, causes, drawn = random_fall(number)
+        run, causes, drawn = random_fall(number)
+        told = told_of(run)
         good = told.partition(" at ")[0] in {cause.value for cause in causes}
-        right, draws = right + good, draws + drawn
+        right, draws, alone = right + good, draws + drawn, alone + (len(causes) == 1)
         if show and not good:
-            print(f"    {number}: {told}; without {', '.join(c.value for c in causes)} it walks on",
+            print(f"    {number}: {told}; caused by {', '.join(sorted(c.value for c in causes))}",
                   flush=True)  # fmt: skip
-    print(f"{right} of {count} named rightly, {100.0 * right / count:.1f} %, of {draws} drawn")
+    print(f"{right} of {count} named rightly, {100.0 * right / count:.1f} %, of {draws} drawn; "
+          f"{alone} have one cause")  # fmt: skip
 
 
 def main() -> None:

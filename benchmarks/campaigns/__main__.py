@@ -2,6 +2,8 @@
 
     python benchmarks/campaigns cost --trials 400
     python benchmarks/campaigns kills --kills 200
+    python benchmarks/campaigns clusters --trials 128
+    python benchmarks/campaigns schedulers --kills 5
 
 `cost` walks trials of ``mix.toml`` by :class:`~heelstrike.Campaign`, kept on disk, and the very
 same in bare calls of :func:`~heelstrike.simulate_batch`, in turn, and prints processor time, the
@@ -10,6 +12,10 @@ smallest of some rounds; where the machine is not quiet, that counts and not the
 `kills` begins a campaign of short trials in a process of its own, kills that with SIGKILL at random
 moments and begins it again, until it is through; then the same with the workers of one. Every trial
 must be there, once, and be the one of a campaign that was left alone.
+
+`clusters` has trials of ``mix.toml`` worked on by a pool of processes, a Dask cluster and jobs of
+submitit, where these are installed, and compares outcomes and processor time with own threads.
+`schedulers` kills the scheduler of a Dask cluster at random moments, and goes on with another one.
 """
 
 from __future__ import annotations
@@ -29,6 +35,7 @@ from heelstrike.experiments.campaigns.trials import laid_out
 # Run as a folder, its modules would be on the path and not the package.
 sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
+from campaigns.clusters import compare, kill_schedulers  # noqa: E402
 from campaigns.killing import campaign_of, killed, short_campaign  # noqa: E402
 
 MIX = Path(__file__).parent / "mix.toml"
@@ -49,12 +56,16 @@ def bare(campaign: hs.Campaign, threads: int) -> hs.BatchResult:
     )  # fmt: skip
 
 
+def mix(trials: int, folder: Path) -> hs.Campaign:
+    """Return the campaign of ``mix.toml`` with so many trials, which is kept in a folder."""
+    text = MIX.read_text(encoding="utf-8").replace("trials = 10000", f"trials = {trials}")
+    return campaign_of(text, folder)
+
+
 def cost(trials: int, rounds: int, workers: int) -> None:
     """Print what a campaign costs beside the bare batch."""
     with tempfile.TemporaryDirectory() as folder:
-        text = MIX.read_text(encoding="utf-8").replace("trials = 10000", f"trials = {trials}")
-        campaign = campaign_of(text, Path(folder))
-        few = campaign_of(text.replace(f"trials = {trials}", "trials = 8"), Path(folder))
+        campaign, few = mix(trials, Path(folder)), mix(8, Path(folder))
         few.run(workers=workers)  # compiles
         bare(few, workers)
         least = {"campaign": np.inf, "bare batch": np.inf}
@@ -117,9 +128,22 @@ def main() -> None:
     deaths.add_argument("--kills", type=int, default=200)
     deaths.add_argument("--trials", type=int, default=4000)
     deaths.add_argument("--seed", type=int, default=0)
+    others = commands.add_parser("clusters", help="compare workers of others with own threads")
+    others.add_argument("--trials", type=int, default=128)
+    schedulers = commands.add_parser("schedulers", help="kill schedulers of Dask")
+    schedulers.add_argument("--kills", type=int, default=5)
+    schedulers.add_argument("--trials", type=int, default=1500)
+    schedulers.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     if options.command == "cost":
         cost(options.trials, options.rounds, options.workers)
+    elif options.command == "clusters":
+        with tempfile.TemporaryDirectory() as folder:
+            compare(mix(options.trials, Path(folder)), Path(folder))
+    elif options.command == "schedulers":
+        with tempfile.TemporaryDirectory() as folder:
+            campaign = short_campaign(Path(folder), options.trials)
+            kill_schedulers(campaign, Path(folder), options.kills, options.seed)
     else:
         kills(options.kills, options.trials, options.seed)
 

@@ -124,3 +124,72 @@ def test_a_robot_that_is_falling_when_its_time_is_up() -> None:
     fall = first_cause(run, walking.gait())
     assert fall is not None
     assert fall.cause is Cause.TIPPED_FORWARD
+
+
+def with_stop(angle: float) -> hs.Robot:
+    """Return bravo7 whose left knee bends up to an angle (rad); its gait bends it to 0.56."""
+    robot = walking.bravo7()
+    upper = np.array(robot.model.upper)
+    upper[robot.joint_index("left_knee")] = angle
+    return dataclasses.replace(robot, model=robot.model.replaced(upper=upper))
+
+
+def test_what_a_robot_walks_on_with_is_no_cause_of_what_comes_later() -> None:
+    """A knee that meets its stop in each swing, and a fault at 1 s; with either alone it is told.
+
+    It is back on its gait for 0.1 s before the fault.
+    """
+    law = falls.faulty_law("right_ankle", lambda torque: -torque)
+    stopped = falls.walk(robot=with_stop(0.5)).run()
+    assert stopped.completed
+    assert {each.cause for each in find_symptoms(Walk(stopped, walking.gait()))} >= {
+        Cause.JOINT_STOP
+    }
+    fall = first_cause(falls.walk(robot=with_stop(0.5), law=law).run(), walking.gait())
+    assert fall is not None
+    assert fall.cause is Cause.CONTROLLER
+    assert Cause.JOINT_STOP not in {each.cause for each in fall.chain if each.time < 1.0}
+
+
+def test_what_comes_again_no_longer_than_before_is_no_cause() -> None:
+    """The knee is at its stop when the push comes; it was so for as long a stride before."""
+    push = hs.Push("trunk", force=(-300.0, 0.0), start=1.75, duration=0.1)
+    fall = first_cause(falls.walk(robot=with_stop(0.45), pushes=[push]).run(), walking.gait())
+    assert fall is not None
+    assert (fall.cause, fall.where) == (Cause.TIPPED_BACK, "right_foot")
+    assert fall.time >= 1.75
+
+
+def test_a_push_that_no_motor_withstands_tips_however_weak_motors_are() -> None:
+    """300 N at 1 m move the zero moment point by 0.5 m; with all the torque there is it falls."""
+    limit = np.full(6, 25.0)
+    weak = walking.bravo7().model.replaced(torque_lower=-limit, torque_upper=limit)
+    robot = dataclasses.replace(walking.bravo7(), model=weak)
+    assert falls.walk(robot=robot).run().completed
+    fall = first_cause(falls.pushed(300.0, robot=robot).run(), walking.gait())
+    assert fall is not None
+    assert (fall.cause, fall.where) == (Cause.TIPPED_FORWARD, "left_foot")
+    assert fall.evidence["beyond_m"] > 0.1
+    assert Cause.TORQUE_LIMIT in {each.cause for each in fall.chain}
+
+
+def test_a_motor_at_its_limit_that_drives_its_joint_away_is_the_controllers() -> None:
+    limit = np.full(6, 35.0)
+    weak = walking.bravo7().model.replaced(torque_lower=-limit, torque_upper=limit)
+    robot = dataclasses.replace(walking.bravo7(), model=weak)
+    law = falls.faulty_law("right_hip", lambda _: -100.0)
+    fall = first_cause(falls.walk(robot=robot, law=law).run(), walking.gait())
+    assert fall is not None
+    assert fall.cause is Cause.CONTROLLER
+
+
+def test_a_foot_that_lands_on_a_step_is_early_though_hardly() -> None:
+    """Half of it beyond the edge of a step of 16 mm, at 0.88 of the step's time."""
+    ground = hs.Ground(
+        friction=walking.FRICTION,
+        profile=np.array([(-9.0, 0.0), (1.0223, 0.0), (1.0223, 0.0163), (99.0, 0.0163)]),
+    )
+    symptoms = find_symptoms(Walk(falls.walk(ground=ground).run(on_error="stop"), walking.gait()))
+    scuffed = next(each for each in symptoms if each.cause is Cause.SCUFFED)
+    assert 0.85 < scuffed.evidence["step_phase"] < 0.97
+    assert scuffed.evidence["rise_m"] == pytest.approx(0.0163)

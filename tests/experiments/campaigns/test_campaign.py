@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -180,13 +180,42 @@ def test_a_trial_that_was_given_up_is_tried_again(tmp_path: Path) -> None:
     assert as_text(campaign.load(tmp_path)) == as_text(campaign.run())
 
 
-def test_a_misspelt_name_of_a_rare_share_is_refused_before_anything_runs() -> None:
-    rare = [
-        Share(1e3, FRICTION),
-        Share(1.0, {"state.v.rot_x": stats.norm(0.0, 0.1)}),
-    ]
-    with pytest.raises(hs.HeelstrikeError, match="rot_x"):
-        hs.Campaign(cases.limp(), rare, 2000, 3)
+@pytest.mark.parametrize(("rare", "words"), [
+    ({"state.v.rot_x": stats.norm(0.0, 0.1)}, "rot_x"),
+    ({"trial": ["usual", "usul"]}, "usul"),
+])  # fmt: skip
+def test_a_misspelt_name_of_a_share_is_refused_though_none_of_its_trials_is_drawn(
+    rare: dict[str, Any], words: str
+) -> None:
+    shares = [Share(1e9, FRICTION), Share(1.0, rare)]
+    with pytest.raises(hs.HeelstrikeError, match=words):
+        hs.Campaign({"usual": cases.limp()}, shares, 3, 3)
+
+
+class Watched(ThreadPoolExecutor):
+    """A pool that notes that it was shut down."""
+
+    down = False
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        self.down = True
+        super().shutdown(wait, cancel_futures=cancel_futures)
+
+
+def test_a_pool_is_shut_down_after_an_error() -> None:
+    pools: list[Watched] = []
+
+    def make() -> Watched:
+        pools.append(Watched(1))
+        return pools[-1]
+
+    def fails(_: Any) -> None:
+        if pools:
+            raise ZeroDivisionError("of who watches")
+
+    with pytest.raises(ZeroDivisionError, match="of who watches"):
+        made().run(executor=make, progress=fails)
+    assert [pool.down for pool in pools] == [True]
 
 
 def counted(monkeypatch: pytest.MonkeyPatch, most: int = 10**9) -> list[int]:

@@ -6,6 +6,7 @@ import importlib.util
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import campaign_cases as cases
@@ -103,13 +104,67 @@ def test_a_job_that_was_cancelled_is_no_death_of_its_trial(times: int, lost: boo
     assert (repr(found) == repr(alone)) is not lost
 
 
-def test_what_is_no_death_ends_the_campaign() -> None:
-    class Lost(Client):
-        def submit(self, *_: Any, **__: Any) -> Any:
-            raise ConnectionError("the scheduler is gone")
+class Ended:
+    """A job of SLURM that was cancelled, as submitit tells it."""
 
-    with pytest.raises(ConnectionError, match="scheduler is gone"):
-        made().run(executor=Lost())
+    def __init__(self, state: str) -> None:
+        self.state = state
+
+    def result(self) -> Any:
+        raise UncompletedJobError("Job has not produced any output")
+
+    def cancel(self) -> None:
+        """It has ended."""
+
+
+class Cluster(Client):
+    """Jobs with trial 40 are ended a few times, in some state."""
+
+    def __init__(self, state: str, times: int) -> None:
+        super().__init__()
+        self.state, self.left = state, times
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, pure: bool = True) -> Any:
+        if 40 in arguments[0].numbers and self.left > 0:
+            self.left -= 1
+            return Ended(self.state)
+        return super().submit(function, *arguments, pure=pure)
+
+
+@pytest.mark.parametrize("state", ["CANCELLED by 1000", "PREEMPTED", "NODE_FAIL"])
+def test_a_job_that_somebody_cancels_is_submitted_again_as_it_was(state: str) -> None:
+    cluster = Cluster(state, 2)
+    assert as_text(made().run(executor=cluster)) == as_text(made().run(workers=1))
+    assert cluster.submitted == 3  # blocks; none was halved
+
+
+def test_jobs_that_are_cancelled_again_and_again_end_the_campaign(tmp_path: Path) -> None:
+    """What was finished is kept, no trial has crashed, and the next call does the rest."""
+    with pytest.raises(SimulationError, match="was cancelled 3 times"):
+        made().run(tmp_path, executor=Cluster("CANCELLED", 100))
+    assert len(made().load(tmp_path)) == 32
+    assert as_text(made().run(tmp_path)) == as_text(made().run(workers=1))
+
+
+def test_a_scheduler_that_is_gone_ends_the_campaign_in_words(tmp_path: Path) -> None:
+    class Lost(Client):
+        def submit(self, *arguments: Any, **named: Any) -> Any:
+            if self.submitted == 2:
+                raise ConnectionError("the scheduler is gone")
+            return super().submit(*arguments, **named)
+
+    with pytest.raises(SimulationError, match="any more: the scheduler is gone"):
+        made().run(tmp_path, executor=Lost())
+    assert as_text(made().run(tmp_path)) == as_text(made().run(workers=1))
+
+
+def test_what_is_no_death_ends_the_campaign() -> None:
+    class Broken(Client):
+        def submit(self, *_: Any, **__: Any) -> Any:
+            raise RuntimeError("a bug")
+
+    with pytest.raises(RuntimeError, match="a bug"):
+        made().run(executor=Broken())
 
 
 def test_deaths_are_told_by_the_names_that_libraries_give_them() -> None:

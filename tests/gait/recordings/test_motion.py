@@ -94,6 +94,19 @@ def test_a_unit_that_is_none_is_told_wherever_a_table_is_read(tmp_path: Path) ->
         motion_of(table, walking.bravo7(), rate=50.0, unit="degree")
 
 
+@pytest.mark.parametrize(("heading", "words"), [
+    ("time [deg]", r"'time \[deg\]' is in deg; s or ms is wanted"),
+    (f"{NAMES[0]} [mm]", "is in mm; rad or deg or degrees is wanted"),
+])  # fmt: skip
+def test_a_unit_of_another_kind_is_refused(heading: str, words: str, tmp_path: Path) -> None:
+    """A time in degrees was read as if a second had 57 of them."""
+    names = ["time", *NAMES]
+    names[names.index(heading.partition(" [")[0])] = heading
+    rows = np.column_stack([np.arange(10.0), ROWS])
+    with pytest.raises(GaitError, match=words):
+        load_recorded_motion(written(tmp_path, ",".join(names), rows), walking.bravo7())
+
+
 @pytest.mark.parametrize("suffix", ["csv", "json"])
 def test_a_joint_that_is_missing_in_a_row_is_told_with_the_row(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"motion.{suffix}"

@@ -6,8 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from heelstrike.analysis.diagnosis.symptoms import Cause, Symptom, Walk, find_symptoms
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.diagnosis.symptoms import Cause, Symptom, Walk, find_symptoms, spells
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import AnyRun, Run
@@ -17,6 +21,10 @@ if TYPE_CHECKING:
 
 RECOVERED = 1.5
 """Steps without a symptom after which a robot has recovered from what was before."""
+BACK = 0.03
+"""Time (s) on its gait after which a robot has recovered, too: all joints pass theirs for less."""
+LONGER = 1.1
+"""How much longer something lasts that is worse than it was before."""
 ANSWERS = {Cause.TORQUE_LIMIT: 0.02, Cause.SPEED_LIMIT: 0.02, Cause.CONTROLLER: 0.005}
 """What a controller shows that answers something else, such as a foot that slips or tips, and how
 long before (s) that is seen: a foot that begins to tip turns slowly at first."""
@@ -59,9 +67,10 @@ def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
     """Find the first cause of a fall.
 
     Symptoms are found one by one (:class:`~heelstrike.analysis.diagnosis.symptoms.Cause` lists
-    them). Those from which the robot recovered, as a step and a half without any shows, are left
-    out; the first of the others is the cause. What is known of walking is that of flat and point
-    feet; a gait that means to roll over its toes shows symptoms when nothing is wrong.
+    them). Those from which the robot recovered are left out: a step and a half without any shows
+    that, or joints that are back on the gait. The first of the others is the cause. What is known
+    of walking is that of flat and point feet; a gait that means to roll over its toes shows
+    symptoms when nothing is wrong.
 
     Parameters
     ----------
@@ -91,10 +100,13 @@ def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
     found = find_symptoms(walk)
     if gait is None and any(each.cause is not Cause.JOINT_STOP for each in found):
         found = tuple(each for each in found if each.cause is not Cause.JOINT_STOP)
-    return fall_of(run, found, walk.step_duration)
+    return fall_of(run, found, walk.step_duration, walk.on_its_gait)
 
 
-def fall_of(run: AnyRun, found: tuple[Symptom, ...], step_duration: float) -> Fall | None:
+def fall_of(
+    run: AnyRun, found: tuple[Symptom, ...], step_duration: float,
+    on_its_gait: NDArray[np.bool_] | None = None,
+) -> Fall | None:  # fmt: skip
     """Say what of some symptoms led to the end of a run that did not go well.
 
     Parameters
@@ -105,6 +117,8 @@ def fall_of(run: AnyRun, found: tuple[Symptom, ...], step_duration: float) -> Fa
         In the order of time.
     step_duration : float
         How long a step takes (s): without a symptom for longer the robot has recovered.
+    on_its_gait : (nt,) bool, optional
+        When it was as if nothing had gone wrong.
 
     Returns
     -------
@@ -112,7 +126,8 @@ def fall_of(run: AnyRun, found: tuple[Symptom, ...], step_duration: float) -> Fa
         Nothing if no symptom lasted, and nothing but its controller or its time ended the run.
     """
     end = float(run.time[-1])
-    chain = _unrecovered(found, end, RECOVERED * step_duration)
+    back = () if on_its_gait is None else _lasting(run.time, on_its_gait)
+    chain = _unrecovered(found, end, RECOVERED * step_duration, back)
     if not chain and run.status in (RunStatus.COMPLETED, RunStatus.STOPPED):  # squats; is done
         return None
     if not chain:
@@ -152,16 +167,35 @@ def _sinks(walk: Walk) -> bool:
     return bool(height[late].min() < SUNK * height[0])
 
 
-def _unrecovered(found: tuple[Symptom, ...], end: float, calm: float) -> list[Symptom]:
-    """Symptoms since the last calm before the end; what a controller answers after its cause."""
+def _lasting(time: Floats, rows: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
+    """Return from when to when something holds without a break, where that lasts."""
+    stretches = ((float(time[a]), float(time[b])) for a, b in spells(time, rows, 0.0))
+    return tuple((begin, end) for begin, end in stretches if end - begin >= BACK)
+
+
+def _unrecovered(
+    found: tuple[Symptom, ...], end: float, calm: float, back: tuple[tuple[float, float], ...]
+) -> list[Symptom]:
+    """Symptoms since the last recovery before the end; what a controller answers after its cause.
+
+    What lasts no longer than it did when the robot recovered from it is left out: from the same
+    state it would recover again.
+    """
     first, latest = 0, -math.inf
     for i, each in enumerate(found):
-        if i and each.time - latest > calm:
+        if i and (each.time - latest > calm or _returned(latest, each.time, back)):
             first = i
         latest = max(latest, each.end)
     if not found or end - latest > calm:
         return []
-    chain = list(found[first:])
+    survived: dict[tuple[Cause, str], float] = {}
+    for each in found[:first]:
+        place = each.cause, each.where
+        survived[place] = max(survived.get(place, 0.0), each.end - each.time)
+    chain = [
+        each for each in found[first:]
+        if each.end - each.time > LONGER * survived.get((each.cause, each.where), -1.0)
+    ] or list(found[first:])  # fmt: skip
     wild = next((each for each in chain if each.cause is Cause.NUMERICAL), None)
     if wild is not None and wild.time <= chain[0].time + WILD_AFTER:
         chain.remove(wild)
@@ -174,6 +208,11 @@ def _unrecovered(found: tuple[Symptom, ...], end: float, calm: float) -> list[Sy
         cause = next((each for each in chain if _drives(each, cause.time)), cause)
     chain.remove(cause)
     return [cause, *chain]
+
+
+def _returned(since: float, until: float, back: tuple[tuple[float, float], ...]) -> bool:
+    """Whether a robot was back on its gait between two times, for long enough."""
+    return any(min(end, until) - max(begin, since) >= BACK for begin, end in back)
 
 
 def _drives(each: Symptom, tipped: float) -> bool:

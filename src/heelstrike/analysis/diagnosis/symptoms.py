@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from heelstrike.analysis.actuation import torque_bounds
 from heelstrike.analysis.diagnosis.limits import REACHED
 from heelstrike.analysis.friction import friction_coefficient
-from heelstrike.analysis.motion import Motion, run_motion
+from heelstrike.analysis.motion import Motion, in_world, run_motion
 from heelstrike.analysis.slip import slip_distance
 from heelstrike.analysis.support import pushing, pushing_feet, stances, step_times
 from heelstrike.analysis.tracking import reference_motion
@@ -50,6 +50,8 @@ ON_HEEL, FLAT, ON_TOE, NOTHING_PUSHES = -1, 0, 1, 9
 EARLY, LATE, LATE_UNSEEN = 0.85, 1.1, 1.3
 """Parts of a step before which a foot lands early, and after which late: of a gait, or of the steps
 of the run."""
+EARLY_ON_RISE = 0.97
+"""The first of them where the ground rises under the foot, which makes it land early."""
 TOUCHES = 1e-3
 """How near the ground a foot is down, whether it is pressed or not, in heights of the centre of
 mass."""
@@ -206,6 +208,17 @@ class Walk:
         return np.asarray(self.run.position[:, joints] - reference)
 
     @cached_property
+    def on_its_gait(self) -> Rows | None:
+        """When its joints are where its gait has them, on a sole that lies flat; None without one.
+
+        Its state is then that of a walk in which nothing went wrong.
+        """
+        if self.error is None:
+            return None
+        flat = (self.edge == FLAT).any(axis=1) | (not self.has_soles)
+        return np.asarray(flat & (np.abs(self.error).max(axis=1, initial=0.0) < LEAVES))
+
+    @cached_property
     def full_torque(self) -> tuple[Rows, Floats, Rows]:
         """Where motors give all that they can; see :func:`full_torque`."""
         return full_torque(self.run, self.run.robot.model.actuator_joint)
@@ -338,6 +351,48 @@ def _tips(walk: Walk) -> Iterator[Symptom]:
             )  # fmt: skip
 
 
+def _pushed_over(walk: Walk) -> Iterator[Symptom]:
+    """Find pushes that the robot cannot withstand on the feet that carry it, however strong it is.
+
+    A push moves the zero moment point by its moment over the force that the feet carry then. Beyond
+    their ends there is none: the robot tips, or what was to hold it gives way first.
+    """
+    run = walk.run
+    if not walk.has_soles:
+        return
+    for push in run.pushes:
+        row = int(np.searchsorted(run.time, push.start - 1e-9)) - 1
+        if row < 0 or not walk.carrying[row].any():
+            continue
+        acts = (run.time >= push.start) & (run.time <= push.end)
+        link, local = push.place(run.robot)
+        origin, angle = walk.motion.link_origin[row, link], walk.motion.link_angle[row, link]
+        normal, points = run.contact_force[row, :, 0], run.contact_point[row]
+        pressed = normal @ points / normal.sum()
+        away = in_world(origin, angle, np.array(local)) - pressed
+        moment = float(push.force[0] * away[1] - push.force[1] * away[0])
+        carried = float(normal.sum()) - push.force[1]
+        if carried <= 0.0:
+            continue  # it is lifted
+        reached = float(pressed[0]) + moment / carried
+        carrying = np.flatnonzero(walk.carrying[row]).tolist()
+        ends = points[[i for foot in carrying for i in run.robot.feet[foot].contacts], 0]
+        beyond = max(reached - float(ends.max()), float(ends.min()) - reached)
+        if beyond > 0.0 and _gives_way(walk, acts):
+            yield Symptom(
+                Cause.TIPPED_FORWARD if moment > 0.0 else Cause.TIPPED_BACK, push.start, push.end,
+                run.robot.feet[carrying[0]].name, {"moment_Nm": moment, "beyond_m": beyond},
+            )  # fmt: skip
+
+
+def _gives_way(walk: Walk, rows: Rows) -> bool:
+    """Whether feet tip or slide, or motors give all they can, in some rows."""
+    slow = SLOW * walk.height / walk.pace
+    slides = pushing(walk.run)[rows] & (np.abs(walk.run.slip_velocity[rows]) > slow)
+    tips = (walk.edge[rows] != FLAT).all(axis=1)
+    return bool(slides.any() or tips.any() or walk.full_torque[0][rows].any())
+
+
 def _landings_amiss(walk: Walk) -> Iterator[Symptom]:
     """Find feet that meet the ground in mid-swing, at the speed at which they swing."""
     run = walk.run
@@ -352,13 +407,14 @@ def _landings_amiss(walk: Walk) -> Iterator[Symptom]:
             contacts = list(run.robot.feet[foot].contacts)
             lowest = contacts[int(np.argmin(run.gap[row, contacts]))]
             velocity = walk.motion.contact_velocity[row, lowest]
+            rise = _rise(walk, float(run.contact_point[row, lowest, 0]), row)
+            rises = rise > SLID * walk.height
             if (
                 in_the_air > IN_THE_AIR * walk.step_duration
-                and phase < EARLY
+                and phase < (EARLY_ON_RISE if rises else EARLY)
                 and abs(velocity[0]) > FAST * walk.speed
             ):
-                rise = _rise(walk, float(run.contact_point[row, lowest, 0]), row)
-                tips = not walk.has_soles and rise < SLID * walk.height
+                tips = not (walk.has_soles or rises)
                 yield Symptom(
                     Cause.TIPPED_FORWARD if tips else Cause.SCUFFED, time,
                     time + IN_THE_AIR * walk.step_duration, run.robot.feet[foot].name,
@@ -408,6 +464,8 @@ def _torques_at_limits(walk: Walk) -> Iterator[Symptom]:
                 missed = float(np.abs(error[first:, i][soon[first:]]).max())
                 if held < HELD or missed < MISSED:
                     continue
+                if not by_speed[first, i] and _drives_away(run, error, i, first, last):
+                    continue
             elif held < HELD_UNSEEN:
                 continue
             cause = Cause.SPEED_LIMIT if by_speed[first, i] else Cause.TORQUE_LIMIT
@@ -417,6 +475,17 @@ def _torques_at_limits(walk: Walk) -> Iterator[Symptom]:
                 {"torque_Nm": float(run.torque[first, i]), "limit_Nm": float(bound[first, i]),
                  "speed_rad_s": float(run.velocity[first, joint]), "missed_rad": missed},
             )  # fmt: skip
+
+
+def _drives_away(run: Run, error: Floats, i: int, first: int, last: int) -> bool:
+    """Whether a motor at its limit moves its joint off the gait: it lacks no torque then.
+
+    What it does until the joint is far from the gait decides: afterwards it may be on its way back.
+    """
+    far = np.flatnonzero(np.abs(error[first : last + 1, i]) >= MISSED)
+    until = first + int(far[0]) if len(far) else last
+    rows = slice(first, until + 1)
+    return bool(run.torque[rows, i] @ error[rows, i] > 0.0)
 
 
 def _joints_at_stops(walk: Walk) -> Iterator[Symptom]:
@@ -486,11 +555,14 @@ def _departures(walk: Walk) -> Iterator[Symptom]:
         return
     away = np.abs(error)
     full, _, _ = walk.full_torque  # what is no fault of who asks for more
-    let = (away > LEAVES) & (run.torque * error >= 0.0) & ~full
+    off = (away > LEAVES) & (run.torque * error >= 0.0)
+    let = off & ~full
     found = []
     for i, name in enumerate(run.robot.actuator_names):
         for first, last in spells(run.time, let[:, i], 0.5 * HELD):
-            if away[first : last + 1, i].max() < MISSED or _is_pushed(run, float(run.time[first])):
+            rest = off[last:, i]  # it may go on at the limit
+            end = last + (len(rest) if rest.all() else int(np.argmin(rest)))
+            if away[first : end + 1, i].max() < MISSED or _is_pushed(run, float(run.time[first])):
                 continue
             soon = run.time[first : last + 1] <= run.time[first] + 4.0 * HELD
             helped = float((run.torque * error)[first : last + 1, i][soon].sum())
@@ -531,6 +603,7 @@ DETECTORS = (
     _ends,
     _departures,
     _runaways,
+    _pushed_over,
     _joints_at_stops,
     _landings_amiss,
     _slips,

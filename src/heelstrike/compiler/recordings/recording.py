@@ -57,7 +57,7 @@ class Program:
     def structural(self, name: str, value: Any) -> Any:
         """Tell which numbers of an array of the model are so in all robots that share the code."""
         by = {each for _, entries in self.derivatives.values() for each in entries}
-        return np.zeros(value.shape, dtype=bool) if name in by else _structural(value)
+        return np.zeros(value.shape, dtype=bool) if name in by else is_structural(value)
 
     def description(self) -> bytes:
         """What its recording depends on besides the source of its kernel."""
@@ -171,7 +171,8 @@ class Recording:
         }
 
 
-def _structural(value: Any) -> Any:
+def is_structural(value: Any) -> Any:
+    """Tell which numbers of the model code is made for: zeros, and ones of either sign."""
     return (value == 0.0) | (np.abs(value) == 1.0)
 
 

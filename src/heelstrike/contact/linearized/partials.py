@@ -26,7 +26,7 @@ import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
-from heelstrike.compiler.recordings.recording import Program
+from heelstrike.compiler.recordings.recording import Program, is_structural
 from heelstrike.compiler.straight_line import play, straight_line_code
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics.frames import into_frame
@@ -195,7 +195,37 @@ def allocate_along(model: Model, samples: int, numbers: Sequence[str] = ()) -> P
     return PartialsAlong.allocate(extents)
 
 
-_known: WeakKeyDictionary[Model, dict[tuple[bool, tuple[str, ...]], int]] = WeakKeyDictionary()
+class MadeFor:
+    """Zeros and ones of a robot's model, which code is made for: it is wrong where they are others.
+
+    Parameters
+    ----------
+    model : Model
+        The model.
+    numbers : tuple of str
+        Numbers by which the code differentiates, which it is not made for.
+    """
+
+    def __init__(self, model: Model, numbers: tuple[str, ...]) -> None:
+        floats = ((name, each) for name, each in model.storage() if each.dtype == np.float64)
+        self._kept = [
+            (name, each, chosen, each[chosen])
+            for name, each in floats
+            if name not in numbers and (chosen := is_structural(each)).any()
+        ]
+
+    @property
+    def changed(self) -> str:
+        """Name of a number that has become another one; nothing if there is none."""
+        for name, numbers, chosen, before in self._kept:
+            if not (numbers[chosen] == before).all():
+                return name
+        return ""
+
+
+_known: WeakKeyDictionary[Model, dict[tuple[bool, tuple[str, ...]], tuple[MadeFor, int]]] = (
+    WeakKeyDictionary()
+)
 
 
 def partial_program(model: Model, *, dated: bool, numbers: tuple[str, ...] = ()) -> int:
@@ -214,9 +244,11 @@ def partial_program(model: Model, *, dated: bool, numbers: tuple[str, ...] = ())
         Of `DYNAMIC`, by which r is differentiated.
     """
     programs = _known.setdefault(model, {})
-    if (dated, numbers) not in programs:
-        programs[dated, numbers] = _compiled(model, dated, numbers)
-    return programs[dated, numbers]
+    made_for, program = programs.get((dated, numbers), (None, 0))
+    if made_for is None or made_for.changed:
+        made_for, program = MadeFor(model, numbers), _compiled(model, dated, numbers)
+        programs[dated, numbers] = made_for, program
+    return program
 
 
 def _compiled(model: Model, dated: bool, numbers: tuple[str, ...]) -> int:
@@ -301,10 +333,15 @@ class Differentiated:
         The robot.
     numbers : tuple of str
         Of `DYNAMIC`, by which r is differentiated too.
+
+    Notes
+    -----
+    Code is made for what is 0, 1 or -1 in the model. Other numbers may be written into it at any
+    time; looks refuse a model in which one of these has become another.
     """
 
     def __init__(self, model: Model, numbers: tuple[str, ...] = ()) -> None:
-        self._model = ref(model)
+        self._model, self.made_for = ref(model), MadeFor(model, numbers)
         self._program = partial_program(model, dated=True, numbers=numbers)
         self.balance, self.partials = allocate_balance(model, numbers)
         self._tree = Workspace.allocate({**model.extents, "components": 2})
@@ -319,7 +356,14 @@ class Differentiated:
         self, *, ahead: float, going: Floats | float = 0.0, acceleration: Floats | float = 0.0,
         push: Floats | float = 0.0, pull: Floats | float = 0.0,
     ) -> None:  # fmt: skip
-        """Find r, s and their derivatives, of a motion under forces; see the module."""
+        """Find r, s and their derivatives, of a motion under forces; see the module.
+
+        Raises
+        ------
+        SimulationError
+            If the model is another one than code was made for.
+        """
+        self._check()
         balance = self.balance
         balance.ahead[:], balance.going[:], balance.acceleration[:] = ahead, going, acceleration
         balance.push[:], balance.pull[:] = push, pull
@@ -330,13 +374,29 @@ class Differentiated:
         )  # fmt: skip
 
     def look_along(self, found: PartialsAlong, normal: Any) -> None:
-        """Find derivatives at many instants, with one normal (2,) of the ground; see there."""
+        """Find derivatives at many instants, with one normal (2,) of the ground; see there.
+
+        Raises
+        ------
+        SimulationError
+            If the model is another one than code was made for.
+        """
+        self._check()
         self.balance.normal[:], self.balance.ahead[:], self.balance.pull[:] = normal, 1.0, 0.0
         model: Any = self._model()
         find_partials_along(
             model, self._program, self._dated, self._tree, self.loops, self.balance,
             self.partials, found,
         )  # fmt: skip
+
+    def _check(self) -> None:
+        changed = self.made_for.changed
+        if changed:
+            raise SimulationError(
+                f"some {changed} of the robot was 0, 1 or -1 when its equations were "
+                "differentiated, and is another number now: the code is made for what it was. "
+                "Differentiate the equations of the changed model again"
+            )
 
 
 _kept = threading.local()
@@ -348,7 +408,7 @@ def differentiated(model: Model, numbers: tuple[str, ...] = ()) -> Differentiate
     if not hasattr(_kept, "equations"):
         _kept.equations = WeakKeyDictionary()
     known = _kept.equations.setdefault(model, {})
-    if numbers not in known:
+    if numbers not in known or known[numbers].made_for.changed:
         known[numbers] = Differentiated(model, numbers)
     found: Differentiated = known[numbers]
     return found

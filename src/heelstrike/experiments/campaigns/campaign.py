@@ -6,9 +6,9 @@ import math
 import os
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -17,9 +17,9 @@ from typing import Any, Protocol
 from heelstrike.analysis.stability.largest import Largest, largest
 from heelstrike.analysis.stability.trial import ROWS, Trial
 from heelstrike.arguments import takes
-from heelstrike.errors import SimulationError
+from heelstrike.errors import HeelstrikeError, SimulationError
 from heelstrike.experiments.campaigns.outcome import CRASHED, Outcome
-from heelstrike.experiments.campaigns.parameters import Draw, Share, planned
+from heelstrike.experiments.campaigns.parameters import Draw, Share, planned, typical
 from heelstrike.experiments.campaigns.results import CampaignResults
 from heelstrike.experiments.campaigns.store import (
     Store,
@@ -39,7 +39,7 @@ from heelstrike.experiments.campaigns.trials import (
     run_block,
     trial_digest,
 )
-from heelstrike.experiments.campaigns.workers import is_death, is_sure
+from heelstrike.experiments.campaigns.workers import is_death, is_lost, is_sure, was_cancelled
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.sim.run import Run
@@ -174,7 +174,7 @@ class Campaign:
             raise SimulationError(f"the duration of trials must be positive, got {duration!r}")
         self.seed, self.draw = seed, draw
         self.plan = planned(parameters, draw, trials, seed)
-        check_parameters(self.trials, list(map(self.plan.of, self.plan.first_trials())))
+        check_parameters(self.trials, list(typical(parameters)))
         self._description = dict(description or {})
         self._bases = {
             name: inputs_digest(each, self.duration) for name, each in self.trials.items()
@@ -223,7 +223,8 @@ class Campaign:
         Raises
         ------
         SimulationError
-            If the folder has another campaign, or another process is at work in it.
+            If the folder has another campaign, another process is at work in it, the workers are
+            gone, as when a scheduler has ended, or jobs of theirs are cancelled again and again.
         WriteError
             If the folder cannot be written to; what was finished is there.
         KeyboardInterrupt
@@ -247,8 +248,11 @@ class Campaign:
             finished = found
             show(Progress(len(self), finished, good, found, 0.0))
             blocks = self._blocks(wanted, limit)
-            with _worked(executor, workers or os.cpu_count() or 1) as work:
-                for block, outcomes in work(blocks):
+            with (
+                _worked(executor, workers or os.cpu_count() or 1) as work,
+                closing(work(blocks)) as done,
+            ):
+                for block, outcomes in done:
                     own = [digests[number] for number in block.numbers]
                     if store is not None:
                         store.keep(own, block.numbers, outcomes)
@@ -257,6 +261,13 @@ class Campaign:
                     good += sum(each.success for each in outcomes)
                     seconds = perf_counter() - begin
                     show(Progress(len(self), finished, good, found, seconds))
+        except Exception as error:
+            if isinstance(error, HeelstrikeError) or not is_lost(error):
+                raise
+            raise SimulationError(
+                f"nobody works on the campaign any more: {error or type(error).__name__}. What was "
+                "finished is kept; the same command goes on"
+            ) from error
         finally:
             if store is not None:
                 store.close()
@@ -398,14 +409,14 @@ class Campaign:
 
 
 TRIES = 3
-"""How often a worker of a cluster must die of a single trial until that is its outcome: jobs are
-cancelled, too."""
+"""How often a worker of a cluster must die of a single trial until that is its outcome, and how
+often a job may be cancelled until the campaign ends."""
 
 Done = tuple[Block, list[Outcome]]
 
 
 @contextmanager
-def _worked(executor: Any, workers: int) -> Iterator[Callable[[Iterable[Block]], Iterator[Done]]]:
+def _worked(executor: Any, workers: int) -> Iterator[Callable[[Iterable[Block]], Generator[Done]]]:
     """Make a function that has blocks worked on, and yields them in their order as they come."""
     if executor is not None:
         yield partial(_by_others, executor)
@@ -423,7 +434,7 @@ def _worked(executor: Any, workers: int) -> Iterator[Callable[[Iterable[Block]],
 
 def _in_order(
     submit: Callable[[Block], Any], blocks: Iterable[Block], ahead: int
-) -> Iterator[Done]:
+) -> Generator[Done]:
     waiting: deque[tuple[Block, Any]] = deque()
     for block in blocks:
         waiting.append((block, submit(block)))
@@ -434,7 +445,7 @@ def _in_order(
         yield block, future.result()
 
 
-def _by_others(executor: Any, blocks: Iterable[Block]) -> Iterator[Done]:
+def _by_others(executor: Any, blocks: Iterable[Block]) -> Generator[Done]:
     """Have blocks worked on by an executor; where one dies of a block, find the trial.
 
     A maker of executors is asked for another then; an executor that was given is broken for good.
@@ -472,8 +483,8 @@ def _by_others(executor: Any, blocks: Iterable[Block]) -> Iterator[Done]:
             except Exception as error:  # of a cluster, which goes on without a worker that died
                 if not is_death(error):
                     raise
-                block, _ = waiting.popleft()
-                yield block, _again(worker, block, error, died=1)
+                block, future = waiting.popleft()
+                yield block, _again(worker, block, future, error)
     finally:
         for _, future in waiting:
             if hasattr(future, "cancel"):
@@ -493,21 +504,35 @@ def _alone(make: Callable[[], Any], block: Block) -> list[Outcome]:
         worker.shutdown()
 
 
-def _together(worker: Any, block: Block, died: int = 0) -> list[Outcome]:
+def _together(worker: Any, block: Block, died: int = 0, cancelled: int = 0) -> list[Outcome]:
     """Work on a block with an executor that goes on when a worker dies, as some did before."""
+    future = worker.submit(run_block, block)
     try:
-        found: list[Outcome] = worker.submit(run_block, block).result()
+        found: list[Outcome] = future.result()
         return found
     except Exception as error:
         if isinstance(error, BrokenExecutor) or not is_death(error):
             raise
-        return _again(worker, block, error, died + 1)
+        return _again(worker, block, future, error, died, cancelled)
 
 
-def _again(worker: Any, block: Block, error: Exception, died: int) -> list[Outcome]:
-    """Work again on a block that workers died of: on each half, on a single trial several times."""
-    if len(block.numbers) == 1 and died < TRIES and not is_sure(error):
-        return _together(worker, block, died)
+def _again(
+    worker: Any, block: Block, future: Any, error: Exception, died: int = 0, cancelled: int = 0
+) -> list[Outcome]:
+    """Work again on a block that did not complete.
+
+    One that was cancelled is worked on as it was. One that workers died of is halved; a single
+    trial is tried several times.
+    """
+    if was_cancelled(future):
+        if cancelled + 1 >= TRIES:
+            raise SimulationError(
+                f"a job of the campaign was cancelled {TRIES} times. What was finished is kept; "
+                "the same command goes on"
+            ) from error
+        return _together(worker, block, died, cancelled + 1)
+    if len(block.numbers) == 1 and died + 1 < TRIES and not is_sure(error):
+        return _together(worker, block, died + 1)
     return _by_halves(partial(_together, worker), block, error)
 
 

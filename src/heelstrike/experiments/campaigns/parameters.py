@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -74,11 +74,6 @@ class Plan:
     """Whether its trials are drawn from distributions, each by itself: shares of them estimate
     probabilities then. Those of a grid and of a sensitivity design are chosen."""
 
-    def first_trials(self) -> list[int]:
-        """Return for each parameter the first trial in which it differs, if there is one."""
-        differs = np.isfinite(self.values)
-        return sorted({int(rows.argmax()) for rows in differs.T if rows.any()})
-
     def of(self, number: int) -> dict[str, Any]:
         """Return what is other in a trial, by the names of its parameters."""
         row = self.values[number].tolist()
@@ -127,6 +122,30 @@ def planned(
         values = _drawn(shares, names, texts, _uniform(draw, count, base, seed, len(names)))
     chosen = draw in (Draw.GRID, Draw.SENSITIVITY)
     return Plan(names, values, texts, _own_seeds(seed, len(values)), base, not chosen)
+
+
+def typical(parameters: Mapping[str, Any] | Sequence[Share]) -> Iterator[dict[str, Any]]:
+    """Yield a value of each parameter of every share, whether it is ever drawn or not.
+
+    Of a distribution it is the median, of a list the first entry; each text of a list has its turn.
+
+    Parameters
+    ----------
+    parameters : mapping or sequence of Share
+        What differs.
+    """
+    shares = [Share(1.0, parameters)] if isinstance(parameters, Mapping) else parameters
+    for share in shares:
+        entries = {
+            name: [float(given.ppf(0.5))] if hasattr(given, "ppf") else _listed(given)
+            for name, given in share.parameters.items()
+        }
+        most = max(map(len, entries.values()), default=0)
+        for k in range(most):
+            yield {
+                name: each[k if isinstance(each[0], str) and k < len(each) else 0]
+                for name, each in entries.items()
+            }
 
 
 def own_sequence(seed: int, number: int) -> np.random.SeedSequence:

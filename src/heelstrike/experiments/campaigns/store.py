@@ -137,12 +137,17 @@ class Store:
 
 
 @contextmanager
-def told(folder: Path) -> Iterator[None]:
+def told(folder: Path, *, reads: bool = False) -> Iterator[None]:
     """Turn what the database says into words."""
     path = folder / DATABASE
     try:
         yield
     except sqlite3.OperationalError as error:
+        if reads:
+            raise SimulationError(
+                f"{path} cannot be read: {error}. If its campaign was killed, only who may write "
+                "there can open it; ask for the right to, or copy the folder"
+            ) from error
         raise WriteError(
             f"cannot write {path}: {error}. What was finished is kept; the same command goes on"
         ) from error
@@ -161,7 +166,7 @@ def reading(folder: Path) -> Iterator[sqlite3.Connection]:
     """
     if not (folder / DATABASE).is_file():
         raise SimulationError(f"{folder} has no campaign: there is no {DATABASE} in it")
-    with told(folder):
+    with told(folder, reads=True):
         connection = _readable((folder / DATABASE).resolve().as_uri())
         try:
             yield connection

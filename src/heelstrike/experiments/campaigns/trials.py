@@ -245,8 +245,7 @@ def check_parameters(trials: Mapping[str, Trial], values: Sequence[Mapping[str, 
     if pushes and "impulse" not in pushes:
         raise SimulationError(f"push.{pushes[0]} is of a push that has no push.impulse. Give one.")
     for each in values:
+        _, trial = chosen(trials, each)
         for name in each.keys() - seen - {TRIAL}:
-            target(name)
-            _, trial = chosen(trials, each)
             laid(trial, {name: each[name]}, 0)
             seen.add(name)

@@ -14,8 +14,15 @@ DEATHS = ("BrokenExecutor", "KilledWorker", "UncompletedJobError")
 """Errors by which executors of Python, Dask and submitit say that a worker died of its work."""
 
 SURE = ("KilledWorker",)
-"""Those raised after several workers died of the same work. A job of submitit is also called
-uncompleted when somebody cancels it or its time is over."""
+"""Those raised after several workers died of the same work."""
+
+CANCELLED = ("CANCELLED", "PREEMPTED", "NODE_FAIL", "BOOT_FAIL", "REVOKED")
+"""States of jobs of SLURM that somebody else ended, or a machine; submitit calls them uncompleted,
+as it does those that die."""
+
+LOST = ("OSError", "CancelledError")
+"""Errors by which executors say that nobody works any more, as when a scheduler of Dask has ended
+and its connection is closed."""
 
 
 def is_death(error: BaseException) -> bool:
@@ -38,6 +45,28 @@ def is_sure(error: BaseException) -> bool:
         What ``result()`` raised.
     """
     return _is_called(error, SURE)
+
+
+def was_cancelled(work: Any) -> bool:
+    """Whether a job that did not complete was ended by somebody, and not by its own work.
+
+    Parameters
+    ----------
+    work : Any
+        What an executor returned for it; those of submitit have the ``state`` of their job.
+    """
+    return str(getattr(work, "state", "")).startswith(CANCELLED)
+
+
+def is_lost(error: BaseException) -> bool:
+    """Whether an error says that nobody is there any more who would work.
+
+    Parameters
+    ----------
+    error : BaseException
+        What ``submit()`` or ``result()`` raised.
+    """
+    return _is_called(error, LOST)
 
 
 def _is_called(error: BaseException, names: tuple[str, ...]) -> bool:

@@ -11,10 +11,10 @@ from heelstrike.field_texts import dataclass
 from heelstrike.gait.recordings.lines import Name
 from heelstrike.gait.recordings.markers import AXES, axis_and_sense
 from heelstrike.gait.recordings.table import Table, read_table
-from heelstrike.gait.recordings.units import UNITS
+from heelstrike.gait.recordings.units import FORCES, LENGTHS
 from heelstrike.robot.model import Floats
 
-KINDS = {"v": ("n",), "p": ("m", "cm", "mm")}
+KINDS = {"v": FORCES, "p": LENGTHS}
 """Units of forces and of where they act; the first one where none is told."""
 
 
@@ -76,12 +76,4 @@ def load_forces(path: Name, *, forward: str = "x", up: str = "y") -> RecordedFor
 
 def _scale(table: Table, name: str) -> float:
     """What a number of a column is in N or m."""
-    k = table.column(name)
-    units = KINDS[name[-2]]
-    unit = table.units[k] or units[0]
-    if unit not in units:
-        raise GaitError(
-            f"{table.path}: column {table.written[k]!r} is in {unit}; {' or '.join(units)} is "
-            "wanted"
-        )
-    return UNITS[unit]
+    return table.unit(table.column(name), KINDS[name[-2]])

@@ -20,7 +20,7 @@ from heelstrike.gait.recordings.landmarks import landmark_of
 from heelstrike.gait.recordings.lines import Name
 from heelstrike.gait.recordings.table import Table, read_table
 from heelstrike.gait.recordings.trc import points_of_trc
-from heelstrike.gait.recordings.units import UNITS, plain
+from heelstrike.gait.recordings.units import LENGTHS, plain
 from heelstrike.robot.model import Floats
 from heelstrike.wording import meant
 
@@ -200,7 +200,7 @@ def _points_of_table(table: Table, rate: float | None) -> Points:
     position = np.full((len(table.values), len(columns), 3), np.nan)
     for k, each in enumerate(columns.values()):
         for axis, column in each.items():
-            unit = UNITS[table.units[column] or "m"]
+            unit = table.unit(column, LENGTHS)
             position[:, k, AXES.index(axis)] = table.values[:, column] * unit
     flat = all("z" not in each for each in columns.values())
     return Points(table.begin + table.time(rate), tuple(columns), position, "y" if flat else "z")

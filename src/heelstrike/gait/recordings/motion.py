@@ -9,7 +9,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.gait.recordings.lines import Name
 from heelstrike.gait.recordings.opensim import joints_of_opensim
 from heelstrike.gait.recordings.table import Table, read_table
-from heelstrike.gait.recordings.units import UNITS, check_unit, plain
+from heelstrike.gait.recordings.units import ANGLES, LENGTHS, check_unit, plain
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.wording import meant
@@ -126,7 +126,11 @@ def motion_of(
         )
     names = [plain(name) for name in robot.actuator_names]
     order = [table.column(name) for name in names]
-    scale = [UNITS[table.units[column] or unit or "rad"] for column in order]
+    turns = robot.model.axis[robot.model.actuator_joint, 0] != 0.0
+    scale = [
+        table.unit(column, ANGLES, unit) if turn else table.unit(column, LENGTHS)
+        for column, turn in zip(order, turns.tolist(), strict=True)
+    ]
     used = {*order, table.column("time")}
     ignored = tuple(name for column, name in enumerate(table.written) if column not in used)
     return RecordedMotion(table.time(rate), table.whole(names) * scale, ignored)

@@ -16,8 +16,8 @@ from heelstrike.gait.recordings.units import (
     ANGLES,
     FORCES,
     LENGTHS,
+    TIMES,
     TORQUES,
-    UNITS,
     check_unit,
     plain,
 )
@@ -218,7 +218,7 @@ def _last_of_each_time(table: Table) -> Table:
     column = table.column("time")
     if column < 0:
         return table
-    steps = np.diff(table.values[:, column], append=np.inf) * UNITS[table.units[column] or "s"]
+    steps = np.diff(table.values[:, column], append=np.inf) * table.unit(column, TIMES)
     kept = ~((steps >= 0.0) & (steps <= SAME_ROW))
     places = tuple(place for place, keeps in zip(table.places, kept, strict=True) if keeps)
     return replace(table, values=table.values[kept], places=places)
@@ -237,14 +237,9 @@ def _columns(table: Table, columns: Sequence[int], kinds: Sequence[Kind], unit: 
     GaitError
         If a number is missing, or a column is in a unit of another kind.
     """
-    scale = []
-    for k, kind in zip(columns, kinds, strict=True):
-        given = table.units[k]
-        if given and given not in kind:
-            raise GaitError(
-                f"{table.path}: column {table.written[k]!r} is in {given}; its unit must be one of "
-                f"{', '.join(kind)}"
-            )
-        scale.append(UNITS[given or (unit if kind is ANGLES else "") or kind[0]])
+    scale = [
+        table.unit(k, kind, unit if kind is ANGLES else "")
+        for k, kind in zip(columns, kinds, strict=True)
+    ]
     found: Floats = table.whole([table.names[k] for k in columns]) * scale
     return found

@@ -22,11 +22,11 @@ from heelstrike.gait.recordings.lines import (
     numbers_in,
     text_of,
 )
-from heelstrike.gait.recordings.units import UNITS, told
+from heelstrike.gait.recordings.units import TIMES, UNITS, told
 from heelstrike.robot.model import Floats
 from heelstrike.sim.files.table import EVENTS
 
-TIMES = ("time", "t", "seconds")
+NAMES_OF_TIME = ("time", "t", "seconds")
 """Columns that hold times."""
 HEADER_ENDS = "endheader"
 """Line after which a table of OpenSim begins."""
@@ -83,11 +83,36 @@ class Table:
             )
         return values
 
+    def unit(self, column: int, kinds: Sequence[str], usual: str = "") -> float:
+        """Return the unit of a column in ours.
+
+        Parameters
+        ----------
+        column : int
+            Its place.
+        kinds : sequence of str
+            Units that make sense.
+        usual : str
+            That of a column that tells none; by default the first of them.
+
+        Raises
+        ------
+        GaitError
+            If it is in another one.
+        """
+        given = self.units[column] or usual or kinds[0]
+        if given not in kinds:
+            raise GaitError(
+                f"{self.path}: column {self.written[column]!r} is in {given}; "
+                f"{' or '.join(kinds)} is wanted"
+            )
+        return UNITS[given]
+
     @property
     def begin(self) -> float:
         """Time of the first row, as the file counts it, in s."""
         k = self.column("time")
-        return 0.0 if k < 0 else float(self.values[0, k]) * UNITS[self.units[k] or "s"]
+        return 0.0 if k < 0 else float(self.values[0, k]) * self.unit(k, TIMES)
 
     def time(self, rate: float | None = None) -> Floats:
         """Return the times of the rows from 0 on, (n,), in s.
@@ -100,7 +125,7 @@ class Table:
         Raises
         ------
         GaitError
-            If there are none, or they do not go on.
+            If there are none, they do not go on, or they are in no unit of time.
         """
         column = self.column("time")
         if column < 0:
@@ -111,7 +136,7 @@ class Table:
                 )
             return np.arange(len(self.values)) / rate
         given = self.values[:, column]
-        time: Floats = (given - given[0]) * UNITS[self.units[column] or "s"]
+        time: Floats = (given - given[0]) * self.unit(column, TIMES)
         steps = np.diff(time) > 0.0
         if not steps.all():
             line = self.places[int(np.argmin(steps)) + 1]
@@ -170,7 +195,7 @@ def table_of(
     known, units = [], []
     for name in names:
         called, unit = told(name)
-        known.append("time" if called in TIMES else called)
+        known.append("time" if called in NAMES_OF_TIME else called)
         units.append(unit)
     for k, name in enumerate(known):
         if name in known[:k]:

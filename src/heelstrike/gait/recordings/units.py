@@ -19,7 +19,8 @@ ANGLES = ("rad", "deg", "degrees")
 LENGTHS = ("m", "cm", "mm")
 FORCES = ("n",)
 TORQUES = ("n m",)
-"""ANGLES, LENGTHS, FORCES, TORQUES: Units of each kind, ours first."""
+TIMES = ("s", "ms")
+"""ANGLES, LENGTHS, FORCES, TORQUES, TIMES: Units of each kind, ours first."""
 
 
 def check_unit(unit: str) -> None:
