@@ -7,8 +7,8 @@ Run, from the top folder::
 
 A family has 10 speeds and 10 slopes, -8° to 8°. In the middle of each of the 81 cells its gait is
 interpolated, held against the optimum (the better one of those that are found from it and from
-scratch), and walked event-driven under computed
-torque on its slope: 20 steps on flat feet, one on points, on which computed torque cannot go on.
+scratch), and walked event-driven under computed torque on its slope: 20 steps on flat feet, one on
+points, on which computed torque cannot go on.
 Times are of the clock and of the processor; the load is that of the machine before and after.
 """
 
