@@ -11,6 +11,11 @@ the hip up to half of weight times leg; friction 0.8. What is least is the cost 
 twentieth of weight times leg: every gait of ours is one of his problem. His has limits on how fast
 forces change, which ours does not. Speed and step are given here, from within his bounds.
 
+His walk (0.0744744; 0.6 kg at each foot, legs of 0.7 to 0.9 m, a step of 0.05 m at 0.1 m/s) is not
+reached: more than a third of its work is done by an ankle torque up to 0.2 weight times leg, and
+what `hs.optimize_motion` finds without one swings torques between the instants at which it looks at
+the power.
+
 The trunk between the legs has an inertia of 0.01 kg m², which his has not: torques at the two hips
 are then opposite but for what turns it. Costs are those of the motion, by inverse dynamics on 400
 instants of each phase; times are of the processor.

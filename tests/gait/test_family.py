@@ -57,7 +57,7 @@ def test_what_was_interrupted_goes_on(bravo7: hs.Robot, tmp_path: Path) -> None:
 
     def interrupt(share: float) -> None:
         told.append(share)
-        if share > 0.4:
+        if share > 0.3:  # the second of two
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

@@ -14,6 +14,7 @@ import numpy as np
 from heelstrike.arguments import takes
 from heelstrike.errors import GaitError, InfeasibleGaitError, WriteError
 from heelstrike.field_texts import dataclass
+from heelstrike.gait.branches import Place, on_the_cheaper_branch
 from heelstrike.gait.file import LARGEST_NUMBER, check_robot, entries_of, gait_of
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.optimize import optimize_gait, request_of
@@ -22,12 +23,11 @@ from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.whole_file import write_whole
 
-Place = tuple[int, ...]
-"""Indices of a point of the grid, an axis each."""
-
 AXES = ("step_length", "step_duration", "speed", "slope", "rise")
 """What a family may be spanned over."""
 VERSION = 1
+FIRST = 0.7
+"""Share of the work until every place has a gait."""
 LARGEST_FILE = 2**26
 """Files of families larger than this (in bytes) are refused."""
 
@@ -59,10 +59,11 @@ class GaitFamily:
     def at(self, **values: float) -> Gait:
         """Gait between those of the grid.
 
-        The motion is interpolated linearly between the gaits at the corners of the cell, then
-        changed as little as makes it satisfy all equations of a step: the foot lands in its place,
-        and the velocities after the impact are those with which the step began. Limits between the
-        corners are not enforced; `gait.margins` tells how far they are.
+        The motion is interpolated, linearly between the gaits at the corners of the cell and by
+        polynomials of third degree through those around it, then changed as little as makes it
+        satisfy all equations of a step: the foot lands in its place, and the velocities after the
+        impact are those with which the step began. The cheaper one of the two is returned. Limits
+        between the gaits are not enforced; `gait.margins` tells how far they are.
 
         Parameters
         ----------
@@ -79,35 +80,47 @@ class GaitFamily:
         GaitError
             If a value is missing, of no axis or out of range, or the cell has a gap.
         """
-        cell = self._cell(values)
-        corners = [(self._corner(place), weight) for place, weight in cell]
+        corners = [(self._corner(place), weight) for place, weight in self._weights(values, 2)]
         if len(corners) == 1:
             return corners[0][0]
         from heelstrike.gait.design import between
 
-        return between(request_of(self.robot, **self.asked, **values), corners)
+        request, mixtures = request_of(self.robot, **self.asked, **values), [corners]
+        around = self._weights(values, 4)
+        if len(around) > len(corners) and all(place in self.gaits for place, _ in around):
+            mixtures.append([(self.gaits[place], weight) for place, weight in around])
+        return min((between(request, each) for each in mixtures), key=lambda gait: gait.spent)
 
-    def _cell(self, values: Mapping[str, float]) -> list[tuple[Place, float]]:
-        """Corners of the cell of a point, with the weights that are not zero."""
+    def _weights(self, values: Mapping[str, float], width: int) -> list[tuple[Place, float]]:
+        """Places about a point, so many along each axis, with Lagrange's weights but for zeros."""
         if set(values) != set(self.axes):
             raise GaitError(
                 f"give a value of each axis, {', '.join(self.axes)}; "
                 f"got {', '.join(values) or 'none'}"
             )
-        ends: list[list[tuple[int, float]]] = []
+        along: list[list[tuple[int, float]]] = []
         for name, axis in self.axes.items():
             value = values[name]
             if not axis[0] <= value <= axis[-1]:
                 raise GaitError(
                     f"{name} = {value:g} is outside of the family, {axis[0]:g} to {axis[-1]:g}"
                 )
-            i = max(0, min(int(np.searchsorted(axis, value, side="right")) - 1, axis.size - 2))
-            share = 0.0 if axis.size == 1 else float((value - axis[i]) / (axis[i + 1] - axis[i]))
-            both = [(i, 1.0 - share), (i + 1, share)]
-            ends.append([each for each in both if each[1] > 0.0])
+            count = min(width, axis.size)
+            first = int(np.searchsorted(axis, value, side="right")) - width // 2
+            near = range(axis.size)[max(0, min(first, axis.size - count)) :][:count]
+            weights = [
+                (
+                    i,
+                    float(
+                        np.prod([(value - axis[j]) / (axis[i] - axis[j]) for j in near if j != i])
+                    ),
+                )
+                for i in near
+            ]
+            along.append([each for each in weights if each[1] != 0.0])
         return [
-            (tuple(i for i, _ in corner), float(np.prod([weight for _, weight in corner])))
-            for corner in product(*ends)
+            (tuple(i for i, _ in place), float(np.prod([weight for _, weight in place])))
+            for place in product(*along)
         ]
 
     def _corner(self, place: Place) -> Gait:
@@ -162,7 +175,8 @@ def gait_family(
 ) -> GaitFamily:
     """Design gaits over a grid of steps and grounds, each started from its nearest neighbour.
 
-    Arguments of which a sequence is given are the axes of the grid.
+    Arguments of which a sequence is given are the axes of the grid. Where neighbours move very
+    differently, each is sought again from the other, and the cheaper gait is kept.
 
     Parameters
     ----------
@@ -215,22 +229,35 @@ def gait_family(
     family = GaitFamily(robot, axes, {**asked, **fixed}, gaits, gaps)
     if file is not None and Path(file).exists():
         _go_on(family, load_gait_family(file, robot), gaits, gaps)
-    places = list(_from_the_middle([axis.size for axis in axes.values()]))
-    for done, place in enumerate(places):
-        if progress is not None:
-            progress(done / len(places))
-        if place in gaits or place in gaps:
-            continue
+
+    def designed(place: Place, near: Gait | None) -> Gait:
         point: dict[str, Any] = {
             name: float(axis[i]) for (name, axis), i in zip(axes.items(), place, strict=True)
         }
-        near = _nearest(place, gaits)
+        return optimize_gait(robot, **family.asked, **point, warm_start=near)
+
+    def sought(place: Place, near: Gait) -> Gait | None:
         try:
-            gaits[place] = optimize_gait(robot, **family.asked, **point, warm_start=near)
-        except InfeasibleGaitError as error:
-            gaps[place] = str(error)
+            return designed(place, near)
+        except InfeasibleGaitError:
+            return None
+
+    def save() -> None:
         if file is not None:
             family.save(file)
+
+    places = list(_from_the_middle([axis.size for axis in axes.values()]))
+    for done, place in enumerate(places):
+        if progress is not None:
+            progress(FIRST * done / len(places))
+        if place in gaits or place in gaps:
+            continue
+        try:
+            gaits[place] = designed(place, _nearest(place, gaits))
+        except InfeasibleGaitError as error:
+            gaps[place] = str(error)
+        save()
+    on_the_cheaper_branch(gaits, sought, save)
     if progress is not None:
         progress(1.0)
     return family

@@ -56,6 +56,19 @@ def test_trc_with_a_marker_that_was_not_always_seen(tmp_path: Path) -> None:
     assert np.isnan(seen.of("right_heel")[4]).all()
 
 
+def test_times_of_trc_that_are_rounded_are_even(tmp_path: Path) -> None:
+    """At 60 Hz to the millisecond; where a row is late by more than that, they stay as they are."""
+    path = trc(tmp_path, places())
+    lines = path.read_text(encoding="utf-8").replace("100.0\t100.0", "60.00\t60.00").split("\n")
+    for late, expected in ((0.0, 1.0 / 60.0), (0.004, 0.017)):
+        for k in range(ROWS):
+            words = lines[6 + k].split("\t")
+            words[1] = f"{2.0 + k / 60.0 + late * (k == 9):.3f}"
+            lines[6 + k] = "\t".join(words)
+        path.write_text("\n".join(lines), encoding="utf-8")
+        assert load_markers(path).time[1] == pytest.approx(expected, abs=1e-12)
+
+
 def test_who_walks_another_way_is_turned_round(tmp_path: Path) -> None:
     """Along -z of the file, in cm."""
     position = places()

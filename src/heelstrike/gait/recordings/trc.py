@@ -10,6 +10,9 @@ from heelstrike.gait.recordings.table import FASTEST, SLOWEST
 from heelstrike.gait.recordings.units import UNITS
 from heelstrike.robot.model import Floats
 
+ROUNDED = 1e-3
+"""Times are often written to the millisecond (s); rows that are so near to the header's rate are
+taken by that: accelerations would suffer from rounded times."""
 HEADER = 5
 """Lines before the numbers: kind, names and values of what holds for all, markers, their axes."""
 
@@ -17,7 +20,7 @@ HEADER = 5
 def points_of_trc(path: Name) -> tuple[Floats, tuple[str, ...], Floats]:
     """Read times (n,) in s, names of markers, and positions (n, m, 3) in m; NaN where unseen.
 
-    Times are as the file counts them.
+    Times are as the file counts them, and evenly spaced where they are so but for rounding.
 
     Raises
     ------
@@ -53,5 +56,10 @@ def points_of_trc(path: Name) -> tuple[Floats, tuple[str, ...], Floats]:
         raise GaitError(f"{path}, line {line}: the time does not go on")
     if not SLOWEST <= (len(time) - 1) / (time[-1] - time[0]) <= FASTEST:
         raise GaitError(f"{path}: its times are in no seconds")
+    rate = said.get("datarate", "")
+    if rate.replace(".", "", 1).isdigit() and float(rate) > 0.0:
+        even = time[0] + np.arange(len(time)) / float(rate)
+        if np.abs(time - even).max() <= ROUNDED:
+            time = even
     position = UNITS[unit] * numbers[:, 2:].reshape(len(numbers), -1, 3)
     return time, names, position

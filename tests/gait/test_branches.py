@@ -1,0 +1,60 @@
+"""The cheaper branch of a family spreads, and stops where the other one is cheaper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from heelstrike.gait.branches import Place, on_the_cheaper_branch
+
+
+@dataclass(frozen=True)
+class Fake:
+    """A gait whose one joint rests: where, tells the branch."""
+
+    place: int
+    branch: int
+    optimal: bool = True
+    step_duration: float = 1.0
+
+    @property
+    def spent(self) -> float:
+        """Branches cross between places 5 and 6; below, the first one is cheaper."""
+        return 10.0 + (5.5 - self.place) * (-1.0 if self.branch == 0 else 1.0)
+
+    def position(self, times: np.ndarray) -> np.ndarray:
+        return np.full((len(times), 1), 0.01 * self.place + self.branch)
+
+
+def family(*branches: int) -> dict[Place, Fake]:
+    return {(k,): Fake(k, branch) for k, branch in enumerate(branches)}
+
+
+def spread(gaits: dict[Place, Fake]) -> tuple[list[int], int, int]:
+    """Branches in the end, how many gaits were sought, and how many replaced."""
+    sought, changed = [], []
+
+    def seek(place: Place, near: Fake) -> Fake | None:
+        sought.append(place)
+        return None if place == (9,) else Fake(place[0], near.branch)
+
+    on_the_cheaper_branch(gaits, seek, lambda: changed.append(1))  # type: ignore[arg-type]
+    return [gaits[k,].branch for k in range(len(gaits))], len(sought), len(changed)
+
+
+def test_the_cheaper_branch_spreads_to_where_they_cross() -> None:
+    end = [0, 0, 0, 0, 0, 0, 1, 1, 1, 1]
+    assert spread(family(0, 0, 1, 1, 1, 1, 1, 1, 1, 1))[0] == end
+    assert spread(family(0, 0, 0, 0, 0, 0, 0, 0, 0, 1))[0] == end  # backwards
+
+
+def test_one_branch_is_left_alone() -> None:
+    assert spread(family(*[1] * 10)) == ([1] * 10, 0, 0)
+
+
+def test_what_is_no_optimum_gives_way_and_never_replaces() -> None:
+    gaits = family(0, 0, 0, 0, 0, 0, 1, 1, 1, 1)
+    gaits[2,] = Fake(2, 1, optimal=False)
+    assert spread(gaits)[0] == [0, 0, 0, 0, 0, 0, 1, 1, 1, 1]
+    assert all(gait.optimal for gait in gaits.values())
