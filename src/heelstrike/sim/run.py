@@ -284,6 +284,25 @@ class AnyRun(ShownInNotebooks):
         run: Any = self
         return animate(run, path, **options)
 
+    def save_report(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a report of the run; see :func:`heelstrike.report`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.report.writing import report
+
+        return report(self, path, **options)
+
     def to_dataset(self) -> xarray.Dataset:
         """Return the run as a labelled dataset with units."""
         from heelstrike.sim.files.dataset import to_dataset
@@ -460,25 +479,6 @@ class Run(AnyRun):
         from heelstrike.view.notebook.cards import film
 
         return film(self, gait, height)
-
-    def save_report(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a report of the run; see :func:`heelstrike.report`.
-
-        Parameters
-        ----------
-        path : str or path
-            File to write.
-        **options
-            As for that function.
-
-        Returns
-        -------
-        Path
-            The file.
-        """
-        from heelstrike.view.report.writing import report
-
-        return report(self, path, **options)
 
 
 def quantities_of(run: type[AnyRun]) -> dict[str, Quantity]:
