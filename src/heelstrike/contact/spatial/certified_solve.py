@@ -27,7 +27,7 @@ from heelstrike.contact.spatial.newton import RIDGE, iterate_newton
 from heelstrike.contact.spatial.proximal import approach
 from heelstrike.contact.spatial.restarts import try_other_starts
 from heelstrike.contact.spatial.scaling import give_impulses, scale_blocks, take_impulses
-from heelstrike.contact.spatial.sticking import try_sticking
+from heelstrike.contact.spatial.sticking import stick_within_cones, try_sticking
 from heelstrike.contact.spatial.workspace import (
     BlockAnswer,
     BlockProblem,
@@ -94,6 +94,9 @@ def try_way(way: int, slips: bool, problem: BlockProblem, work: BlockWorkspace) 
             problem, scaled, settings, NEXT_STEPS, RIDGE, False, tally, iterate, newton
         )  # fmt: skip
     elif way == REGULARISED:
+        if stick_within_cones(problem, settings, scaled, tally, iterate, newton):
+            return
+        return_to_best(problem, scaled, iterate)
         for turn in range(3):
             ridge = FIRST_RIDGE if turn == 0 else (NEXT_RIDGE if turn == 1 else LAST_RIDGE)
             sweep(problem, scaled, NEXT_SWEEPS, tally, iterate)

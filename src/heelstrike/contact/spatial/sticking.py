@@ -11,11 +11,14 @@ from __future__ import annotations
 import math
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.sets import CONE, HALF_LINE
-from heelstrike.contact.spatial.iterates import look
+from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL
+from heelstrike.contact.spatial.cones import project
+from heelstrike.contact.spatial.iterates import find_velocities, look, return_to_best
 from heelstrike.contact.spatial.modes import OPEN, SLIP, STICK
 from heelstrike.contact.spatial.workspace import (
     BlockProblem,
+    BlockSettings,
+    BlockTally,
     Floats,
     Integers,
     Iterate,
@@ -41,6 +44,16 @@ ROUNDS_OF_OPENING = 4
 
 STUCK = 1e-12
 """Residual up to which an answer of sticking contacts is taken."""
+
+
+PROJECTIONS, CORRECTIONS = 100, 2
+"""How often impulses that hold are brought into their cones, and held again each time."""
+
+INSIDE = 0.95
+"""Part of the friction that they are brought into, so that a few times are enough."""
+
+AT_ITS_BOUND = 1.0 - 1e-9
+"""Part of its bound from which on dry friction is taken to slide."""
 
 
 @kernel
@@ -158,4 +171,83 @@ def try_sticking(
             return True
         if correct_modes(problem, iterate) == 0:
             return False
+    return False
+
+
+@kernel
+def list_held_rows(
+    problem: BlockProblem, settings: BlockSettings, scaled: ScaledBlocks, iterate: Iterate,
+    newton: NewtonSystem,
+) -> int:  # fmt: skip
+    """List the rows of all that touches or sticks; return how many.
+
+    Their impulses become zero. Dry friction that slides keeps its own.
+    """
+    size = 0
+    for block in range(problem.count):
+        begin, kind = problem.first[block], problem.set[block]
+        pressed = iterate.x[begin]
+        free = kind == INTERVAL and abs(pressed) >= AT_ITS_BOUND * scaled.bound[block]
+        if kind in (CONE, HALF_LINE):
+            free = pressed <= 0.0 and iterate.u[begin] > settings.tolerance
+        for row in range(begin, problem.first[block + 1]):
+            if not free and scaled.scale[block] != 0.0:
+                newton.row[size] = row
+                size += 1
+            if kind != INTERVAL or not free:
+                iterate.x[row] = 0.0
+    return size
+
+
+@kernel
+def bring_inside(problem: BlockProblem, scaled: ScaledBlocks, x: Floats) -> None:
+    """Project all impulses onto their sets, whose friction is a little less than it is."""
+    for block in range(problem.count):
+        begin = problem.first[block]
+        size = problem.first[block + 1] - begin
+        n, s, t = project(
+            problem.set[block], INSIDE * problem.friction[block], scaled.bound[block], x[begin],
+            x[begin + 1] if size > 1 else 0.0, x[begin + 2] if size > 2 else 0.0,
+        )  # fmt: skip
+        x[begin] = n
+        if size > 1:
+            x[begin + 1] = s
+        if size > 2:
+            x[begin + 2] = t
+
+
+@kernel
+def stick_within_cones(
+    problem: BlockProblem, settings: BlockSettings, scaled: ScaledBlocks, tally: BlockTally,
+    iterate: Iterate, newton: NewtonSystem,
+) -> bool:  # fmt: skip
+    """Look for impulses that hold all that touches, and lie within their cones; return success.
+
+    Points of one body that stick share its load in many ways. That of least norm may leave a cone
+    where others do not: projections onto the cones and onto what holds, in turn, find one (Bregman
+    1965).
+    """
+    return_to_best(problem, scaled, iterate)
+    rows = problem.first[problem.count]
+    size = list_held_rows(problem, settings, scaled, iterate, newton)
+    row, system, right, x = newton.row, newton.system, newton.right, iterate.x
+    for i in range(size):
+        for j in range(i + 1):
+            system[i, j] = scaled.matrix[row[i], row[j]]
+        system[i, i] += FIRM
+    if not factorize(size, system):
+        return False
+    for _ in range(PROJECTIONS):
+        tally.iterations += 1
+        for _ in range(CORRECTIONS):
+            find_velocities(rows, scaled, x, iterate.u)
+            for i in range(size):
+                right[i] = -iterate.u[row[i]]
+            solve_factored(size, system, right)
+            for i in range(size):
+                x[row[i]] += right[i]
+        look(problem, scaled, iterate)
+        if iterate.worst <= settings.tolerance:
+            return True
+        bring_inside(problem, scaled, x)
     return False
