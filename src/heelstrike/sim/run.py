@@ -161,7 +161,7 @@ class SolverCount:
             "not certified": self.failures,
             "needed another solver": self.fallbacks,
             "by trying combinations of contact modes": self.combinations,
-            "steps with a wedged point left in place": self.relaxed,
+            "steps with a wedged point or an impact left as it was": self.relaxed,
         }
         told = [f"{count} {what}" for what, count in notes.items() if count]
         return ", ".join([str(self.solves), *([] if self.failures else ["all certified"]), *told])

@@ -96,7 +96,6 @@ def try_way(way: int, slips: bool, problem: BlockProblem, work: BlockWorkspace) 
     elif way == REGULARISED:
         if stick_within_cones(problem, settings, scaled, tally, iterate, newton):
             return
-        return_to_best(problem, scaled, iterate)
         for turn in range(3):
             ridge = FIRST_RIDGE if turn == 0 else (NEXT_RIDGE if turn == 1 else LAST_RIDGE)
             sweep(problem, scaled, NEXT_SWEEPS, tally, iterate)

@@ -52,6 +52,10 @@ PROJECTIONS, CORRECTIONS = 100, 2
 INSIDE = 0.95
 """Part of the friction that they are brought into, so that a few times are enough."""
 
+BEYOND = 1.8
+"""How far they go, in ways to the cone: nearly to the mirror image, which saves two turns of
+three."""
+
 AT_ITS_BOUND = 1.0 - 1e-9
 """Part of its bound from which on dry friction is taken to slide."""
 
@@ -201,7 +205,7 @@ def list_held_rows(
 
 @kernel
 def bring_inside(problem: BlockProblem, scaled: ScaledBlocks, x: Floats) -> None:
-    """Project all impulses onto their sets, whose friction is a little less than it is."""
+    """Move all impulses into their sets, whose friction is a little less than it is."""
     for block in range(problem.count):
         begin = problem.first[block]
         size = problem.first[block + 1] - begin
@@ -209,11 +213,43 @@ def bring_inside(problem: BlockProblem, scaled: ScaledBlocks, x: Floats) -> None
             problem.set[block], INSIDE * problem.friction[block], scaled.bound[block], x[begin],
             x[begin + 1] if size > 1 else 0.0, x[begin + 2] if size > 2 else 0.0,
         )  # fmt: skip
-        x[begin] = n
+        x[begin] += BEYOND * (n - x[begin])
         if size > 1:
-            x[begin + 1] = s
+            x[begin + 1] += BEYOND * (s - x[begin + 1])
         if size > 2:
-            x[begin + 2] = t
+            x[begin + 2] += BEYOND * (t - x[begin + 2])
+
+
+@kernel
+def project_in_turn(
+    problem: BlockProblem, settings: BlockSettings, scaled: ScaledBlocks, tally: BlockTally,
+    iterate: Iterate, newton: NewtonSystem,
+) -> bool:  # fmt: skip
+    """Project onto what holds and onto the cones until both are met; return success."""
+    return_to_best(problem, scaled, iterate)
+    rows = problem.first[problem.count]
+    size = list_held_rows(problem, settings, scaled, iterate, newton)
+    row, system, right, x = newton.row, newton.system, newton.right, iterate.x
+    for i in range(size):
+        for j in range(i + 1):
+            system[i, j] = scaled.matrix[row[i], row[j]]
+        system[i, i] += FIRM
+    if not factorize(size, system):
+        return False
+    for turn in range(PROJECTIONS):
+        for _ in range(CORRECTIONS):
+            find_velocities(rows, scaled, x, iterate.u)
+            for i in range(size):
+                right[i] = -iterate.u[row[i]]
+            solve_factored(size, system, right)
+            for i in range(size):
+                x[row[i]] += right[i]
+        look(problem, scaled, iterate)
+        if iterate.worst <= settings.tolerance:
+            tally.iterations += turn
+            return True
+        bring_inside(problem, scaled, x)
+    return False
 
 
 @kernel
@@ -225,29 +261,14 @@ def stick_within_cones(
 
     Points of one body that stick share its load in many ways. That of least norm may leave a cone
     where others do not: projections onto the cones and onto what holds, in turn, find one (Bregman
-    1965).
+    1965). If they do not, the impulses stay as they were.
     """
-    return_to_best(problem, scaled, iterate)
     rows = problem.first[problem.count]
-    size = list_held_rows(problem, settings, scaled, iterate, newton)
-    row, system, right, x = newton.row, newton.system, newton.right, iterate.x
-    for i in range(size):
-        for j in range(i + 1):
-            system[i, j] = scaled.matrix[row[i], row[j]]
-        system[i, i] += FIRM
-    if not factorize(size, system):
-        return False
-    for _ in range(PROJECTIONS):
-        tally.iterations += 1
-        for _ in range(CORRECTIONS):
-            find_velocities(rows, scaled, x, iterate.u)
-            for i in range(size):
-                right[i] = -iterate.u[row[i]]
-            solve_factored(size, system, right)
-            for i in range(size):
-                x[row[i]] += right[i]
-        look(problem, scaled, iterate)
-        if iterate.worst <= settings.tolerance:
-            return True
-        bring_inside(problem, scaled, x)
+    for k in range(rows):
+        newton.trial_x[k] = iterate.x[k]
+    if project_in_turn(problem, settings, scaled, tally, iterate, newton):
+        return True
+    for k in range(rows):
+        iterate.x[k] = newton.trial_x[k]
+    look(problem, scaled, iterate)
     return False

@@ -205,7 +205,7 @@ def certificates_in_space(run: SpatialRun) -> dict[str, str]:
         "residual of the contact problems": f"{worst.residual:.3g} of the data",
         "steps not certified to 1e-9": str(worst.uncertified),
         "steps taken in parts": str(worst.halved),
-        "problems of wedges, not asked to leave the ground": str(worst.relaxed),
+        "steps with a wedged point or an impact left as it was": str(worst.relaxed),
         "contact problems": f"{solver.solves}, {solver.shortcuts} by known modes, "
         f"{solver.fallbacks} by another way, {solver.failures} failed",
     }
