@@ -9,6 +9,7 @@ from numba import types
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at, separate_kernel
+from heelstrike.contact.sets import INTERVAL
 from heelstrike.contact.spatial.certificate import certify_blocks
 from heelstrike.contact.spatial.gauss_seidel import sweep
 from heelstrike.contact.spatial.iterates import look, return_to_best
@@ -32,6 +33,8 @@ from heelstrike.contact.spatial.workspace import (
     BlockAnswer,
     BlockProblem,
     BlockWorkspace,
+    Iterate,
+    ScaledBlocks,
 )
 
 WAYS = 6
@@ -61,27 +64,48 @@ def _signature() -> Any:
 
 
 @kernel
-def has_slip(problem: BlockProblem, answer: BlockAnswer) -> bool:
-    """Whether any block slips by the modes of the answer."""
-    slipping = 0
+def count_slips(problem: BlockProblem, answer: BlockAnswer) -> tuple[int, int]:
+    """How many contacts slip by the modes of the answer, and how much dry friction slides."""
+    slipping = sliding = 0
     for block in range(problem.count):
-        slipping += answer.mode[block] == SLIP
-    return slipping > 0
+        if answer.mode[block] == SLIP:
+            rubs = problem.set[block] == INTERVAL
+            slipping += not rubs
+            sliding += rubs
+    return slipping, sliding
 
 
 @kernel
-def try_way(way: int, slips: bool, problem: BlockProblem, work: BlockWorkspace) -> None:
+def begin_from(
+    problem: BlockProblem, scaled: ScaledBlocks, answer: BlockAnswer, iterate: Iterate
+) -> None:
+    """Begin with the impulses and modes of an answer."""
+    take_impulses(problem, scaled, answer.impulse, iterate)
+    for block in range(problem.count):
+        iterate.mode[block] = answer.mode[block]
+
+
+@kernel
+def try_last_modes(problem: BlockProblem, work: BlockWorkspace, answer: BlockAnswer) -> None:
+    """Solve the scaled problem with the modes of an answer, from its impulses."""
+    scaled, settings, tally = work.scaled, work.settings, work.tally
+    iterate, newton = work.iterate, work.newton
+    slipping, sliding = count_slips(problem, answer)
+    if slipping == 0:
+        tally.iterations += 1
+        if try_sticking(problem, scaled, iterate, newton) or sliding == 0:
+            return
+        begin_from(problem, scaled, answer, iterate)
+    iterate_newton(problem, scaled, settings, FIRST_STEPS, RIDGE, True, tally, iterate, newton)
+
+
+@kernel
+def try_way(way: int, problem: BlockProblem, work: BlockWorkspace, answer: BlockAnswer) -> None:
     """Try one way to solve the scaled problem; the iterate keeps the best impulses."""
     scaled, settings, tally = work.scaled, work.settings, work.tally
     iterate, newton = work.iterate, work.newton
     if way == LAST_MODES:
-        if slips:
-            iterate_newton(
-                problem, scaled, settings, FIRST_STEPS, RIDGE, True, tally, iterate, newton
-            )  # fmt: skip
-        else:
-            tally.iterations += 1
-            try_sticking(problem, scaled, iterate, newton)
+        try_last_modes(problem, work, answer)
     elif way == NEWTON:
         return_to_best(problem, scaled, iterate)
         iterate_newton(
@@ -127,18 +151,15 @@ def try_ways(problem: BlockProblem, work: BlockWorkspace, answer: BlockAnswer) -
     tally.last_fallbacks = 0
     tally.solver = LAST_MODES
     scale_blocks(problem, settings, scaled)
-    take_impulses(problem, scaled, answer.impulse, iterate)
-    for block in range(problem.count):
-        iterate.mode[block] = answer.mode[block]
+    begin_from(problem, scaled, answer, iterate)
     iterate.least = math.inf
-    slips = has_slip(problem, answer)
     status = NOT_FOUND
     for way in range(settings.ways):
         if way > 0:
             tally.fallbacks += way > NEWTON
             tally.last_fallbacks += 1
         before = iterate.least
-        try_way(way, slips, problem, work)
+        try_way(way, problem, work, answer)
         if iterate.least < before:
             tally.solver = way
         if not iterate.least < math.inf:

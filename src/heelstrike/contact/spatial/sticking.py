@@ -1,9 +1,9 @@
 """The usual case: contacts go on sticking, or stay open, as in the solve before.
 
-Sticking contacts make one symmetric system, often singular: the points of one rigid foot have more
-rows than it has freedoms. A little is added to the diagonal, and the answer refined from zero, so
-that it is the one of least norm. From the impulses of the step before it would wander to the edge
-of the cones.
+Dry friction may slide meanwhile, with the impulse of its bound. Sticking contacts make one
+symmetric system, often singular: the points of one rigid foot have more rows than it has freedoms.
+A little is added to the diagonal, and the answer refined from zero, so that it is the one of least
+norm. From the impulses of the step before it would wander to the edge of the cones.
 """
 
 from __future__ import annotations
@@ -95,10 +95,12 @@ def solve_factored(size: int, factor: Floats, right: Floats) -> None:
 def list_sticking_rows(
     problem: BlockProblem, scaled: ScaledBlocks, mode: Integers, newton: NewtonSystem
 ) -> int:
-    """List the rows of blocks that stick; return how many, or -1 if one slips."""
+    """List the rows of blocks that stick; return how many, or -1 if a contact slips."""
     size = 0
     for block in range(problem.count):
         if mode[block] == SLIP:
+            if problem.set[block] == INTERVAL:
+                continue
             return -1
         if mode[block] == OPEN or scaled.scale[block] == 0.0:
             continue
@@ -108,6 +110,28 @@ def list_sticking_rows(
             newton.row[size] = row
             size += 1
     return size
+
+
+@kernel
+def begin_at_bounds(
+    problem: BlockProblem, scaled: ScaledBlocks, iterate: Iterate, newton: NewtonSystem
+) -> None:
+    """Let dry friction that slides be at its bound, and all other impulses be zero.
+
+    ``newton.moved`` receives what that does to the velocities.
+    """
+    x, rows = iterate.x, problem.first[problem.count]
+    for row in range(rows):
+        newton.moved[row] = 0.0
+    for block in range(problem.count):
+        begin = problem.first[block]
+        if problem.set[block] == INTERVAL and iterate.mode[block] == SLIP:
+            x[begin] = math.copysign(scaled.bound[block], x[begin])
+            for row in range(rows):
+                newton.moved[row] += scaled.matrix[begin, row] * x[begin]
+            continue
+        for row in range(begin, problem.first[block + 1]):
+            x[row] = 0.0
 
 
 @kernel
@@ -124,7 +148,7 @@ def hold(size: int, scaled: ScaledBlocks, newton: NewtonSystem, x: Floats) -> bo
     for turn in range(REFINEMENTS):
         left = 0.0
         for i in range(size):
-            total = scaled.offset[row[i]]
+            total = scaled.offset[row[i]] + newton.moved[row[i]]
             if turn > 0:
                 for j in range(size):
                     total += matrix[row[i], row[j]] * x[row[j]]
@@ -140,11 +164,21 @@ def hold(size: int, scaled: ScaledBlocks, newton: NewtonSystem, x: Floats) -> bo
 
 
 @kernel
-def correct_modes(problem: BlockProblem, iterate: Iterate) -> int:
-    """Open what pulls and close what sinks; return how many blocks changed."""
+def correct_modes(problem: BlockProblem, scaled: ScaledBlocks, iterate: Iterate) -> int:
+    """Open what pulls, close what sinks, let dry friction slide or stick; count the changes."""
     changed = 0
     for block in range(problem.count):
         row, kind = problem.first[block], problem.set[block]
+        if kind == INTERVAL:
+            x, bound = iterate.x[row], scaled.bound[block]
+            slides = iterate.mode[block] == SLIP
+            if slides and iterate.u[row] * x > 0.0:
+                iterate.mode[block] = STICK
+                changed += 1
+            elif not slides and abs(x) > bound:
+                iterate.mode[block] = SLIP
+                changed += 1
+            continue
         if kind != CONE and kind != HALF_LINE:
             continue
         if iterate.mode[block] == OPEN:
@@ -166,14 +200,13 @@ def try_sticking(
         size = list_sticking_rows(problem, scaled, iterate.mode, newton)
         if size < 0:
             return False
-        for row in range(problem.first[problem.count]):
-            iterate.x[row] = 0.0
+        begin_at_bounds(problem, scaled, iterate, newton)
         if not hold(size, scaled, newton, iterate.x):
             return False
         look(problem, scaled, iterate)
         if iterate.worst <= STUCK:
             return True
-        if correct_modes(problem, iterate) == 0:
+        if correct_modes(problem, scaled, iterate) == 0:
             return False
     return False
 

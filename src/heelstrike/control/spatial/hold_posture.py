@@ -93,7 +93,8 @@ class HoldPosture(Law):
 
     Notes
     -----
-    Torques are held over a step: the damping of a joint must stay below its inertia over the step.
+    Torques are held over a step h: with the inertia I that a joint moves, h² kp + 2 h kd must stay
+    below 4 I. A simulation warns of gains beyond that.
     """
 
     @takes(ControllerError)
@@ -114,4 +115,4 @@ class HoldPosture(Law):
         parameters = PostureGains(
             kp=stiff, kd=damped, posture=whole[places].copy(), weight=int(gravity)
         )
-        super().__init__(hold_posture, parameters)
+        super().__init__(hold_posture, parameters, stiffness=stiff, damping=damped)
