@@ -139,4 +139,5 @@ def account_of(
 
     if gait is not None:
         raise ViewError(f"gaits are for robots in the plane, and {name} is in space: leave it out")
-    return InSpace(run)
+    in_space: Any = run
+    return InSpace(in_space)
