@@ -73,10 +73,10 @@ def begun(problem: BlockProblem) -> BlockWorkspace:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_split_within_the_cones_is_found(seed: int) -> None:
-    problem, beyond = wedged(seed, held=True)
+    problem, _ = wedged(seed, held=True)
     work = begun(problem)
     assert stick_within_cones(
-        problem, work.settings, work.scaled, work.tally, work.iterate, work.newton
+        problem, work.scaled, work.settings.tolerance, work.iterate, work.newton
     )
     answer = block_answer(4, 8)
     give_impulses(problem, work.scaled, work.iterate.best, answer)
@@ -88,8 +88,6 @@ def test_a_split_within_the_cones_is_found(seed: int) -> None:
         assert np.hypot(*impulse[point + 1 : point + 3]) <= 0.5 * impulse[point] + 1e-8 * size
     assert impulse[6] >= -1e-8 * size
     assert impulse[7] == pytest.approx(SLIDES)
-    if beyond > 1e-3:
-        assert work.tally.iterations > 0  # the first one, of least norm, was not it
 
 
 def test_some_of_them_need_it() -> None:
@@ -102,7 +100,7 @@ def test_what_cannot_stick_stays_as_it_was() -> None:
     work = begun(problem)
     before = work.iterate.x.copy()
     found = stick_within_cones(
-        problem, work.settings, work.scaled, work.tally, work.iterate, work.newton
+        problem, work.scaled, work.settings.tolerance, work.iterate, work.newton
     )
     assert not found
     assert np.array_equal(work.iterate.x, before)

@@ -86,7 +86,7 @@ def begin_from(
 
 
 @kernel
-def try_last_modes(problem: BlockProblem, work: BlockWorkspace, answer: BlockAnswer) -> None:
+def try_last_modes(problem: BlockProblem, answer: BlockAnswer, work: BlockWorkspace) -> None:
     """Solve the scaled problem with the modes of an answer, from its impulses."""
     scaled, settings, tally = work.scaled, work.settings, work.tally
     iterate, newton = work.iterate, work.newton
@@ -100,12 +100,12 @@ def try_last_modes(problem: BlockProblem, work: BlockWorkspace, answer: BlockAns
 
 
 @kernel
-def try_way(way: int, problem: BlockProblem, work: BlockWorkspace, answer: BlockAnswer) -> None:
+def try_way(way: int, problem: BlockProblem, answer: BlockAnswer, work: BlockWorkspace) -> None:
     """Try one way to solve the scaled problem; the iterate keeps the best impulses."""
     scaled, settings, tally = work.scaled, work.settings, work.tally
     iterate, newton = work.iterate, work.newton
     if way == LAST_MODES:
-        try_last_modes(problem, work, answer)
+        try_last_modes(problem, answer, work)
     elif way == NEWTON:
         return_to_best(problem, scaled, iterate)
         iterate_newton(
@@ -118,7 +118,8 @@ def try_way(way: int, problem: BlockProblem, work: BlockWorkspace, answer: Block
             problem, scaled, settings, NEXT_STEPS, RIDGE, False, tally, iterate, newton
         )  # fmt: skip
     elif way == REGULARISED:
-        if stick_within_cones(problem, settings, scaled, tally, iterate, newton):
+        tally.iterations += 1
+        if stick_within_cones(problem, scaled, settings.tolerance, iterate, newton):
             return
         for turn in range(3):
             ridge = FIRST_RIDGE if turn == 0 else (NEXT_RIDGE if turn == 1 else LAST_RIDGE)
@@ -159,7 +160,7 @@ def try_ways(problem: BlockProblem, work: BlockWorkspace, answer: BlockAnswer) -
             tally.fallbacks += way > NEWTON
             tally.last_fallbacks += 1
         before = iterate.least
-        try_way(way, problem, work, answer)
+        try_way(way, problem, answer, work)
         if iterate.least < before:
             tally.solver = way
         if not iterate.least < math.inf:

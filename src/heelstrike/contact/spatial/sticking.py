@@ -17,8 +17,6 @@ from heelstrike.contact.spatial.iterates import find_velocities, look, return_to
 from heelstrike.contact.spatial.modes import OPEN, SLIP, STICK
 from heelstrike.contact.spatial.workspace import (
     BlockProblem,
-    BlockSettings,
-    BlockTally,
     Floats,
     Integers,
     Iterate,
@@ -213,7 +211,7 @@ def try_sticking(
 
 @kernel
 def list_held_rows(
-    problem: BlockProblem, settings: BlockSettings, scaled: ScaledBlocks, iterate: Iterate,
+    problem: BlockProblem, scaled: ScaledBlocks, tolerance: float, iterate: Iterate,
     newton: NewtonSystem,
 ) -> int:  # fmt: skip
     """List the rows of all that touches or sticks; return how many.
@@ -226,7 +224,7 @@ def list_held_rows(
         pressed = iterate.x[begin]
         free = kind == INTERVAL and abs(pressed) >= AT_ITS_BOUND * scaled.bound[block]
         if kind in (CONE, HALF_LINE):
-            free = pressed <= 0.0 and iterate.u[begin] > settings.tolerance
+            free = pressed <= 0.0 and iterate.u[begin] > tolerance
         for row in range(begin, problem.first[block + 1]):
             if not free and scaled.scale[block] != 0.0:
                 newton.row[size] = row
@@ -255,13 +253,13 @@ def bring_inside(problem: BlockProblem, scaled: ScaledBlocks, x: Floats) -> None
 
 @kernel
 def project_in_turn(
-    problem: BlockProblem, settings: BlockSettings, scaled: ScaledBlocks, tally: BlockTally,
-    iterate: Iterate, newton: NewtonSystem,
+    problem: BlockProblem, scaled: ScaledBlocks, tolerance: float, iterate: Iterate,
+    newton: NewtonSystem,
 ) -> bool:  # fmt: skip
     """Project onto what holds and onto the cones until both are met; return success."""
     return_to_best(problem, scaled, iterate)
     rows = problem.first[problem.count]
-    size = list_held_rows(problem, settings, scaled, iterate, newton)
+    size = list_held_rows(problem, scaled, tolerance, iterate, newton)
     row, system, right, x = newton.row, newton.system, newton.right, iterate.x
     for i in range(size):
         for j in range(i + 1):
@@ -269,7 +267,7 @@ def project_in_turn(
         system[i, i] += FIRM
     if not factorize(size, system):
         return False
-    for turn in range(PROJECTIONS):
+    for _ in range(PROJECTIONS):
         for _ in range(CORRECTIONS):
             find_velocities(rows, scaled, x, iterate.u)
             for i in range(size):
@@ -278,8 +276,7 @@ def project_in_turn(
             for i in range(size):
                 x[row[i]] += right[i]
         look(problem, scaled, iterate)
-        if iterate.worst <= settings.tolerance:
-            tally.iterations += turn
+        if iterate.worst <= tolerance:
             return True
         bring_inside(problem, scaled, x)
     return False
@@ -287,8 +284,8 @@ def project_in_turn(
 
 @kernel
 def stick_within_cones(
-    problem: BlockProblem, settings: BlockSettings, scaled: ScaledBlocks, tally: BlockTally,
-    iterate: Iterate, newton: NewtonSystem,
+    problem: BlockProblem, scaled: ScaledBlocks, tolerance: float, iterate: Iterate,
+    newton: NewtonSystem,
 ) -> bool:  # fmt: skip
     """Look for impulses that hold all that touches, and lie within their cones; return success.
 
@@ -299,7 +296,7 @@ def stick_within_cones(
     rows = problem.first[problem.count]
     for k in range(rows):
         newton.trial_x[k] = iterate.x[k]
-    if project_in_turn(problem, settings, scaled, tally, iterate, newton):
+    if project_in_turn(problem, scaled, tolerance, iterate, newton):
         return True
     for k in range(rows):
         iterate.x[k] = newton.trial_x[k]

@@ -66,6 +66,9 @@ DYNAMICS_LEVEL, MOTOR_LEVEL, CONE_LEVEL, PRESSURE_LEVEL = 0, 0, 1, 2
 WEIGHTS = {"momentum": 1.0, "spin": 0.1, "foot": 10.0, "trunk": 0.1, "posture": 1e-2, "force": 1e-4}
 """How much the tasks count: accelerations by their squares, forces in parts of the weight."""
 
+REST = 1e-2
+"""What any acceleration costs, in parts of the posture's weight: so that none is left open."""
+
 WITHIN = 0.9
 """Part of a sole that is used."""
 
@@ -348,7 +351,7 @@ def want_posture(
         program.hessian[3 + i, 3 + i] += numbers.trunk
         program.gradient[3 + i] -= numbers.trunk * wanted
     for k in range(robot.nv):
-        program.hessian[k, k] += 1e-2 * numbers.posture_weight
+        program.hessian[k, k] += REST * numbers.posture_weight
 
 
 @kernel
