@@ -57,6 +57,7 @@ def usual() -> dict[str, dict[str, Any]]:
         "Policy": {"file": "policy.npz"},
         "Box": {"center": np.zeros(3), "size": np.ones(3)},
         "SpatialGround": {},
+        "HoldBalance": {"robot": hs.load_robot("bravo7", dimension=3, floating=True)},
         "HoldPosture": {"robot": hs.load_robot("bravo7", dimension=3), "kp": 1.0, "kd": 1.0},
         "Push": {"link": "trunk", "force": (1.0, 0.0), "start": 0.0, "duration": 0.1},
         "RobotBuilder": {"name": "robot"},

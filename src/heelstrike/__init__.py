@@ -93,6 +93,7 @@ if TYPE_CHECKING:
     from heelstrike.control import ZeroMomentPointRegulation as ZeroMomentPointRegulation
     from heelstrike.control import controller as controller
     from heelstrike.control import solve_quadratic_program as solve_quadratic_program
+    from heelstrike.control.spatial.hold_balance import HoldBalance as HoldBalance
     from heelstrike.control.spatial.hold_posture import HoldPosture as HoldPosture
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
@@ -215,6 +216,7 @@ _HOME = {
     "GroundShape": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
     "HeldTorque": "heelstrike.sim",
+    "HoldBalance": "heelstrike.control.spatial.hold_balance",
     "HoldPosture": "heelstrike.control.spatial.hold_posture",
     "HuntCrossley": "heelstrike.sim",
     "ImpulseSet": "heelstrike.sim",

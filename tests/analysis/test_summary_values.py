@@ -237,7 +237,7 @@ def test_what_is_seldom_is_told_where_it_is() -> None:
     counts = SolverCount("lemke", 9, 5, 3, 2, 4, 6)
     assert str(counts) == (
         "9, 2 not certified, 3 needed another solver, 4 by trying combinations of contact modes, "
-        "6 steps with a wedged point left in place"
+        "6 steps with a wedged point or an impact left as it was"
     )
     made = dataclasses.replace(figures(), energy_gain_J=1.25)
     line = "energy created by impacts 1.25 J (Newton's restitution with friction)"

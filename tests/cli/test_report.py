@@ -19,7 +19,7 @@ from heelstrike.cli.planning import hint_of_balance
 from heelstrike.experiments import what_if
 from heelstrike.experiments.zoo.disturbances import Effort
 from heelstrike.sim import RunStatus
-from heelstrike.view.report import writing
+from heelstrike.view.report.plane import InPlane
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def one_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw one figure of a report only: drawing takes most of its time."""
-    monkeypatch.setattr(writing, "FIGURES", ("energy",))
+    monkeypatch.setattr(InPlane, "captions", {"energy": InPlane.captions["energy"]})
 
 
 def report(*options: str) -> Any:

@@ -8,6 +8,7 @@ from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.robot import Robot
 from heelstrike.sim.run import AnyRun, Run
 
 
@@ -34,14 +35,23 @@ def torque_cost(run: Run, *, start: float = -np.inf, end: float = np.inf) -> flo
     return float((square * held)[inside].sum())
 
 
-def actuator_power(run: Run) -> Floats:
+def driven(run: AnyRun) -> Integers:
+    """Index of the velocity that each actuator of a run's robot drives, (nu,)."""
+    model = run.robot.model
+    found: Integers = (
+        model.actuator_joint if isinstance(run.robot, Robot) else model.actuator_velocity
+    )
+    return found
+
+
+def actuator_power(run: AnyRun) -> Floats:
     """Mean mechanical power τ ω of every actuator from each row to the next, (nt − 1, nu), in W.
 
     The velocity is the mean of the two rows, which makes the work of an impulsive step exact.
 
     Parameters
     ----------
-    run : Run
+    run : Run or SpatialRun
         The run.
 
     Returns
@@ -49,11 +59,11 @@ def actuator_power(run: Run) -> Floats:
     (nt - 1, nu) float
         Mean power from each row to the next, in W.
     """
-    speed = run.velocity[:, run.robot.model.actuator_joint]
+    speed = run.velocity[:, driven(run)]
     return np.asarray(mean_over_intervals(run, run.torque) * 0.5 * (speed[:-1] + speed[1:]))
 
 
-def torque_bounds(run: AnyRun, driven: Integers) -> tuple[Floats, Floats]:
+def torque_bounds(run: AnyRun) -> tuple[Floats, Floats]:
     """Least and largest torque (nt, nu) that the motors can give in each row.
 
     They are the limits of the robot, and the speed-torque line where a motor has one.
@@ -62,9 +72,6 @@ def torque_bounds(run: AnyRun, driven: Integers) -> tuple[Floats, Floats]:
     ----------
     run : Run or SpatialRun
         The run.
-    driven : (nu,) int
-        Index of the velocity that each actuator drives: `actuator_joint` of the model of a robot
-        in the plane, `actuator_velocity` in space.
 
     Returns
     -------
@@ -74,10 +81,11 @@ def torque_bounds(run: AnyRun, driven: Integers) -> tuple[Floats, Floats]:
     model = run.robot.model
     lower = np.broadcast_to(model.torque_lower, run.torque.shape)
     upper = np.broadcast_to(model.torque_upper, run.torque.shape)
-    stall = model.stall_torque[driven]
+    moved = driven(run)
+    stall = model.stall_torque[moved]
     with np.errstate(invalid="ignore"):
         drag = np.where(
-            np.isfinite(stall), stall / model.no_load_speed[driven] * run.velocity[:, driven], 0.0
+            np.isfinite(stall), stall / model.no_load_speed[moved] * run.velocity[:, moved], 0.0
         )
     return np.maximum(lower, -stall - drag), np.minimum(upper, stall - drag)
 

@@ -13,19 +13,19 @@ import numpy as np
 
 from heelstrike.robot.model import Floats
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.run import Event, Run
+from heelstrike.sim.run import AnyRun, Event, Run
 from heelstrike.tolerances import SAME_ROW
 
 IMPULSIVE = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.ZENO, EventKind.PAINLEVE)
 """Events whose impulses are not in the forces of an event-driven run."""
 
 
-def impulses_in_events(run: Run) -> bool:
+def impulses_in_events(run: AnyRun) -> bool:
     """Whether the impulses of impacts are in the run's events, not in its forces."""
     return run.method.impulses_in_events
 
 
-def mean_over_intervals(run: Run, values: Floats) -> Floats:
+def mean_over_intervals(run: AnyRun, values: Floats) -> Floats:
     """Mean from each row to the next of a force or torque, (nt, ...) to (nt − 1, ...)."""
     if impulses_in_events(run):
         return np.asarray(0.5 * (values[:-1] + values[1:]))

@@ -129,19 +129,26 @@ def _refuse_options_of_a_walk(context: typer.Context) -> None:
 def _read(files: list[str], gait: Path | None) -> tuple[dict[str, Run], Gait | None]:
     """Load runs by the names of their files, and the gait that they followed, if it is known."""
     from heelstrike.gait import load_gait
+    from heelstrike.robot import Robot
     from heelstrike.sim import load_run
 
     with stage("reading"):
         short = len({Path(each).stem for each in files}) == len(files)
         runs = {Path(each).stem if short else each: load_run(each) for each in files}
-        if gait is None:
+        robot = next(iter(runs.values())).robot
+        planar = isinstance(robot, Robot)
+        if gait is None and planar:
             beside = {
                 path for each in files if (path := Path(each).with_name("gait.json")).exists()
             }
             gait = beside.pop() if len(beside) == 1 else None
             if gait is not None:
                 tell(f"the gait is the one of {gait}")
-        robot = next(iter(runs.values())).robot
+        if gait is not None and not planar:
+            raise typer.BadParameter(
+                "gaits are for robots in the plane, and the runs are in space: leave it out",
+                param_hint="--gait",
+            )
         return runs, None if gait is None else load_gait(gait, robot)
 
 
@@ -164,9 +171,11 @@ def _tell(
 ) -> None:
     from heelstrike.analysis.diagnosis.falls import walked_on
     from heelstrike.analysis.told_summary import plain
-    from heelstrike.view.page import judge
+    from heelstrike.view.report.account import account_of
 
-    verdicts = {name: judge(run, gait, tried=tried.get(name, ())) for name, run in runs.items()}
+    verdicts = {
+        name: account_of(name, run, gait, tried.get(name, ())).verdict for name, run in runs.items()
+    }
     if as_json:
         told = {name: plain(asdict(verdict)) for name, verdict in verdicts.items()}
         typer.echo(json.dumps(told, indent=2, ensure_ascii=False))

@@ -165,6 +165,11 @@ class Dimension(ABC):
     def take_gains(self, robot: Any, law: Law | None, voltage: bool, memory: Any) -> None:
         """Note which joint forces an implicit scheme takes at the end of a step."""
 
+    def doubt_gains(  # noqa: B027 - in the plane they are not judged
+        self, robot: Any, law: Law | None, memory: Any, period: float
+    ) -> None:
+        """Warn of gains that are too high for torques held so long (s), where that is judged."""
+
     @abstractmethod
     def look(self, robot: Any) -> Look:
         """Return what looks at the contact points of a simulation."""

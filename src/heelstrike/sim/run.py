@@ -161,7 +161,7 @@ class SolverCount:
             "not certified": self.failures,
             "needed another solver": self.fallbacks,
             "by trying combinations of contact modes": self.combinations,
-            "steps with a wedged point left in place": self.relaxed,
+            "steps with a wedged point or an impact left as it was": self.relaxed,
         }
         told = [f"{count} {what}" for what, count in notes.items() if count]
         return ", ".join([str(self.solves), *([] if self.failures else ["all certified"]), *told])
@@ -283,6 +283,25 @@ class AnyRun(ShownInNotebooks):
 
         run: Any = self
         return animate(run, path, **options)
+
+    def save_report(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a report of the run; see :func:`heelstrike.report`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.report.writing import report
+
+        return report(self, path, **options)
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the run as a labelled dataset with units."""
@@ -460,25 +479,6 @@ class Run(AnyRun):
         from heelstrike.view.notebook.cards import film
 
         return film(self, gait, height)
-
-    def save_report(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write a report of the run; see :func:`heelstrike.report`.
-
-        Parameters
-        ----------
-        path : str or path
-            File to write.
-        **options
-            As for that function.
-
-        Returns
-        -------
-        Path
-            The file.
-        """
-        from heelstrike.view.report.writing import report
-
-        return report(self, path, **options)
 
 
 def quantities_of(run: type[AnyRun]) -> dict[str, Quantity]:

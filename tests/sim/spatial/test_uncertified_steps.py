@@ -112,3 +112,37 @@ def test_steps_that_are_not_asked_out_of_the_ground_count_once(made: Maker) -> N
     record = simulation.record
     assert record.steps >= 80
     assert 1 <= record.certificates.relaxed <= 10
+
+
+ROD = """<body name='rod' pos='0 0 0.9'><joint name='hinge' axis='0 1 0'/>
+<inertial pos='0.25 0 -0.44' mass='1' diaginertia='0.1 0.1 0.1'/>
+<geom type='sphere' pos='0.43 0 -0.88' size='0.01' mass='0'/></body>"""
+"""A rod that hangs from a hinge and is longer than that is high: it swings into the ground."""
+
+
+@pytest.mark.parametrize(
+    ("friction", "restitution", "left"), [(0.75, 0.5, 1), (0.3, 0.5, 0), (0.75, 0.0, 0)]
+)
+def test_an_impact_that_no_impulse_solves_is_left_to_the_next_step(
+    friction: float, restitution: float, left: int, made: Maker
+) -> None:
+    """A push λ up, at arm x, and the friction against the way back, at height H, turn the rod by
+    λ (x − μ H): beyond μ = x / H = 0.43 / 0.89 no push makes it bounce.
+
+    It jams instead, as one of no restitution does.
+    """
+    method = hs.TimeStepping(step=1e-3)
+    run = hs.simulate(
+        made(ROD), state=hs.State(np.array([-0.1]), np.zeros(1)), duration=0.3, method=method,
+        ground=hs.SpatialGround(friction=friction, restitution=restitution),
+    )  # fmt: skip
+    assert run.completed
+    assert run.certificates.relaxed == left
+    assert (run.certificates.halved > 0) == bool(left)
+    assert run.certificates.uncertified == 0
+    assert run.certificates.penetration < 1e-12
+    assert ("1 steps with a wedged point or an impact left as it was" in str(run.solver)) == left
+    bounces = run.velocity.min() < -0.1
+    assert bounces == (restitution > 0.0 and not left)
+    if not bounces:
+        assert abs(run.velocity[-1, 0]) < 1e-9

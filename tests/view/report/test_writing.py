@@ -15,7 +15,8 @@ from synthetic_runs import box, make_run, pendulum
 import heelstrike as hs
 from heelstrike.analysis import first_cause
 from heelstrike.view import ViewError
-from heelstrike.view.report import writing
+from heelstrike.view.report.account import BEFORE
+from heelstrike.view.report.plane import InPlane
 from heelstrike.view.report.writing import report_page
 
 HOSTILE = "</script><img src=x onerror=alert(1)>\"'&"
@@ -24,7 +25,7 @@ HOSTILE = "</script><img src=x onerror=alert(1)>\"'&"
 @pytest.fixture
 def one_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw one figure of a report only: drawing takes most of its time."""
-    monkeypatch.setattr(writing, "FIGURES", ("energy",))
+    monkeypatch.setattr(InPlane, "captions", {"energy": InPlane.captions["energy"]})
 
 
 def pictures(text: str) -> list[str]:
@@ -95,7 +96,7 @@ def test_a_fall_is_shown_from_before_its_cause() -> None:
     text = report_page({"bravo7": fallen}, walking.gait())
     fall = first_cause(fallen, walking.gait())
     assert fall is not None
-    assert shown(text) == pytest.approx(fall.time - writing.BEFORE)
+    assert shown(text) == pytest.approx(fall.time - BEFORE)
     times = [float(each) for each in re.findall(r'data-time="([^"]+)"', text)]
     assert times == sorted(times)
     assert times[0] == 1.0  # the push

@@ -96,7 +96,7 @@ def _of_feet(run: Run, shown: Rows) -> Iterator[Limit]:
 
 def _of_motors(run: Run, shown: Rows) -> Iterator[Limit]:
     model = run.robot.model
-    lower, upper = torque_bounds(run, model.actuator_joint)
+    lower, upper = torque_bounds(run)
     for i, name in enumerate(run.robot.actuator_names):
         joint = model.actuator_joint[i]
         hinge = bool(model.axis[joint, 0] != 0.0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heelstrike.analysis.actuation import actuator_power, cost_of_transport
+from heelstrike.analysis.actuation import actuator_power, cost_of_transport, driven
 from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.slip import max_slip
@@ -16,7 +16,7 @@ from heelstrike.analysis.support import stances, step_times, walking_steps
 from heelstrike.analysis.tracking import tracking_error
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Integers
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import AnyRun, Run
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
@@ -60,12 +60,12 @@ class MotorLoad:
     W."""
 
 
-def motor_loads(run: Run) -> tuple[MotorLoad, ...]:
+def motor_loads(run: AnyRun) -> tuple[MotorLoad, ...]:
     """Compute the load of each motor over a run.
 
     Parameters
     ----------
-    run : Run
+    run : Run or SpatialRun
         The run, of at least one row.
 
     Returns
@@ -76,7 +76,7 @@ def motor_loads(run: Run) -> tuple[MotorLoad, ...]:
     held = np.diff(run.time)
     duration = max(float(held.sum()), np.finfo(float).tiny)
     power, square = actuator_power(run), mean_over_intervals(run, run.torque**2)
-    speed = run.velocity[:, run.robot.model.actuator_joint]
+    speed = run.velocity[:, driven(run)]
     return tuple(
         MotorLoad(
             name,
@@ -172,13 +172,18 @@ def _measures(run: Run, gait: Gait | None) -> Iterator[Measure]:
             "",
             f"{transport.positive:.3g} of positive work",
         )
-        held, power = np.diff(run.time), np.abs(actuator_power(run)).sum(axis=1)
-        if held.sum() > 0.0:
-            at = int(power.argmax())
-            yield Measure(
-                "mechanical power, mean of all motors", float(held @ power / held.sum()), "W",
-                f"{power[at]:.4g} W at most, at {run.time[at]:.3f} s",
-            )  # fmt: skip
+        yield from measure_power(run)
+
+
+def measure_power(run: AnyRun) -> Iterator[Measure]:
+    """Measure the mechanical power of all motors of a run, of some duration, together."""
+    held, power = np.diff(run.time), np.abs(actuator_power(run)).sum(axis=1)
+    if held.sum() > 0.0:
+        at = int(power.argmax())
+        yield Measure(
+            "mechanical power, mean of all motors", float(held @ power / held.sum()), "W",
+            f"{power[at]:.4g} W at most, at {run.time[at]:.3f} s",
+        )  # fmt: skip
 
 
 def _repetition(run: Run, rows: Integers) -> Iterator[Measure]:

@@ -221,7 +221,7 @@ class Walk:
     @cached_property
     def full_torque(self) -> tuple[Rows, Floats, Rows]:
         """Where motors give all that they can; see :func:`full_torque`."""
-        return full_torque(self.run, self.run.robot.model.actuator_joint)
+        return full_torque(self.run)
 
     @cached_property
     def tilt(self) -> Floats:
@@ -265,13 +265,12 @@ class Walk:
         return bool(np.isfinite(self.tilt).any())
 
 
-def full_torque(run: AnyRun, driven: Integers) -> tuple[Rows, Floats, Rows]:
+def full_torque(run: AnyRun) -> tuple[Rows, Floats, Rows]:
     """Where motors give all that they can, that bound, and whether their speed sets it.
 
-    Each (nt, nu), the bound in N m; see :func:`~heelstrike.analysis.actuation.torque_bounds` for
-    what they drive.
+    Each (nt, nu), the bound in N m; see :func:`~heelstrike.analysis.actuation.torque_bounds`.
     """
-    lower, upper = torque_bounds(run, driven)
+    lower, upper = torque_bounds(run)
     # Beyond the speed without load both bounds have one sign: then a motor can only brake.
     with np.errstate(invalid="ignore"):
         least = run.torque <= lower + (1.0 - REACHED) * np.abs(lower)

@@ -91,7 +91,7 @@ def _limits(run: SpatialRun, shown: Rows) -> Iterator[Limit]:
         inside, when = 1e3 * max(float(zmp.margin[k]), 0.0), float(time[rows[k]])
         detail = f"{inside:.3g} mm from the edge of the support polygon at {when:.3g} s"
         yield Limit("zero moment point", "zero moment point", used, when, reached, detail)
-    lower, upper = torque_bounds(run, model.actuator_velocity)
+    lower, upper = torque_bounds(run)
     for i, name in enumerate(robot.actuator_names):
         k = int(model.actuator_velocity[i])
         hinge = int(model.joint_kind[model.velocity_joint[k]]) != SLIDE
@@ -173,7 +173,7 @@ def _symptoms(run: SpatialRun, height: float, pace: float, center: Floats) -> It
     yield from _slips(run, height, pace)
     yield from _tips(run, height, center)
     model = run.robot.model
-    full, bound, by_speed = full_torque(run, model.actuator_velocity)
+    full, bound, by_speed = full_torque(run)
     for i, name in enumerate(run.robot.actuator_names):
         for a, b in _lasting(time, full[:, i], HELD_UNSEEN):
             cause = Cause.SPEED_LIMIT if by_speed[a, i] else Cause.TORQUE_LIMIT

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from heelstrike.analysis.actuation import actuator_power
 from heelstrike.analysis.spatial.friction import face_friction, foot_friction
 from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.support import pushing_in_space
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 from heelstrike.analysis.told_summary import OF_A_GAIN, UNKNOWN, ToldSummary, in_lines
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.model import Floats
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import SolverCount
 from heelstrike.sim.spatial.run import SpatialRun
@@ -111,7 +111,7 @@ def summarize_in_space(run: SpatialRun) -> SpatialSummary:
     every = max(1, -(-count // MOST_LOOKED_AT))
     margin = spatial_zero_moment_point(run, np.arange(0, count, every)).margin
     held = np.diff(run.time)
-    power = run.torque[:-1] * _mean_speed(run)
+    power = actuator_power(run)
     scale = run.robot.weight * distance
     if not (run.robot.weight > 0.0 and distance > SHORTEST_WAY):
         scale = UNKNOWN
@@ -145,12 +145,6 @@ def summarize_in_space(run: SpatialRun) -> SpatialSummary:
         real_time_factor=duration / wall if wall > 0.0 else UNKNOWN,
         energy_gain_J=run.certificates.energy_gain,
     )
-
-
-def _mean_speed(run: SpatialRun) -> Floats:
-    """Mean velocity of what each actuator drives from each row to the next, (nt − 1, nu)."""
-    speed = run.velocity[:, run.robot.model.actuator_velocity]
-    return np.asarray(0.5 * (speed[:-1] + speed[1:]))
 
 
 def _turn(run: SpatialRun) -> float:

@@ -9,6 +9,7 @@ from numba import types
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at, separate_kernel
+from heelstrike.contact.sets import INTERVAL
 from heelstrike.contact.spatial.certificate import certify_blocks
 from heelstrike.contact.spatial.gauss_seidel import sweep
 from heelstrike.contact.spatial.iterates import look, return_to_best
@@ -27,11 +28,13 @@ from heelstrike.contact.spatial.newton import RIDGE, iterate_newton
 from heelstrike.contact.spatial.proximal import approach
 from heelstrike.contact.spatial.restarts import try_other_starts
 from heelstrike.contact.spatial.scaling import give_impulses, scale_blocks, take_impulses
-from heelstrike.contact.spatial.sticking import try_sticking
+from heelstrike.contact.spatial.sticking import stick_within_cones, try_sticking
 from heelstrike.contact.spatial.workspace import (
     BlockAnswer,
     BlockProblem,
     BlockWorkspace,
+    Iterate,
+    ScaledBlocks,
 )
 
 WAYS = 6
@@ -61,27 +64,48 @@ def _signature() -> Any:
 
 
 @kernel
-def has_slip(problem: BlockProblem, answer: BlockAnswer) -> bool:
-    """Whether any block slips by the modes of the answer."""
-    slipping = 0
+def count_slips(problem: BlockProblem, answer: BlockAnswer) -> tuple[int, int]:
+    """How many contacts slip by the modes of the answer, and how much dry friction slides."""
+    slipping = sliding = 0
     for block in range(problem.count):
-        slipping += answer.mode[block] == SLIP
-    return slipping > 0
+        if answer.mode[block] == SLIP:
+            rubs = problem.set[block] == INTERVAL
+            slipping += not rubs
+            sliding += rubs
+    return slipping, sliding
 
 
 @kernel
-def try_way(way: int, slips: bool, problem: BlockProblem, work: BlockWorkspace) -> None:
+def begin_from(
+    problem: BlockProblem, scaled: ScaledBlocks, answer: BlockAnswer, iterate: Iterate
+) -> None:
+    """Begin with the impulses and modes of an answer."""
+    take_impulses(problem, scaled, answer.impulse, iterate)
+    for block in range(problem.count):
+        iterate.mode[block] = answer.mode[block]
+
+
+@kernel
+def try_last_modes(problem: BlockProblem, answer: BlockAnswer, work: BlockWorkspace) -> None:
+    """Solve the scaled problem with the modes of an answer, from its impulses."""
+    scaled, settings, tally = work.scaled, work.settings, work.tally
+    iterate, newton = work.iterate, work.newton
+    slipping, sliding = count_slips(problem, answer)
+    if slipping == 0:
+        tally.iterations += 1
+        if try_sticking(problem, scaled, iterate, newton) or sliding == 0:
+            return
+        begin_from(problem, scaled, answer, iterate)
+    iterate_newton(problem, scaled, settings, FIRST_STEPS, RIDGE, True, tally, iterate, newton)
+
+
+@kernel
+def try_way(way: int, problem: BlockProblem, answer: BlockAnswer, work: BlockWorkspace) -> None:
     """Try one way to solve the scaled problem; the iterate keeps the best impulses."""
     scaled, settings, tally = work.scaled, work.settings, work.tally
     iterate, newton = work.iterate, work.newton
     if way == LAST_MODES:
-        if slips:
-            iterate_newton(
-                problem, scaled, settings, FIRST_STEPS, RIDGE, True, tally, iterate, newton
-            )  # fmt: skip
-        else:
-            tally.iterations += 1
-            try_sticking(problem, scaled, iterate, newton)
+        try_last_modes(problem, answer, work)
     elif way == NEWTON:
         return_to_best(problem, scaled, iterate)
         iterate_newton(
@@ -94,6 +118,9 @@ def try_way(way: int, slips: bool, problem: BlockProblem, work: BlockWorkspace) 
             problem, scaled, settings, NEXT_STEPS, RIDGE, False, tally, iterate, newton
         )  # fmt: skip
     elif way == REGULARISED:
+        tally.iterations += 1
+        if stick_within_cones(problem, scaled, settings.tolerance, iterate, newton):
+            return
         for turn in range(3):
             ridge = FIRST_RIDGE if turn == 0 else (NEXT_RIDGE if turn == 1 else LAST_RIDGE)
             sweep(problem, scaled, NEXT_SWEEPS, tally, iterate)
@@ -125,18 +152,15 @@ def try_ways(problem: BlockProblem, work: BlockWorkspace, answer: BlockAnswer) -
     tally.last_fallbacks = 0
     tally.solver = LAST_MODES
     scale_blocks(problem, settings, scaled)
-    take_impulses(problem, scaled, answer.impulse, iterate)
-    for block in range(problem.count):
-        iterate.mode[block] = answer.mode[block]
+    begin_from(problem, scaled, answer, iterate)
     iterate.least = math.inf
-    slips = has_slip(problem, answer)
     status = NOT_FOUND
     for way in range(settings.ways):
         if way > 0:
             tally.fallbacks += way > NEWTON
             tally.last_fallbacks += 1
         before = iterate.least
-        try_way(way, slips, problem, work)
+        try_way(way, problem, answer, work)
         if iterate.least < before:
             tally.solver = way
         if not iterate.least < math.inf:

@@ -1,9 +1,9 @@
 """The usual case: contacts go on sticking, or stay open, as in the solve before.
 
-Sticking contacts make one symmetric system, often singular: the points of one rigid foot have more
-rows than it has freedoms. A little is added to the diagonal, and the answer refined from zero, so
-that it is the one of least norm. From the impulses of the step before it would wander to the edge
-of the cones.
+Dry friction may slide meanwhile, with the impulse of its bound. Sticking contacts make one
+symmetric system, often singular: the points of one rigid foot have more rows than it has freedoms.
+A little is added to the diagonal, and the answer refined from zero, so that it is the one of least
+norm. From the impulses of the step before it would wander to the edge of the cones.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from __future__ import annotations
 import math
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.sets import CONE, HALF_LINE
-from heelstrike.contact.spatial.iterates import look
+from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL
+from heelstrike.contact.spatial.cones import project
+from heelstrike.contact.spatial.iterates import find_velocities, look, return_to_best
 from heelstrike.contact.spatial.modes import OPEN, SLIP, STICK
 from heelstrike.contact.spatial.workspace import (
     BlockProblem,
@@ -41,6 +42,20 @@ ROUNDS_OF_OPENING = 4
 
 STUCK = 1e-12
 """Residual up to which an answer of sticking contacts is taken."""
+
+
+PROJECTIONS, CORRECTIONS = 100, 2
+"""How often impulses that hold are brought into their cones, and held again each time."""
+
+INSIDE = 0.95
+"""Part of the friction that they are brought into, so that a few times are enough."""
+
+BEYOND = 1.8
+"""How far they go, in ways to the cone: nearly to the mirror image, which saves two turns of
+three."""
+
+AT_ITS_BOUND = 1.0 - 1e-9
+"""Part of its bound from which on dry friction is taken to slide."""
 
 
 @kernel
@@ -78,10 +93,12 @@ def solve_factored(size: int, factor: Floats, right: Floats) -> None:
 def list_sticking_rows(
     problem: BlockProblem, scaled: ScaledBlocks, mode: Integers, newton: NewtonSystem
 ) -> int:
-    """List the rows of blocks that stick; return how many, or -1 if one slips."""
+    """List the rows of blocks that stick; return how many, or -1 if a contact slips."""
     size = 0
     for block in range(problem.count):
         if mode[block] == SLIP:
+            if problem.set[block] == INTERVAL:
+                continue
             return -1
         if mode[block] == OPEN or scaled.scale[block] == 0.0:
             continue
@@ -91,6 +108,28 @@ def list_sticking_rows(
             newton.row[size] = row
             size += 1
     return size
+
+
+@kernel
+def begin_at_bounds(
+    problem: BlockProblem, scaled: ScaledBlocks, iterate: Iterate, newton: NewtonSystem
+) -> None:
+    """Let dry friction that slides be at its bound, and all other impulses be zero.
+
+    ``newton.moved`` receives what that does to the velocities.
+    """
+    x, rows = iterate.x, problem.first[problem.count]
+    for row in range(rows):
+        newton.moved[row] = 0.0
+    for block in range(problem.count):
+        begin = problem.first[block]
+        if problem.set[block] == INTERVAL and iterate.mode[block] == SLIP:
+            x[begin] = math.copysign(scaled.bound[block], x[begin])
+            for row in range(rows):
+                newton.moved[row] += scaled.matrix[begin, row] * x[begin]
+            continue
+        for row in range(begin, problem.first[block + 1]):
+            x[row] = 0.0
 
 
 @kernel
@@ -107,7 +146,7 @@ def hold(size: int, scaled: ScaledBlocks, newton: NewtonSystem, x: Floats) -> bo
     for turn in range(REFINEMENTS):
         left = 0.0
         for i in range(size):
-            total = scaled.offset[row[i]]
+            total = scaled.offset[row[i]] + newton.moved[row[i]]
             if turn > 0:
                 for j in range(size):
                     total += matrix[row[i], row[j]] * x[row[j]]
@@ -123,11 +162,21 @@ def hold(size: int, scaled: ScaledBlocks, newton: NewtonSystem, x: Floats) -> bo
 
 
 @kernel
-def correct_modes(problem: BlockProblem, iterate: Iterate) -> int:
-    """Open what pulls and close what sinks; return how many blocks changed."""
+def correct_modes(problem: BlockProblem, scaled: ScaledBlocks, iterate: Iterate) -> int:
+    """Open what pulls, close what sinks, let dry friction slide or stick; count the changes."""
     changed = 0
     for block in range(problem.count):
         row, kind = problem.first[block], problem.set[block]
+        if kind == INTERVAL:
+            x, bound = iterate.x[row], scaled.bound[block]
+            slides = iterate.mode[block] == SLIP
+            if slides and iterate.u[row] * x > 0.0:
+                iterate.mode[block] = STICK
+                changed += 1
+            elif not slides and abs(x) > bound:
+                iterate.mode[block] = SLIP
+                changed += 1
+            continue
         if kind != CONE and kind != HALF_LINE:
             continue
         if iterate.mode[block] == OPEN:
@@ -149,13 +198,107 @@ def try_sticking(
         size = list_sticking_rows(problem, scaled, iterate.mode, newton)
         if size < 0:
             return False
-        for row in range(problem.first[problem.count]):
-            iterate.x[row] = 0.0
+        begin_at_bounds(problem, scaled, iterate, newton)
         if not hold(size, scaled, newton, iterate.x):
             return False
         look(problem, scaled, iterate)
         if iterate.worst <= STUCK:
             return True
-        if correct_modes(problem, iterate) == 0:
+        if correct_modes(problem, scaled, iterate) == 0:
             return False
+    return False
+
+
+@kernel
+def list_held_rows(
+    problem: BlockProblem, scaled: ScaledBlocks, tolerance: float, iterate: Iterate,
+    newton: NewtonSystem,
+) -> int:  # fmt: skip
+    """List the rows of all that touches or sticks; return how many.
+
+    Their impulses become zero. Dry friction that slides keeps its own.
+    """
+    size = 0
+    for block in range(problem.count):
+        begin, kind = problem.first[block], problem.set[block]
+        pressed = iterate.x[begin]
+        free = kind == INTERVAL and abs(pressed) >= AT_ITS_BOUND * scaled.bound[block]
+        if kind in (CONE, HALF_LINE):
+            free = pressed <= 0.0 and iterate.u[begin] > tolerance
+        for row in range(begin, problem.first[block + 1]):
+            if not free and scaled.scale[block] != 0.0:
+                newton.row[size] = row
+                size += 1
+            if kind != INTERVAL or not free:
+                iterate.x[row] = 0.0
+    return size
+
+
+@kernel
+def bring_inside(problem: BlockProblem, scaled: ScaledBlocks, x: Floats) -> None:
+    """Move all impulses into their sets, whose friction is a little less than it is."""
+    for block in range(problem.count):
+        begin = problem.first[block]
+        size = problem.first[block + 1] - begin
+        n, s, t = project(
+            problem.set[block], INSIDE * problem.friction[block], scaled.bound[block], x[begin],
+            x[begin + 1] if size > 1 else 0.0, x[begin + 2] if size > 2 else 0.0,
+        )  # fmt: skip
+        x[begin] += BEYOND * (n - x[begin])
+        if size > 1:
+            x[begin + 1] += BEYOND * (s - x[begin + 1])
+        if size > 2:
+            x[begin + 2] += BEYOND * (t - x[begin + 2])
+
+
+@kernel
+def project_in_turn(
+    problem: BlockProblem, scaled: ScaledBlocks, tolerance: float, iterate: Iterate,
+    newton: NewtonSystem,
+) -> bool:  # fmt: skip
+    """Project onto what holds and onto the cones until both are met; return success."""
+    return_to_best(problem, scaled, iterate)
+    rows = problem.first[problem.count]
+    size = list_held_rows(problem, scaled, tolerance, iterate, newton)
+    row, system, right, x = newton.row, newton.system, newton.right, iterate.x
+    for i in range(size):
+        for j in range(i + 1):
+            system[i, j] = scaled.matrix[row[i], row[j]]
+        system[i, i] += FIRM
+    if not factorize(size, system):
+        return False
+    for _ in range(PROJECTIONS):
+        for _ in range(CORRECTIONS):
+            find_velocities(rows, scaled, x, iterate.u)
+            for i in range(size):
+                right[i] = -iterate.u[row[i]]
+            solve_factored(size, system, right)
+            for i in range(size):
+                x[row[i]] += right[i]
+        look(problem, scaled, iterate)
+        if iterate.worst <= tolerance:
+            return True
+        bring_inside(problem, scaled, x)
+    return False
+
+
+@kernel
+def stick_within_cones(
+    problem: BlockProblem, scaled: ScaledBlocks, tolerance: float, iterate: Iterate,
+    newton: NewtonSystem,
+) -> bool:  # fmt: skip
+    """Look for impulses that hold all that touches, and lie within their cones; return success.
+
+    Points of one body that stick share its load in many ways. That of least norm may leave a cone
+    where others do not: projections onto the cones and onto what holds, in turn, find one (Bregman
+    1965). If they do not, the impulses stay as they were.
+    """
+    rows = problem.first[problem.count]
+    for k in range(rows):
+        newton.trial_x[k] = iterate.x[k]
+    if project_in_turn(problem, scaled, tolerance, iterate, newton):
+        return True
+    for k in range(rows):
+        iterate.x[k] = newton.trial_x[k]
+    look(problem, scaled, iterate)
     return False

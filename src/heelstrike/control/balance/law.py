@@ -19,10 +19,9 @@ from heelstrike.control.balance.tasks import (
     add_contact,
     add_motors,
     add_pressure,
-    add_task,
-    clear,
     solve_torques,
 )
+from heelstrike.control.quadratic.tasks import add_task, clear
 from heelstrike.dynamics.kernels import center_of_mass, point_position
 from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.robot.model import Floats

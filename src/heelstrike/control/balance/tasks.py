@@ -9,6 +9,7 @@ from heelstrike.control.balance.constrained import Constrained
 from heelstrike.control.balance.numbers import Memory, Parameters
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import SOLVED, Program
+from heelstrike.control.quadratic.tasks import add_task
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.motors import motor_torque
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
@@ -22,29 +23,6 @@ PRESSURE_LEVEL = 2
 FORCE_LEVEL = 3
 CONE_LEVEL = 1
 MOTOR_LEVEL = 0
-
-
-@kernel
-def clear(program: Program) -> None:
-    """Begin a new programme: no cost, no rows."""
-    n = program.x.shape[0]
-    for i in range(n):
-        program.gradient[i] = 0.0
-        for j in range(n):
-            program.hessian[i, j] = 0.0
-    program.count = 0
-    program.equalities = 0
-
-
-@kernel
-def add_task(rows: Floats, row: int, missing: float, weight: float, program: Program) -> None:
-    """Add ½ weight (row a − missing)² to the cost."""
-    n = program.x.shape[0]
-    for i in range(n):
-        share = weight * rows[row, i]
-        program.gradient[i] -= share * missing
-        for j in range(n):
-            program.hessian[i, j] += share * rows[row, j]
 
 
 @kernel

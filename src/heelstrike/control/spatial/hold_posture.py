@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.control.arguments import must_be
 from heelstrike.errors import ControllerError
-from heelstrike.robot.model import Floats
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.controller.law import Law, controller, per_actuator
 from heelstrike.sim.spatial.controlled import (
@@ -49,6 +50,28 @@ def hold_posture(
         torque[i] -= parameters.kd[i] * state.joint_velocity[i]
 
 
+def posture_of(robot: SpatialRobot, posture: ArrayLike | None) -> tuple[Floats, Integers]:
+    """Return a position (nq,) that a law holds, that of the file by default, and its driven places.
+
+    Raises
+    ------
+    ControllerError
+        If it is no position, or motors drive other joints than hinges and slides.
+    """
+    must_be(SpatialRobot, "robot", robot)
+    whole = robot.model.reference if posture is None else np.asarray(posture, dtype=float)
+    if whole.shape != (robot.nq,) or not np.all(np.isfinite(whole)):
+        raise ControllerError(f"posture must be {robot.nq} finite numbers, got {posture!r}")
+    places = driven_positions(robot)
+    if np.any(places < 0):
+        names = [robot.actuator_names[i] for i in np.flatnonzero(places < 0)]
+        raise ControllerError(
+            f"a posture is held by hinges and slides; {', '.join(names)} of robot "
+            f"{robot.name!r} drive something else"
+        )
+    return whole, places
+
+
 class HoldPosture(Law):
     """Hold a posture of a robot in space with springs and dampers on its joints.
 
@@ -70,7 +93,8 @@ class HoldPosture(Law):
 
     Notes
     -----
-    Torques are held over a step: the damping of a joint must stay below its inertia over the step.
+    Torques are held over a step h: with the inertia I that a joint moves, h² kp + 2 h kd must stay
+    below 4 I. A simulation warns of gains beyond that.
     """
 
     @takes(ControllerError)
@@ -83,22 +107,12 @@ class HoldPosture(Law):
         posture: ArrayLike | None = None,
         gravity: bool = True,
     ) -> None:
-        if not isinstance(robot, SpatialRobot):
-            raise ControllerError(f"robot must be a SpatialRobot, got {type(robot).__name__}")
+        must_be(SpatialRobot, "robot", robot)
         stiff, damped = per_actuator("kp", kp, robot), per_actuator("kd", kd, robot)
         if np.any(stiff < 0.0) or np.any(damped < 0.0):
             raise ControllerError(f"kp and kd must not be negative, got {stiff} and {damped}")
-        whole = robot.model.reference if posture is None else np.asarray(posture, dtype=float)
-        if whole.shape != (robot.nq,) or not np.all(np.isfinite(whole)):
-            raise ControllerError(f"posture must be {robot.nq} finite numbers, got {posture!r}")
-        places = driven_positions(robot)
-        if np.any(places < 0):
-            names = [robot.actuator_names[i] for i in np.flatnonzero(places < 0)]
-            raise ControllerError(
-                f"a posture is held by hinges and slides; {', '.join(names)} of robot "
-                f"{robot.name!r} drive something else"
-            )
+        whole, places = posture_of(robot, posture)
         parameters = PostureGains(
             kp=stiff, kd=damped, posture=whole[places].copy(), weight=int(gravity)
         )
-        super().__init__(hold_posture, parameters)
+        super().__init__(hold_posture, parameters, stiffness=stiff, damping=damped)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cache
@@ -52,6 +53,7 @@ from heelstrike.sim.spatial.table import (
     WALL,
     most_rows_of,
 )
+from heelstrike.sim.time_stepping.doubts import SimulationWarning, largest_pull
 from heelstrike.tolerances import STANDING_GAP
 
 
@@ -167,6 +169,14 @@ class Space(Dimension):
     ) -> None:
         """No scheme of space takes forces at the end of a step."""
 
+    def doubt_gains(
+        self, robot: SpatialRobot, law: Law | None, memory: SpatialMemory, period: float
+    ) -> None:
+        """Warn of gains that are too high for torques held so long (s)."""
+        told = too_high(robot, law, memory.q, period)
+        if told:
+            warnings.warn(told, SimulationWarning, stacklevel=5)
+
     def look(self, robot: SpatialRobot) -> SpatialLook:
         """Return what looks at the contact points of a simulation."""
         return SpatialLook(robot)
@@ -243,6 +253,30 @@ class Space(Dimension):
             f"no contact impulses could be certified at {now}, nor in parts of the step: "
             f"residual {memory.tally.unsolved:.3g}. A smaller step may get past it"
         )
+
+
+def too_high(robot: SpatialRobot, law: Law | None, q: Floats, period: float) -> str:
+    """Say which gains of a law are too high for torques held so long (s); nothing if none are.
+
+    As for springs and dampers in :mod:`heelstrike.sim.time_stepping.doubts`: of links that nothing
+    holds. What stands on the ground bears more.
+    """
+    if law is None or law.stiffness is None or law.damping is None or not np.all(np.isfinite(q)):
+        return ""
+    pull = np.zeros(robot.nv)
+    pull[robot.model.actuator_velocity] = 0.25 * period**2 * law.stiffness
+    pull[robot.model.actuator_velocity] += 0.5 * period * law.damping
+    if not np.any(pull > robot.model.armature):
+        return ""
+    value, worst = largest_pull(spatial.mass_matrix(robot, q), pull)
+    if value <= 1.0:
+        return ""
+    joint = robot.joint_names[robot.model.velocity_joint[worst]]
+    return (
+        f"the gains of controller {law.function.name!r} on joint {joint!r} are {value:.2g} times "
+        f"too high for torques that are held over {period:g} s: a link that is free to swing on "
+        "them chatters. Use lower ones there, or a smaller step or control_period"
+    )
 
 
 def has_walls(ground: SpatialGround) -> bool:

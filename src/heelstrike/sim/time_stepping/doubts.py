@@ -50,10 +50,15 @@ def stiffest(robot: Robot, q: Floats, step: float, *, dampers: bool = True) -> t
     # A is more than what motors and reductions add to it.
     if not np.any(pull > model.armature) or not np.all(np.isfinite(q)):
         return 0.0, ""
-    value, mode = np.linalg.eig(np.linalg.solve(mass_matrix(robot, q), np.diag(pull)))
+    value, joint = largest_pull(mass_matrix(robot, q), pull)
+    return value, robot.joint_names[joint]
+
+
+def largest_pull(mass: Floats, pull: Floats) -> tuple[float, int]:
+    """Return the largest eigenvalue of A⁻¹ diag(pull), and the velocity that takes most part."""
+    value, mode = np.linalg.eig(np.linalg.solve(mass, np.diag(pull)))
     worst = int(np.argmax(value.real))
-    joint = int(np.argmax(pull * np.abs(mode[:, worst]) ** 2))
-    return float(value[worst].real), robot.joint_names[joint]
+    return float(value[worst].real), int(np.argmax(pull * np.abs(mode[:, worst]) ** 2))
 
 
 def too_stiff(robot: Robot, q: Floats, step: float) -> str:

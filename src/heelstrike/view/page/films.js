@@ -3,7 +3,8 @@
 
 (() => {
   const at = (name) => document.getElementById(name);
-  const runs = JSON.parse(at("runs").textContent).map(HeelstrikeRecording.read);
+  const reader = typeof HeelstrikeSpace === "undefined" ? HeelstrikeRecording : HeelstrikeSpace;
+  const runs = JSON.parse(at("runs").textContent).map(reader.read);
   const canvases = [...document.querySelectorAll(".films canvas")];
   const start = Math.min(...runs.map((run) => run.start));
   const end = Math.max(...runs.map((run) => run.end));
@@ -55,6 +56,7 @@
     happened.preventDefault();
     play(!state.playing);
   });
+  for (const run of runs) if (run.whenMoved) run.whenMoved(show);
   new ResizeObserver(show).observe(document.body);
   for (const query of [dark, paper]) query.addEventListener("change", show);
   show();

@@ -7,61 +7,54 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from heelstrike.analysis.motion import run_motion
-from heelstrike.analysis.support import walking_steps
-from heelstrike.sim.run import Run
+from heelstrike.robot.model import Floats
+from heelstrike.view.report.account import Account
 
 INSTANTS = 1000
 """At how many times runs are held against each other."""
 
-QUANTITIES = (
-    "steps",
-    "last common time (s)",
-    "centre of mass, largest distance (mm)",
-    "coordinates, largest difference (rad, m)",
-    "touchdowns of steps, largest difference in time (ms)",
-)
+STEPS, LANDINGS = "steps", "touchdowns of steps, largest difference in time (ms)"
+"""Quantities of runs whose steps are counted."""
 
 
-def differences(named: Mapping[str, Run]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def differences(named: Mapping[str, Account]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return heading and rows of a table, a column a run: how far each is from the first.
 
     Coordinates are compared between robots of the same joints only.
     """
     reference = next(iter(named.values()))
-    columns = [_apart(run, reference) for run in named.values()]
-    return ("", *named), list(zip(QUANTITIES, *columns, strict=True))
+    columns = [_apart(account, reference) for account in named.values()]
+    rows = [(what, *(column[what] for column in columns)) for what in columns[0]]
+    return ("", *named), rows
 
 
-def _apart(run: Run, reference: Run) -> tuple[str, ...]:
-    start = max(float(run.time[0]), float(reference.time[0]))
-    end = min(float(run.time[-1]), float(reference.time[-1]))
-    steps = str(len(walking_steps(run)))
-    if not end > start:
-        return steps, f"{end:.4g}", "–", "–", "–"
-    grid = np.linspace(start, end, INSTANTS)
+def _apart(account: Account, reference: Account) -> dict[str, str]:
+    run, first = account.run, reference.run
+    start = max(float(run.time[0]), float(first.time[0]))
+    end = min(float(run.time[-1]), float(first.time[-1]))
+    landings, theirs = account.touchdowns(), reference.touchdowns()
+    apart = coordinates = late = math.nan
+    if end > start:
+        grid = np.linspace(start, end, INSTANTS)
 
-    def at(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-        return np.column_stack([np.interp(grid, time, column) for column in values.T])
+        def at(time: Floats, values: Floats) -> Floats:
+            return np.column_stack([np.interp(grid, time, column) for column in values.T])
 
-    center, other = (at(each.time, run_motion(each).center_of_mass) for each in (run, reference))
-    apart = float(np.hypot(*(center - other).T).max())
-    coordinates = math.nan
-    if run.robot.joint_names == reference.robot.joint_names:
-        ours, theirs = at(run.time, run.position), at(reference.time, reference.position)
-        coordinates = float(np.abs(ours - theirs).max())
-    ours, theirs = (
-        np.array([step.touchdown for step in walking_steps(each)]) for each in (run, reference)
-    )
-    common = min(len(ours), len(theirs))
-    late = float(np.abs(ours[:common] - theirs[:common]).max()) if common else math.nan
-    return (
-        steps,
-        f"{end:.4g}",
-        _number(1e3 * apart),
-        _number(coordinates),
-        _number(1e3 * late),
-    )
+        center, other = (at(each.run.time, each.center_of_mass()) for each in (account, reference))
+        apart = 1e3 * float(np.linalg.norm(center - other, axis=1).max())
+        if run.robot.joint_names == first.robot.joint_names:
+            ours, others = at(run.time, run.position), at(first.time, first.position)
+            coordinates = float(np.abs(ours - others).max())
+        if landings and theirs:
+            late = 1e3 * max(abs(a - b) for a, b in zip(landings, theirs, strict=False))
+    found = {
+        "last common time (s)": f"{end:.4g}",
+        "centre of mass, largest distance (mm)": _number(apart),
+        "coordinates, largest difference (rad, m)": _number(coordinates),
+    }
+    if landings is None:
+        return found
+    return {STEPS: str(len(landings)), **found, LANDINGS: _number(late)}
 
 
 def _number(value: float) -> str:

@@ -13,17 +13,14 @@ from matplotlib.figure import Figure
 
 from heelstrike.analysis.diagnosis.changes import Tried
 from heelstrike.analysis.diagnosis.limits import REACHED, Limit
-from heelstrike.analysis.diagnosis.measures import measures, motor_loads
-from heelstrike.analysis.summary import summarize
-from heelstrike.analysis.support import step_times
+from heelstrike.analysis.diagnosis.measures import motor_loads
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
-from heelstrike.sim.run import AnyRun, Run
-from heelstrike.view.figures import FIGURES, plot
+from heelstrike.sim.run import AnyRun
 from heelstrike.view.page.markup import data_block, document, escaped, grid, shipped, table
-from heelstrike.view.page.page import certificates, check_page, contents
-from heelstrike.view.page.provenance import provenance
-from heelstrike.view.page.verdict import NOTHING_TO_CHANGE, Verdict, happened, judge
+from heelstrike.view.page.page import check_page
+from heelstrike.view.page.verdict import NOTHING_TO_CHANGE, happened
+from heelstrike.view.report.account import Account, account_of
 from heelstrike.view.report.differences import differences
 from heelstrike.view.style import in_words, styled, view_errors
 from heelstrike.whole_file import write_whole
@@ -31,26 +28,16 @@ from heelstrike.whole_file import write_whole
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
 
-CAPTIONS = {
-    "snapshots": "The robot at equal times of its middle step, with the forces of the ground",
-    "tracking": "Joint positions and their references",
-    "velocities": "Joint velocities and their references",
-    "zmp": "Zero moment point of the stance foot, within its sole",
-    "friction": "Tangential forces within the friction cones",
-    "forces": "Forces of the ground on the feet",
-    "torque": "Joint torques and their limits",
-    "gaps": "Heights of the contact points",
-    "energy": "Energy, and the work that changed it",
-}
-"""What the figures show, in the order of a report."""
-
 PIXELS = 110
 """Dots an inch of what a figure does not draw as lines."""
+
+FILMS = 1_000_000
+"""Bytes that the films of a page take together, about."""
 
 
 @takes(ViewError)
 def report(
-    runs: Run | Mapping[str, Run] | Sequence[Run],
+    runs: AnyRun | Mapping[str, AnyRun] | Sequence[AnyRun],
     path: str | os.PathLike[str],
     *,
     gait: Gait | None = None,
@@ -67,13 +54,13 @@ def report(
 
     Parameters
     ----------
-    runs : Run, or mapping of names to runs, or sequence of runs
-        What to report; several are compared, the first being the one the others are held against.
-        Runs of a sequence are named after their methods.
+    runs : Run or SpatialRun, or mapping of names to runs, or sequence of runs
+        What to report, in the plane or in space; several are compared, the first being the one the
+        others are held against. Runs of a sequence are named after their methods.
     path : str or path
         File to write, .html or .htm.
     gait : Gait, optional
-        The gait that they followed, for references and the tracking error.
+        The gait that runs in the plane followed, for references and the tracking error.
     command : str
         The command that makes the report, for its provenance.
     tried : mapping of str to sequence of Tried, optional
@@ -88,70 +75,72 @@ def report(
     Raises
     ------
     ViewError
-        If there is no run, one is empty, or the file cannot be written.
+        If there is no run, one is empty, some are in the plane and some in space, or the file
+        cannot be written.
     GaitError
         If the gait does not fit the robot of a run.
     """
     target = check_page(path)
-    named = _named(runs)
-    for name, run in named.items():
-        if isinstance(run, AnyRun) and not isinstance(run, Run):
-            raise ViewError(
-                f"reports are of runs in the plane, and {name} is in space: run.save_html(path) "
-                "writes the page of this one, with its verdict"
-            )
-        if not isinstance(run, Run):
-            raise ViewError(f"a report is of runs, got {run!r}; load_run reads one from its file")
-        if not len(run.time):
-            raise ViewError(f"there is nothing to report of {name}: no rows ({run.message})")
-    text = report_page(named, gait, command=command, tried=tried)
+    text = report_page(_named(runs), gait, command=command, tried=tried)
     with view_errors():
         return write_whole(target, text)
 
 
 def report_page(
-    named: Mapping[str, Run],
+    runs: Mapping[str, AnyRun],
     gait: Gait | None = None,
     *,
     command: str = "",
     tried: Mapping[str, Sequence[Tried]] | None = None,
 ) -> str:
-    """Write the page of a report; see :func:`report`."""
+    """Write the page of a report; see :func:`report`.
+
+    Raises
+    ------
+    ViewError
+        If one has no rows, or some are in the plane and some in space.
+    """
     beside = tried or {}
-    verdicts = {name: judge(run, gait, tried=beside.get(name, ())) for name, run in named.items()}
-    robots = " and ".join(dict.fromkeys(run.robot.name for run in named.values()))
+    named = {name: account_of(name, run, gait, beside.get(name, ())) for name, run in runs.items()}
+    kinds = {type(account) for account in named.values()}
+    if len(kinds) > 1:
+        raise ViewError("a report compares runs in the plane, or runs in space, not both")
+    robots = " and ".join(dict.fromkeys(account.run.robot.name for account in named.values()))
     title = f"{robots}: report" if len(named) == 1 else f"{robots}: {', '.join(named)}"
+    films = []
+    for account in named.values():
+        films.append(account.film(FILMS // len(named)) | {"shown": account.shown()})
     body = [
         f"<header><h1>{escaped(title)}</h1>",
-        *_headlines(verdicts),
+        *_headlines(named),
         "</header><main>",
         _films(named),
-        *_happened(named, verdicts),
-        *_advice(verdicts),
-        *_tried(verdicts),
-        *(_limits(name, verdict, len(named)) for name, verdict in verdicts.items()),
-        *_measures(named, gait),
+        *_happened(named),
+        *_advice(named),
+        *_tried(named),
+        *(_limits(name, account, len(named)) for name, account in named.items()),
+        *_measures(named),
         *_differences(named),
-        _summaries(named, gait),
+        _summaries(named),
         "<h2>Figures</h2>",
-        *_figures(named, gait),
+        *_figures(named),
         "<h2>Certificates</h2>",
-        *(table(certificates(run), _caption(name, named)) for name, run in named.items()),
+        *(table(account.certificates(), _caption(name, named)) for name, account in named.items()),
         "<h2>Where this comes from</h2>",
-        *_origins(named, gait, command),
-        "</main>",
-        data_block(
-            "runs",
-            [contents(run, gait, shown=_shown(run, verdicts[name])) for name, run in named.items()],
+        *(
+            table(account.provenance(command), _caption(name, named))
+            for name, account in named.items()
         ),
+        "</main>",
+        data_block("runs", films),
     ]
     style = shipped("page.css") + shipped("report.css")
-    script = "".join(map(shipped, ("drawing.js", "recording.js", "films.js")))
+    script = next(iter(named.values())).script() + shipped("films.js")
     return document(title, "\n".join(body), style=style, script=script)
 
 
-def _named(runs: Run | Mapping[str, Run] | Sequence[Run]) -> dict[str, Run]:
-    if isinstance(runs, Run):
+def _named(runs: AnyRun | Mapping[str, AnyRun] | Sequence[AnyRun]) -> dict[str, AnyRun]:
+    if isinstance(runs, AnyRun):
         return {runs.robot.name: runs}
     if isinstance(runs, str | os.PathLike):
         raise ViewError(f"a report is of runs, got {runs!r}; load_run reads one from its file")
@@ -168,10 +157,11 @@ def _named(runs: Run | Mapping[str, Run] | Sequence[Run]) -> dict[str, Run]:
     return named
 
 
-def _headlines(verdicts: Mapping[str, Verdict]) -> Iterator[str]:
-    for name, verdict in verdicts.items():
+def _headlines(named: Mapping[str, Account]) -> Iterator[str]:
+    for name, account in named.items():
+        verdict = account.verdict
         sign = "good" if verdict.good else "bad"
-        label = f"{escaped(name)}: " if len(verdicts) > 1 else ""
+        label = f"{escaped(name)}: " if len(named) > 1 else ""
         first, _, rest = verdict.headline.partition(". ")
         yield (
             f'<p class="verdict">{label}<span class="{sign}">{escaped(first)}.</span> '
@@ -179,7 +169,7 @@ def _headlines(verdicts: Mapping[str, Verdict]) -> Iterator[str]:
         )
 
 
-def _films(named: Mapping[str, Run]) -> str:
+def _films(named: Mapping[str, Account]) -> str:
     canvases = "".join(
         f'<figure><canvas role="img" aria-label="film of {escaped(name)}"></canvas>'
         f"<figcaption>{escaped(name)}</figcaption></figure>"
@@ -196,33 +186,18 @@ def _films(named: Mapping[str, Run]) -> str:
     )
 
 
-BEFORE = 0.1
-"""How long before the first cause of a fall (s) a film begins."""
-
-
-def _shown(run: Run, verdict: Verdict) -> float:
-    """When the first picture of a film is: before what went wrong, or in the middle of a step."""
-    if verdict.fall is not None:
-        return max(float(run.time[0]), verdict.fall.time - BEFORE)
-    landings = step_times(run)
-    if len(landings) < 2:
-        return float(0.5 * (run.time[0] + run.time[-1]))
-    step = (len(landings) - 1) // 2
-    return 0.5 * (landings[step] + landings[step + 1])
-
-
-def _happened(named: Mapping[str, Run], verdicts: Mapping[str, Verdict]) -> Iterator[str]:
+def _happened(named: Mapping[str, Account]) -> Iterator[str]:
     """What went wrong, one after the other; a click on a time takes the film there."""
-    for name, verdict in verdicts.items():
-        if verdict.fall is None:
+    for name, account in named.items():
+        if account.verdict.fall is None:
             continue
         cells = "".join(
             '<tr><th scope="row"><button type="button" '
             f'data-time="{time:.6f}">{time:.3f} s</button></th><td>{escaped(what)}</td></tr>'
-            for time, what in happened(verdict, named[name])
+            for time, what in happened(account.verdict, account.run)
         )
         caption = "What happened, causes before consequences" + (
-            f": {name}" if len(verdicts) > 1 else ""
+            f": {name}" if len(named) > 1 else ""
         )
         yield (
             f'<table class="happened"><caption>{escaped(caption)}</caption>'
@@ -230,51 +205,43 @@ def _happened(named: Mapping[str, Run], verdicts: Mapping[str, Verdict]) -> Iter
         )
 
 
-def _tried(verdicts: Mapping[str, Verdict]) -> Iterator[str]:
-    for name, verdict in verdicts.items():
-        caption = "Tried beside this run" + (f": {name}" if len(verdicts) > 1 else "")
-        rows = [(each.what, each.outcome) for each in verdict.tried if each.change is None]
+def _tried(named: Mapping[str, Account]) -> Iterator[str]:
+    for name, account in named.items():
+        caption = "Tried beside this run" + (f": {name}" if len(named) > 1 else "")
+        tried = account.verdict.tried
+        rows = [(each.what, each.outcome) for each in tried if each.change is None]
         if rows:
             yield grid(("", "withstood"), rows, caption)
-        elif not verdict.tried:
-            yield f'<p class="note">{escaped(caption)}: nothing. {escaped(NOT_TRIED)}</p>'
+        elif not tried and account.not_tried:
+            yield f'<p class="note">{escaped(caption)}: nothing. {escaped(account.not_tried)}</p>'
 
 
-NOT_TRIED = (
-    "Pushes, slopes and changes need the controller, which a run does not hold: "
-    "“heelstrike report ROBOT” tries them, and heelstrike.experiments.what_if does in Python."
-)
-"""Why a report of runs alone tries nothing."""
-
-
-def _measures(named: Mapping[str, Run], gait: Gait | None) -> Iterator[str]:
-    for name, run in named.items():
+def _measures(named: Mapping[str, Account]) -> Iterator[str]:
+    for name, account in named.items():
         of = f": {name}" if len(named) > 1 else ""
         rows = [
             (each.name, f"{each.value:.3g}\u00a0{each.unit}".strip(), each.detail)
-            for each in measures(run, gait)
+            for each in account.measures()
         ]
         if rows:
-            yield grid(("", "value", ""), rows, f"The walk in figures{of}")
+            yield grid(("", "value", ""), rows, f"{account.measured}{of}")
         loads = [
             (
                 in_words(load.name), f"{load.peak_torque:.3g}", f"{load.rms_torque:.3g}",
                 f"{load.peak_speed:.3g}", f"{load.mean_power:.3g}", f"{load.peak_power:.3g}",
             )
-            for load in motor_loads(run)
+            for load in motor_loads(account.run)
         ]  # fmt: skip
         if loads:
-            units = [
-                "N" if run.robot.model.axis[joint, 0] == 0.0 else "N m"
-                for joint in run.robot.model.actuator_joint
-            ]
-            slides = " (N and m/s of slides)" if "N" in units else ""
+            has_slides = any(map(account.is_slide, range(len(loads))))
+            slides = " (N and m/s of slides)" if has_slides else ""
             heading = ("", "peak torque (N m)", "rms (N m)", "peak speed (rad/s)",
                        "mean power (W)", "peak power (W)")  # fmt: skip
             yield f'<div class="wide">{grid(heading, loads, f"Motors{slides}{of}")}</div>'
 
 
-def _limits(name: str, verdict: Verdict, several: int) -> str:
+def _limits(name: str, account: Account, several: int) -> str:
+    verdict = account.verdict
     rows = "".join(map(_limit, verdict.limits))
     if not rows:
         return ""
@@ -301,42 +268,43 @@ def _limit(limit: Limit) -> str:
     )
 
 
-def _advice(verdicts: Mapping[str, Verdict]) -> Iterator[str]:
+def _advice(named: Mapping[str, Account]) -> Iterator[str]:
     yield "<h2>What to change</h2>"
-    for name, verdict in verdicts.items():
-        label = f"<p>{escaped(name)}:</p>" if len(verdicts) > 1 else ""
+    for name, account in named.items():
+        verdict = account.verdict
+        label = f"<p>{escaped(name)}:</p>" if len(named) > 1 else ""
         items = "".join(f"<li>{escaped(each)}</li>" for each in verdict.advice)
         nothing = (
-            f"<p>{NOTHING_TO_CHANGE}. What the walk withstands is below.</p>"
+            f"<p>{' '.join(filter(None, (f'{NOTHING_TO_CHANGE}.', account.withstands)))}</p>"
             if verdict.good
             else "<p>No change is known that would help.</p>"
         )
         yield label + (f"<ol>{items}</ol>" if items else nothing)
 
 
-def _differences(named: Mapping[str, Run]) -> Iterator[str]:
+def _differences(named: Mapping[str, Account]) -> Iterator[str]:
     if len(named) > 1:
         heading, rows = differences(named)
         yield grid(heading, rows, f"Differences from {next(iter(named))}")
 
 
-def _summaries(named: Mapping[str, Run], gait: Gait | None) -> str:
-    each = [dict(summarize(run, gait=gait).lines()) for run in named.values()]
+def _summaries(named: Mapping[str, Account]) -> str:
+    each = [account.summary() for account in named.values()]
     if len(each) == 1:
         return table(each[0], "Summary")
     rows = [(label, *(one.get(label, "–") for one in each)) for label in each[0]]
     return grid(("", *named), rows, "Summary")
 
 
-def _figures(named: Mapping[str, Run], gait: Gait | None) -> Iterator[str]:
-    for what in sorted(FIGURES, key=list(CAPTIONS).index):
+def _figures(named: Mapping[str, Account]) -> Iterator[str]:
+    for what, caption in next(iter(named.values())).captions.items():
         pictures = []
-        for name, run in named.items():
+        for name, account in named.items():
             try:
-                drawn = plot(run, what, gait=gait)
+                drawn = account.plot(what)
             except ViewError:  # there is nothing of the kind on this robot
                 continue
-            words = CAPTIONS[what] + (f": {name}" if len(named) > 1 else "")
+            words = caption + (f": {name}" if len(named) > 1 else "")
             pictures.append(
                 f'<figure><img alt="{escaped(words)}" src="{svg(drawn)}">'
                 f"<figcaption>{escaped(words)}</figcaption></figure>"
@@ -353,11 +321,5 @@ def svg(figure: Figure) -> str:
     return f"data:image/svg+xml;base64,{base64.b64encode(picture.getvalue()).decode('ascii')}"
 
 
-def _origins(named: Mapping[str, Run], gait: Gait | None, command: str) -> Iterator[str]:
-    for name, run in named.items():
-        found = provenance(run, gait, command=command)
-        yield table(found, _caption(name, named))
-
-
-def _caption(name: str, named: Mapping[str, Run]) -> str:
+def _caption(name: str, named: Mapping[str, Account]) -> str:
     return name if len(named) > 1 else ""

@@ -91,24 +91,35 @@ def page_in_space(run: SpatialRun, *, command: str = "") -> str:
                 table(dict(summary.lines()), "Summary"),
             )
         ),
-        "certificates": table(_certificates(run), "Certificates: worst values over all steps"),
-        "provenance": table(_provenance(run, command), "Where this comes from"),
+        "certificates": table(
+            certificates_in_space(run), "Certificates: worst values over all steps"
+        ),
+        "provenance": table(provenance_in_space(run, command), "Where this comes from"),
         "camera": escaped(CAMERA),
     }
     body = shipped("player.html")
     for name, part in parts.items():
         body = body.replace(f"<!--{name}-->", part)
-    scripts = map(shipped, ("drawing.js", "recording.js"))
-    own = files(__package__).joinpath("space.js").read_text(encoding="utf-8")
-    script = "".join((*scripts, own, shipped("player.js")))
+    script = drawing_script() + shipped("player.js")
     title = f"{run.robot.name}: {run.message}"
+    block = data_block("run", contents_within(run, LARGEST - len(script)))
+    return document(title, body + block, style=shipped("page.css"), script=script)
+
+
+def drawing_script() -> str:
+    """Return the script that draws runs in space."""
+    own = files(__package__).joinpath("space.js").read_text(encoding="utf-8")
+    return "".join((*map(shipped, ("drawing.js", "recording.js")), own))
+
+
+def contents_within(run: SpatialRun, room: int) -> dict[str, Any]:
+    """Return what :func:`contents` does, of so few rows that it takes no more bytes as JSON."""
     most = MOST_ROWS
     while True:
-        block = data_block("run", contents(run, most=most))
-        if len(block) <= LARGEST - len(script) or most <= FEWEST_ROWS:
-            break
+        found = contents(run, most=most)
+        if len(data_block("run", found)) <= room or most <= FEWEST_ROWS:
+            return found
         most = max(FEWEST_ROWS, int(0.6 * most))
-    return document(title, body + block, style=shipped("page.css"), script=script)
 
 
 def _what_happened(verdict: Verdict, run: SpatialRun) -> str:
@@ -186,20 +197,22 @@ def _described(event: SpatialEvent, run: SpatialRun) -> dict[str, Any]:
     }
 
 
-def _certificates(run: SpatialRun) -> dict[str, str]:
+def certificates_in_space(run: SpatialRun) -> dict[str, str]:
+    """Return the worst values of a run's certificates, label by label."""
     worst, solver = run.certificates, run.solver
     return {
         "deepest penetration": f"{worst.penetration:.3g} m",
         "residual of the contact problems": f"{worst.residual:.3g} of the data",
         "steps not certified to 1e-9": str(worst.uncertified),
         "steps taken in parts": str(worst.halved),
-        "problems of wedges, not asked to leave the ground": str(worst.relaxed),
+        "steps with a wedged point or an impact left as it was": str(worst.relaxed),
         "contact problems": f"{solver.solves}, {solver.shortcuts} by known modes, "
         f"{solver.fallbacks} by another way, {solver.failures} failed",
     }
 
 
-def _provenance(run: SpatialRun, command: str) -> dict[str, str]:
+def provenance_in_space(run: SpatialRun, command: str = "") -> dict[str, str]:
+    """Say where a run comes from, label by label."""
     robot, ground = run.robot, run.ground
     normal = ", ".join(f"{float(value):.4g}" for value in np.asarray(ground.normal))
     return {

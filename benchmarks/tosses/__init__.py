@@ -1,0 +1,1 @@
+"""Measured tosses of a cube, foretold by heelstrike and other engines."""

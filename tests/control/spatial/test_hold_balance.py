@@ -1,0 +1,175 @@
+"""HoldBalance: its torques by other code, what ground and motors can do, pushes, refusals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import heelstrike as hs
+from heelstrike.control.spatial.hold_balance import WITHIN
+from heelstrike.control.spatial.soles import soles_in_space
+from heelstrike.dynamics import spatial
+
+FRICTION, STRONGEST = 0.6, 200.0
+
+
+def leg(side: str, y: float) -> str:
+    """A leg of six hinges, its foot a box of 22 cm by 10 cm."""
+    shell = 'contype="0" conaffinity="0"'
+    return f"""
+<body name="{side}_hip" pos="0 {y} -0.05"><joint name="{side}_yaw" axis="0 0 1" range="-1 1"/>
+ <geom type="sphere" size="0.04" mass="1" {shell}/>
+ <body name="{side}_side"><joint name="{side}_roll" axis="1 0 0" range="-0.8 0.8"/>
+  <geom type="sphere" size="0.04" mass="1" {shell}/>
+  <body name="{side}_thigh"><joint name="{side}_hip" axis="0 1 0" range="-2 2"/>
+   <geom type="capsule" fromto="0 0 0 0 0 -0.38" size="0.05" mass="5" {shell}/>
+   <body name="{side}_shank" pos="0 0 -0.38">
+    <joint name="{side}_knee" axis="0 1 0" range="-0.1 2.2"/>
+    <geom type="capsule" fromto="0 0 0 0 0 -0.38" size="0.04" mass="3" {shell}/>
+    <body name="{side}_heel" pos="0 0 -0.38">
+     <joint name="{side}_ankle" axis="0 1 0" range="-1 1"/>
+     <geom type="sphere" size="0.03" mass="0.3" {shell}/>
+     <body name="{side}_foot"><joint name="{side}_ankle_roll" axis="1 0 0" range="-0.6 0.6"/>
+      <geom type="box" pos="0.03 0 -0.05" size="0.11 0.05 0.02" mass="1"/>
+     </body></body></body></body></body></body>"""
+
+
+def biped() -> str:
+    """A trunk on two such legs."""
+    joints = ("yaw", "roll", "hip", "knee", "ankle", "ankle_roll")
+    ends = f'ctrllimited="true" ctrlrange="-{STRONGEST} {STRONGEST}"'
+    motors = "".join(
+        f'<motor joint="{side}_{joint}" {ends}/>' for side in ("left", "right") for joint in joints
+    )
+    return f"""<mujoco model="biped"><compiler angle="radian"/><worldbody>
+<body name="trunk" pos="0 0 0.88"><freejoint/>
+ <geom type="box" pos="0 0 0.25" size="0.1 0.15 0.25" mass="30" contype="0" conaffinity="0"/>
+ {leg("left", 0.1)}{leg("right", -0.1)}</body></worldbody>
+<actuator>{motors}</actuator></mujoco>"""
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> hs.SpatialRobot:
+    path = tmp_path_factory.mktemp("robot") / "biped.xml"
+    path.write_text(biped())
+    with pytest.warns(hs.RobotWarning, match="contact is with the ground alone"):
+        return hs.load_robot(path, dimension=3)
+
+
+@pytest.fixture(scope="module")
+def crouched(robot: hs.SpatialRobot) -> np.ndarray:
+    """The robot on its soles with bent knees."""
+    q = robot.reference_state().q.copy()
+    for name, angle in (("hip", -0.3), ("knee", 0.6), ("ankle", -0.3)):
+        for side in ("left", "right"):
+            q[robot.model.first_position[robot.joint_index(f"{side}_{name}")]] = angle
+    lowest = spatial.lowest_positions(robot, q)[:, 2].min()
+    q[2] -= lowest
+    return q
+
+
+def pushed(force: tuple[float, float], law: Any, q: np.ndarray, robot: hs.SpatialRobot) -> Any:
+    """Push the trunk for 0.1 s, when it has come to rest."""
+    push = hs.Push("trunk", force=(*force, 0.0), start=1.0, duration=0.1)
+    period = 2e-3 if isinstance(law, hs.HoldBalance) else None
+    return hs.simulate(
+        robot, law, state=hs.State(q, np.zeros(robot.nv)), duration=4.0, pushes=push,
+        control_period=period,
+    )  # fmt: skip
+
+
+def test_torques_are_those_of_accelerations_and_wrenches(
+    robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    """By the queries of the dynamics: Γ = M v̇ + H − Jᵀw where motors are, and nothing elsewhere.
+
+    And wrenches are such as the ground has, by the world's axes: its normal is z.
+    """
+    law = hs.HoldBalance(robot, posture=crouched, friction=FRICTION)
+    push = hs.Push("trunk", force=(120.0, 60.0, 0.0), start=0.1, duration=0.1)
+    simulation = hs.Simulation(
+        robot, law, state=hs.State(crouched, np.zeros(robot.nv)), pushes=push
+    )
+    memory = simulation._numbers.memory
+    soles = soles_in_space(robot, crouched)
+    seen = 0
+    for until in np.arange(0.02, 0.6, 0.02):
+        simulation.advance(float(until))
+        state = simulation.state
+        simulation.step()
+        torque = simulation.record.torque[-2]  # of the row that the step began with
+        program = memory.program
+        if program.relaxed:
+            continue
+        seen += 1
+        v_dot, wrenches = program.x[: robot.nv], program.x[robot.nv :].reshape(-1, 6)
+        force = spatial.inverse_dynamics(robot, state.q, state.v, v_dot)
+        force -= spatial.passive_force(robot, state.q, state.v)
+        for link, local, half, wrench in zip(
+            soles.link, soles.middle, soles.half, wrenches, strict=True
+        ):
+            force -= spatial.point_jacobian(robot, state.q, link, local).T @ wrench
+            (fx, fy, fz), (mx, my, mz) = wrench[:3], wrench[3:]
+            assert fz >= -1e-6
+            assert np.hypot(fx, fy) <= FRICTION * fz * 1.02 + 1e-6  # soles tilt by a degree
+            assert abs(my) <= WITHIN * half[0] * fz * 1.05 + 1e-3
+            assert abs(mx) <= WITHIN * half[1] * fz * 1.05 + 1e-3
+            assert abs(mz) <= FRICTION * half[1] * fz + 1e-6
+        size = robot.weight
+        driven = robot.model.actuator_velocity
+        assert np.abs(np.delete(force, driven)).max() <= 1e-9 * size
+        assert np.abs(force[driven] - torque).max() <= 1e-9 * size
+        assert np.abs(torque).max() <= STRONGEST
+    assert seen >= 20
+
+
+def test_it_stands_over_the_middle_of_its_soles(
+    robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    law = hs.HoldBalance(robot, posture=crouched)
+    run = pushed((0.0, 0.0), law, crouched, robot)
+    assert run.completed
+    away = run.log["away"].values
+    assert away[0] > 5e-3
+    assert away[-1] < 0.5 * away[0]
+    assert np.abs(run.velocity[-1]).max() < 0.01
+    assert run.certificates.uncertified == 0
+
+
+@pytest.mark.parametrize("force", [(150.0, 0.0), (-140.0, 0.0), (0.0, 200.0), (0.0, -200.0)])
+def test_it_withstands_pushes_that_a_posture_does_not(
+    force: tuple[float, float], robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    """15, 14 and 20 N s; a pendulum of its height falls over its soles at 20, 20 and 27."""
+    assert pushed(force, hs.HoldBalance(robot, posture=crouched), crouched, robot).completed
+    posture = hs.HoldPosture(robot, posture=crouched, kp=600.0, kd=15.0)
+    assert pushed(force, posture, crouched, robot).status is hs.RunStatus.FELL
+
+
+def test_pushed_to_either_side_it_does_the_same(
+    robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    law = hs.HoldBalance(robot, posture=crouched)
+    left, right = (pushed((0.0, side * 100.0), law, crouched, robot) for side in (1.0, -1.0))
+    assert np.abs(left.position[:, 1]).max() > 0.01
+    np.testing.assert_allclose(left.position[:, 1], -right.position[:, 1], atol=1e-6)
+
+
+def test_refusals(robot: hs.SpatialRobot, crouched: np.ndarray, tmp_path: Path) -> None:
+    with pytest.raises(hs.ControllerError, match="friction must be a positive"):
+        hs.HoldBalance(robot, friction=0.0)
+    with pytest.raises(hs.ControllerError, match="posture must be 19"):
+        hs.HoldBalance(robot, posture=crouched[:-1])
+    with pytest.raises(hs.ControllerError, match="must be a SpatialRobot"):
+        hs.HoldBalance(hs.load_robot("bravo7"))  # type: ignore[arg-type]
+    on_points = biped().replace('type="box" pos="0.03 0 -0.05" size="0.11 0.05 0.02"',
+                                'type="sphere" pos="0 0 -0.05" size="0.02"')  # fmt: skip
+    path = tmp_path / "points.xml"
+    path.write_text(on_points)
+    with pytest.warns(hs.RobotWarning, match="contact is with the ground alone"):
+        pointed = hs.load_robot(path, dimension=3)
+    with pytest.raises(hs.ControllerError, match="along a line or in a point only"):
+        hs.HoldBalance(pointed)
