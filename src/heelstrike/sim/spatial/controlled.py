@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -23,10 +22,11 @@ from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import HINGE, SLIDE, SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot
-from heelstrike.sim.controller.asking import call_law, show_contacts
-from heelstrike.sim.controller.control import TRUSTED, Control
+from heelstrike.sim.controller.asking import asking
+from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import ControllerFunction, machine_code_of
+from heelstrike.sim.controller.motors import limit_torques
 from heelstrike.sim.controller.robot import NO_ENDING
 from heelstrike.sim.memory import CommonTally
 
@@ -141,24 +141,14 @@ class SpatialControl(Control):
 
 
 @dissolved_kernel
-def ask_in_space(
-    controller: Any, time: float, q: Floats, v: Floats, model: SpatialModel,
-    tree: SpatialWorkspace, contacts: Contacts, control: SpatialControl, torque: Floats,
-) -> None:  # fmt: skip
-    """Ask a controller for its torques; they are no number if it wrote where it may not."""
+def show(q: Floats, v: Floats, model: SpatialModel, control: SpatialControl) -> None:
+    """Write the state that a controller is shown."""
     state = control.state
     for i in range(q.shape[0]):
         state.q[i] = q[i]
     for k in range(v.shape[0]):
         state.v[k] = v[k]
     show_driven(model, control.robot.position_of, q, v, state)
-    if control.conduct != TRUSTED:
-        show_kinematics(tree, state.kinematics)
-        show_contacts(contacts, control.contacts)
-    if control.believes == 1:
-        control.robot.update(state)
-    at = control.kept_at, control.log_at
-    call_law(controller, time, control.kept, at, control, torque)
 
 
 @kernel
@@ -173,34 +163,26 @@ def show_kinematics(tree: SpatialWorkspace, own: SpatialWorkspace) -> None:
     copy_words(tree.inertia, own.inertia)
 
 
+_ask = asking(show, show_kinematics)
+
+
+@dissolved_kernel
+def ask_in_space(
+    controller: Any, time: float, q: Floats, v: Floats, model: SpatialModel,
+    tree: SpatialWorkspace, contacts: Contacts, control: SpatialControl, torque: Floats,
+) -> None:  # fmt: skip
+    """Ask a controller for its torques; they are no number if it wrote where it may not."""
+    at = control.kept_at, control.log_at
+    _ask(controller, time, q, v, model, tree, contacts, control.kept, at, control, torque)
+
+
 @dissolved_kernel
 def limit_torque_in_space(
-    model: SpatialModel,
-    voltage: int,  # noqa: ARG001 - in space there are none
-    v: Floats,
-    tally: CommonTally,
-    commands: Floats,
+    model: SpatialModel, voltage: int, v: Floats, tally: CommonTally, commands: Floats,
     torques: Floats,
-) -> bool:
-    """Find the torques of an instant from its commands; return whether all of these are finite.
-
-    Torques keep to the limits of their actuators, and to the line from stall torque to no-load
-    speed where a motor has one.
-    """
-    for i in range(model.nu):
-        wanted = commands[i]
-        if not abs(wanted) < math.inf:
-            tally.bad_torque = i
-            return False
-        commands[i] = min(max(wanted, model.torque_lower[i]), model.torque_upper[i])
-        k = model.actuator_velocity[i]
-        stall, applied = model.stall_torque[k], commands[i]
-        if stall < math.inf:
-            drag = stall / model.no_load_speed[k] * v[k]
-            applied = min(max(applied, -stall - drag), stall - drag)
-        tally.saturations += applied != wanted
-        torques[i] = applied
-    return True
+) -> bool:  # fmt: skip
+    """Find the torques of an instant from its commands; return whether all of these are finite."""
+    return limit_torques(model, model.actuator_velocity, voltage, v, tally, commands, torques)
 
 
 SEEN: dict[str, Any] = {
