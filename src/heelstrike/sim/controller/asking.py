@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,40 +14,7 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.controller.control import OVERRAN, TRUSTED, Control
 from heelstrike.sim.controller.guard import intact, intact_between
 from heelstrike.sim.controller.interface import Contacts
-
-
-def asking(show: Callable[..., None], show_kinematics: Callable[..., None]) -> Callable[..., None]:
-    """Make the kernel that asks a law, in the plane or in space.
-
-    Parameters
-    ----------
-    show : callable
-        Kernel ``show(q, v, model, control)``: write the state that it is shown.
-    show_kinematics : callable
-        Kernel ``show_kinematics(tree, own)``: copy what follows from it.
-
-    Returns
-    -------
-    callable
-        Kernel ``ask_law(controller, time, q, v, model, tree, contacts, kept, at, control,
-        torque)``; `kept` is what the law remembers, `at` where that and its log are.
-    """
-
-    @dissolved_kernel
-    def ask_law(
-        controller: Any, time: float, q: Floats, v: Floats, model: Any, tree: Any,
-        contacts: Contacts, kept: Integers, at: tuple[int, int], control: Any, torque: Floats,
-    ) -> None:  # fmt: skip
-        state = control.state
-        show(q, v, model, control)
-        if control.conduct != TRUSTED:
-            show_kinematics(tree, state.kinematics)
-            show_contacts(contacts, control.contacts)
-        if control.believes == 1:
-            control.robot.update(state)
-        call_law(controller, time, kept, at, control, torque)
-
-    return ask_law
+from heelstrike.sim.controller.robot import ControlState
 
 
 @dissolved_kernel
@@ -78,8 +44,7 @@ def consult(
 
 
 @dissolved_kernel
-def _show(q: Floats, v: Floats, model: Model, control: Control) -> None:
-    state = control.state
+def _show(q: Floats, v: Floats, model: Model, state: ControlState) -> None:
     for i in range(q.shape[0]):
         state.q[i] = q[i]
     for i in range(v.shape[0]):
@@ -88,6 +53,21 @@ def _show(q: Floats, v: Floats, model: Model, control: Control) -> None:
         joint = model.actuator_joint[i]
         state.joint_position[i] = q[joint]
         state.joint_velocity[i] = v[joint]
+
+
+@dissolved_kernel
+def _ask(
+    controller: Any, time: float, q: Floats, v: Floats, model: Model, tree: Workspace,
+    contacts: Contacts, kept: Integers, at: tuple[int, int], control: Control, torque: Floats,
+) -> None:  # fmt: skip
+    state = control.state
+    _show(q, v, model, state)
+    if control.conduct != TRUSTED:
+        _show_kinematics(tree, state.kinematics)
+        show_contacts(contacts, control.contacts)
+    if control.believes == 1:
+        control.robot.update(state)
+    call_law(controller, time, kept, at, control, torque)
 
 
 @dissolved_kernel
@@ -134,6 +114,3 @@ def show_contacts(contacts: Contacts, seen: Contacts) -> None:
     copy_words(contacts.normal, seen.normal)
     copy_words(contacts.gap, seen.gap)
     copy_words(contacts.force, seen.force)
-
-
-_ask = asking(_show, _show_kinematics)

@@ -27,7 +27,8 @@ from heelstrike.dynamics.queries.linearization import solved
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Model
-from heelstrike.sim.compliant.dynamics import HELD, CompliantWorkspace, evaluate
+from heelstrike.sim.compliant.corners import Corners
+from heelstrike.sim.compliant.dynamics import HELD, Laws, Rates, evaluate
 from heelstrike.sim.compliant.law import FrictionForces
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Controller
@@ -62,7 +63,7 @@ PENETRATION, SPEED = 1e-4, 0.1
 """Changes of a position (m, rad) or a bend (m), and of a velocity (m/s, rad/s), that matter: parts
 of them are told by the same number."""
 
-SETTLED = 1e-9
+LAST_CHANGE = 1e-9
 """Last change of Newton's iteration in parts of these: after it there is only rounding."""
 
 NEWTON = 8
@@ -83,13 +84,13 @@ differentiated: laws are linear in it, so that any does."""
 
 @kernel
 def act(
-    model: Model, ground: GroundModel, time: float, control: Control, memory: Memory,
-    work: CompliantWorkspace,
+    model: Model, ground: GroundModel, time: float, control: Control, memory: Memory, laws: Laws,
+    corners: Corners, now: Rates, own_rows: Floats, force: Floats,
 ) -> None:  # fmt: skip
     """Find forces and rates of the state in `memory`, under the commands that are there."""
     evaluate(
-        controller_in(control.function), control, model, ground, HELD, time, memory, work.laws,
-        work.corners, work.now, work.now_rows, work.force,
+        controller_in(control.function), control, model, ground, HELD, time, memory, laws, corners,
+        now, own_rows, force,
     )  # fmt: skip
 
 
@@ -102,9 +103,9 @@ def rub_with(factor: float, code: int, law: int, friction: FrictionForces) -> No
 
 
 @kernel
-def address_of_friction(work: CompliantWorkspace) -> int:
+def address_of_friction(laws: Laws) -> int:
     """Where the numbers of the friction law are."""
-    return address_of(work.laws.friction)
+    return address_of(laws.friction)
 
 
 @dataclass(frozen=True)
@@ -257,7 +258,10 @@ class Yielding:
             law = self.law.now()
             memory.command[:] = law.torque()
         wanted = memory.command.copy()
-        act(model, ground, time, simulation._control, memory, work)
+        act(
+            model, ground, time, simulation._control, memory, work.laws, work.corners, now,
+            work.now_rows, work.force,
+        )  # fmt: skip
         if not np.array_equal(memory.torque, wanted):
             raise SimulationError(
                 "torques reached the limits of the motors, where they cannot be differentiated"
@@ -329,7 +333,7 @@ class Yielding:
         """Tangential forces and rates of bends by the ground's coefficient of friction, (nc,)."""
         work, nc = self._simulation._work, self._simulation.robot.nc
         friction, usual = work.now.friction, work.now.friction.friction.copy()
-        law, told = address_of_friction(work), []
+        law, told = address_of_friction(work.laws), []
         for side in (RUBBED, -RUBBED, 0.0):
             friction.friction[:] = usual
             rub_with(1.0 + side, work.laws.friction_code, law, friction)
@@ -373,7 +377,7 @@ class Yielding:
             if not np.all(np.isfinite(moved)):
                 return None
             rates -= moved
-            if np.all(np.abs(stage @ moved) <= SETTLED * self._scale):
+            if np.all(np.abs(stage @ moved) <= LAST_CHANGE * self._scale):
                 break
         else:
             return None

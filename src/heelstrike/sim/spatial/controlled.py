@@ -22,8 +22,8 @@ from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import HINGE, SLIDE, SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot
-from heelstrike.sim.controller.asking import asking
-from heelstrike.sim.controller.control import Control
+from heelstrike.sim.controller.asking import call_law, show_contacts
+from heelstrike.sim.controller.control import TRUSTED, Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import ControllerFunction, machine_code_of
 from heelstrike.sim.controller.motors import limit_torques
@@ -141,14 +141,24 @@ class SpatialControl(Control):
 
 
 @dissolved_kernel
-def show(q: Floats, v: Floats, model: SpatialModel, control: SpatialControl) -> None:
-    """Write the state that a controller is shown."""
+def ask_in_space(
+    controller: Any, time: float, q: Floats, v: Floats, model: SpatialModel,
+    tree: SpatialWorkspace, contacts: Contacts, control: SpatialControl, torque: Floats,
+) -> None:  # fmt: skip
+    """Ask a controller for its torques; they are no number if it wrote where it may not."""
     state = control.state
     for i in range(q.shape[0]):
         state.q[i] = q[i]
     for k in range(v.shape[0]):
         state.v[k] = v[k]
     show_driven(model, control.robot.position_of, q, v, state)
+    if control.conduct != TRUSTED:
+        show_kinematics(tree, state.kinematics)
+        show_contacts(contacts, control.contacts)
+    if control.believes == 1:
+        control.robot.update(state)
+    at = control.kept_at, control.log_at
+    call_law(controller, time, control.kept, at, control, torque)
 
 
 @kernel
@@ -161,19 +171,6 @@ def show_kinematics(tree: SpatialWorkspace, own: SpatialWorkspace) -> None:
     copy_words(tree.velocity, own.velocity)
     copy_words(tree.bias_acceleration, own.bias_acceleration)
     copy_words(tree.inertia, own.inertia)
-
-
-_ask = asking(show, show_kinematics)
-
-
-@dissolved_kernel
-def ask_in_space(
-    controller: Any, time: float, q: Floats, v: Floats, model: SpatialModel,
-    tree: SpatialWorkspace, contacts: Contacts, control: SpatialControl, torque: Floats,
-) -> None:  # fmt: skip
-    """Ask a controller for its torques; they are no number if it wrote where it may not."""
-    at = control.kept_at, control.log_at
-    _ask(controller, time, q, v, model, tree, contacts, control.kept, at, control, torque)
 
 
 @dissolved_kernel
