@@ -20,7 +20,5 @@ def test_the_load_is_told_where_the_system_counts_it(monkeypatch: pytest.MonkeyP
 
 
 def test_benchmarks_ask_nobody_else_for_it() -> None:
-    asking = [
-        path.name for path in BENCHMARKS.rglob("*.py") if "os.getloadavg" in path.read_text()
-    ]
+    asking = [path.name for path in BENCHMARKS.rglob("*.py") if "os.getloadavg" in path.read_text()]
     assert asking == ["machine.py"]
