@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from machine import load
 from rich.console import Console
 from table import Table
 
@@ -83,7 +84,7 @@ def tried(family: hs.GaitFamily, speed: float, slope: float) -> Between | None:
 
 def row(name: str) -> list[str]:
     """Design the family of a robot and return its row of the table."""
-    load = os.getloadavg()[0]
+    begun = load()
     clock, spent = time.perf_counter(), time.process_time()
     family = hs.gait_family(hs.load_robot(name), **ROBOTS[name], speed=SPEEDS, slope=SLOPES)
     clock, spent = time.perf_counter() - clock, time.process_time() - spent
@@ -100,7 +101,7 @@ def row(name: str) -> list[str]:
     more = [100.0 * each.more for each in found]
     return [
         name, str(len(family.gaits)), str(len(family.gaps)), str(optimal), f"{max(errors):.0e}",
-        f"{clock:.0f}", f"{spent:.0f}", f"{load:.1f}, {os.getloadavg()[0]:.1f}", str(len(found)),
+        f"{clock:.0f}", f"{spent:.0f}", f"{begun:.1f}, {load():.1f}", str(len(found)),
         f"{np.median(more):.2f}", f"{max(more):.2f}",
         f"{sum(each.steps == each.asked for each in found)}",
     ]  # fmt: skip

@@ -24,7 +24,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import time
 import warnings
 from collections.abc import Callable
@@ -35,6 +34,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import yaml
+from machine import load
 from numpy.typing import NDArray
 
 import heelstrike as hs
@@ -397,7 +397,7 @@ def main() -> None:
                         f"{one.turning:+.3f} rad/s  peak {one.peak:5.2f} {one.mean_peak:4.2f} "
                         f"slip {one.slip:6.2f} mm/s deep {one.deepest:.1e} "
                         f"{one.microseconds:5.1f} us certified {one.certified:.6f} {one.message} "
-                        f"load {os.getloadavg()[0]:.1f}",
+                        f"load {load():.1f}",
                         flush=True,
                     )
     if given.json:

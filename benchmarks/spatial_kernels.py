@@ -10,13 +10,13 @@ all their points if none is.
 from __future__ import annotations
 
 import argparse
-import os
 import time
 import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from machine import load
 
 import heelstrike as hs
 from heelstrike.compiler.compilation import kernel
@@ -131,7 +131,7 @@ def main() -> None:
         "the same, whitened": (whitened, model, tree, last, rows_of),
         f"Delassus {len(matrix)} x {len(matrix)}": (delassus, model, first, last, along, matrix),
     }
-    print(robot, f"load {os.getloadavg()[0]:.1f}")
+    print(robot, f"load {load():.1f}")
     for name, (timed, *arguments) in times.items():
         print(f"{name:40} {microseconds(timed, *arguments):6.2f} us", flush=True)
 

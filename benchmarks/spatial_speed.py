@@ -20,6 +20,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from machine import load
 
 import heelstrike as hs
 from heelstrike.dynamics.spatial.queries.equations_of_motion import mass_matrix
@@ -112,7 +113,7 @@ def main() -> None:
     model = file.compile()
     model.opt.timestep = STEP
     steps = round(options.seconds / STEP)
-    print(f"{robot!r}; load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    print(f"{robot!r}; load {load():.1f} on {os.cpu_count()} cores")
     best: dict[str, float] = {}
     last: dict[str, Any] = {}
     for _ in range(options.rounds):

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
+from heelstrike.cli.options import Reading
+from heelstrike.cli.planning import planar_robot_called
 from heelstrike.cli.values import AHEAD, GROUNDS, ground_called, pose_called, pushes_called
 
 
@@ -148,3 +150,11 @@ def test_help_names_every_kind_of_ground() -> None:
 
     (option,) = OnGround.__metadata__  # type: ignore[attr-defined]
     assert [kind.partition(":")[0] for kind in option.metavar.split("|")] == ["FILE", *GROUNDS]
+
+
+def test_a_built_in_robot_is_read_as_it_is_asked_for() -> None:
+    """No option of reading is passed over in silence."""
+    posed = planar_robot_called("bravo7", Reading(pose=["right_knee=0.4", "left_knee=0.4"]))
+    assert posed.reference_state().q[posed.joint_index("left_knee")] == 0.4
+    with pytest.raises(hs.RobotError, match="Did you mean 'left_knee'"):
+        planar_robot_called("bravo7", Reading(pose=["left_kne=0.4"]))

@@ -103,6 +103,19 @@ def test_a_start_on_a_slope_is_a_start_on_a_slope(
         assert state is gait.initial_state
 
 
+def test_a_gait_of_a_slope_begins_on_it_as_it_was_designed(bravo7: hs.Robot, gait: hs.Gait) -> None:
+    """And is turned by the difference on a steeper one."""
+    gentle, steep = (hs.Ground(slope=np.deg2rad(degrees)) for degrees in (3.0, 5.0))
+    designed = beginning(bravo7, gait, gentle).state
+    sloped = replace(gait, slope=gentle.slope, initial_state=designed)
+    there = beginning(bravo7, sloped, gentle).state
+    np.testing.assert_allclose(there.vector, designed.vector, atol=1e-12)
+    further = beginning(bravo7, sloped, steep).state
+    np.testing.assert_allclose(
+        further.vector, beginning(bravo7, gait, steep).state.vector, atol=1e-12
+    )
+
+
 def test_a_start_on_high_ground_is_on_the_ground(bravo7: hs.Robot, gait: hs.Gait) -> None:
     ground = hs.Ground(profile=[(-5.0, 0.3), (0.6, 0.3), (0.6, 0.5), (9.0, 0.5)])
     state = beginning(bravo7, gait, ground).state

@@ -329,6 +329,8 @@ def test_wrong_questions_are_refused(tmp_path: Path) -> None:
         campaign.loaded("bravo7, rabit", {})
     with pytest.raises(hs.RobotError, match="two robots are called 'bravo7'"):
         campaign.loaded("bravo7,bravo7", {})
+    with pytest.raises(hs.RobotError, match="rabbit are built in: leave out mirror"):
+        campaign.loaded("bravo7, rabbit", {"mirror": "average", "pose": {}})
     assert campaign.chosen_controllers(" wholebody,") == (BY_NAME["WholeBody"],)
     assert campaign.chosen_disturbances(None) == DISTURBANCES
     walks.bravo7().save(tmp_path / "mine.xml")

@@ -54,11 +54,10 @@ def spatial_law_asked(words: str) -> SpatialLaw:
 
 
 def planar_robot_called(name: str, how: Reading) -> Robot:
-    """Load a robot of the plane; options of reading are for files, not for built-in robots."""
-    from heelstrike.robot import builtin_robots
+    """Load a robot of the plane."""
     from heelstrike.robot.library import load_planar_robot
 
-    return load_planar_robot(name, **({} if name in builtin_robots() else how.keywords()))
+    return load_planar_robot(name, **how.keywords())
 
 
 def robots_named(
@@ -102,11 +101,10 @@ def asked_for(
 ) -> Case:
     """Make of options what is walked, but for its gait, which may take long to find."""
     from heelstrike.experiments.walk import Case
-    from heelstrike.robot.library import load_planar_robot
 
     ground = ground_called(walking.ground, friction=walking.friction, restitution=restitution)
     pushes = pushes_called(walking.push)
-    machine = load_planar_robot(robot, **how.keywords())
+    machine = planar_robot_called(robot, how)
     for each in pushes:
         each.place(machine)
     law = law_asked(walking.controller, machine)

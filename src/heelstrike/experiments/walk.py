@@ -149,8 +149,9 @@ def beginning(
     """Put a robot on a ground as its gait begins, or on its limit cycle.
 
     Where the ground slopes at the start, the whole robot is turned with it about the middle of its
-    stance foot, so that its feet lie on the ground as they do on the level; see also
-    :meth:`heelstrike.Robot.placed`. A robot that stands does so as it can there.
+    stance foot, so that its feet lie on the ground as they do on that of the gait, which may be a
+    slope itself; see also :meth:`heelstrike.Robot.placed`. A robot that stands does so as it can
+    there.
 
     Parameters
     ----------
@@ -176,7 +177,8 @@ def beginning(
         if law is not None and law.stands:
             state = robot.standing(ground)
         else:
-            state = robot.placed(_turned(robot, state, _slope_at(ground, 0.0)), ground)
+            turn = _slope_at(ground, 0.0) - (0.0 if walked is None else walked.slope)
+            state = robot.placed(_turned(robot, state, turn), ground)
     return Beginning(state, duration, controller)
 
 

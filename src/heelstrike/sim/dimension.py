@@ -112,6 +112,10 @@ class Dimension(ABC):
         """Return a state of a robot, or refuse what is none."""
 
     @abstractmethod
+    def is_plain(self, robot: Any, ground: Any) -> bool:
+        """Whether a robot and the numbers of a ground have none of ``sim.frame.PLAIN``."""
+
+    @abstractmethod
     def is_free(self, robot: Any) -> bool:
         """Whether any finite numbers are a state of a robot."""
 

@@ -20,9 +20,7 @@ from collections.abc import Callable, Mapping
 from functools import lru_cache
 from time import perf_counter
 from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
 
-import numpy as np
 from numba import types
 
 from heelstrike.compiler.bundle_type import Fixed
@@ -32,15 +30,13 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.solvers.certified_solve import try_solvers
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Model
-from heelstrike.robot.robot import Robot
-from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.contacts.loops import begin_closed
 from heelstrike.sim.controller.asking import ask
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.law import controller_in
 from heelstrike.sim.controller.motors import limit_torque
-from heelstrike.sim.dimension import AnyRobot
+from heelstrike.sim.dimension import AnyRobot, dimension_of
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record, RowsAndEvents
 from heelstrike.sim.record.recording import center_height, note_log, note_row_when_due, sound
@@ -296,25 +292,10 @@ def fixed_for(robot: AnyRobot, ground: Any, work: Any, usual: Mapping[str, int])
 
     Two loops a method are enough: each is compiled when it is first needed. In space there is one.
     """
-    if isinstance(robot, SpatialRobot):
-        return ()
-    plain = not has_rare_rows(robot) and ground.friction.size == 1 and ground.curved == 0
+    plain = dimension_of(robot).is_plain(robot, ground)
     if not (plain and all(getattr(work, name) == value for name, value in usual.items())):
         return ()
     return PLAIN + tuple(usual.items())
-
-
-def has_rare_rows(robot: Robot) -> bool:
-    """Whether a robot has rows of other kinds than contact points and joint stops."""
-    if robot not in _RARE:
-        model = robot.model
-        dry = model.dry_friction.any() or np.isfinite(model.brake_limit).any()
-        joints = model.loops or model.couplings or model.latches or model.brakes
-        _RARE[robot] = bool(dry or joints or robot.constraints)
-    return _RARE[robot]
-
-
-_RARE: WeakKeyDictionary[Robot, bool] = WeakKeyDictionary()
 
 
 @lru_cache

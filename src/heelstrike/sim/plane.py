@@ -6,8 +6,10 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 from heelstrike.compiler.mold import Mold
-from heelstrike.contact.ground import Ground
+from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactWorkspace
@@ -62,6 +64,10 @@ class Plane(Dimension):
         """Return a state of a robot, or refuse what is none."""
         check_state(robot, state)
         return state
+
+    def is_plain(self, robot: Robot, ground: GroundModel) -> bool:
+        """Whether there are points and stops only, on one segment of ground."""
+        return not has_rare_rows(robot) and ground.friction.size == 1 and ground.curved == 0
 
     def is_free(self, robot: Robot) -> bool:
         """Whether any finite numbers are a state: those of closed loops have to close them."""
@@ -201,3 +207,16 @@ class Plane(Dimension):
 _MOLDS: WeakKeyDictionary[Robot, Mold[Memory]] = WeakKeyDictionary()
 
 PLANE = Plane()
+
+
+def has_rare_rows(robot: Robot) -> bool:
+    """Whether a robot has rows of other kinds than contact points and joint stops."""
+    if robot not in _RARE:
+        model = robot.model
+        dry = model.dry_friction.any() or np.isfinite(model.brake_limit).any()
+        joints = model.loops or model.couplings or model.latches or model.brakes
+        _RARE[robot] = bool(dry or joints or robot.constraints)
+    return _RARE[robot]
+
+
+_RARE: WeakKeyDictionary[Robot, bool] = WeakKeyDictionary()

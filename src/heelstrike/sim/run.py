@@ -198,7 +198,7 @@ class AnyRun(ShownInNotebooks):
     position: Floats = recorded("nq", of="q", unit="m or rad", label="generalised positions")
     velocity: Floats = recorded("nv", of="v", unit="m/s or rad/s", label="generalised velocities")
     torque: Floats = recorded(
-        "nu", of="torque", unit="N m", label="joint torques within their limits"
+        "nu", of="torque", unit="N m or N", label="joint torques within their limits"
     )
     stop_torque: Floats = recorded(
         "nv",

@@ -20,7 +20,7 @@ from heelstrike.robot.state import State
 from heelstrike.sim.image import Image
 
 _IDENTITY = "identity"
-_FORMAT = 7
+_FORMAT = 8
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,6 +41,8 @@ def draw_quantity(excerpt: Excerpt, name: str) -> Figure:
         known.get(each, [str(i) for i in range(size)])
         for each, size in zip(along, sizes, strict=True)
     ] or [[name]]
+    if along:
+        unit = IN_THE_PLANE.unit_along(run.robot, along[0], len(names[0]), unit)
     if not names[0]:
         raise ViewError(f"robot {run.robot.name!r} has no {along[0]}s: there is nothing to show")
     components = names[1] if len(names) > 1 else [""]

@@ -7,7 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from heelstrike.contact.spatial.ground import Box, SpatialGround, distance_to_box
+from heelstrike.contact.spatial.ground import (
+    Box,
+    SpatialGround,
+    distance_to_box,
+    distance_to_face,
+)
 from heelstrike.errors import SimulationError
 
 
@@ -23,6 +28,35 @@ def test_numbers_of_the_ground_are_finite(name: str, number: float) -> None:
 def test_numbers_of_a_box_are_finite(name: str, number: float) -> None:
     with pytest.raises(SimulationError, match=name):
         Box(center=(0.0, 0.0, 0.1), size=(1.0, 1.0, 0.2), **{name: number})
+
+
+@pytest.mark.parametrize("name", ["center", "size"])
+@pytest.mark.parametrize("values", [(0.1, 0.2), (0.1, math.nan, 0.2), (math.inf, 0.1, 0.2)])
+def test_places_and_sizes_of_a_box_are_three_finite_numbers(
+    name: str, values: tuple[float, ...]
+) -> None:
+    usual = {"center": (0.0, 0.0, 0.1), "size": (1.0, 1.0, 0.2)}
+    with pytest.raises(SimulationError, match=f"{name} of a box must be three numbers"):
+        Box(**usual | {name: values})
+
+
+def test_a_box_has_some_size() -> None:
+    with pytest.raises(SimulationError, match="size of a box"):
+        Box(center=(0.0, 0.0, 0.1), size=(1.0, 0.0, 0.2))
+
+
+def test_the_plane_is_as_far_as_its_normal_tells() -> None:
+    """n · p − h, of a slope that climbs along x and y."""
+    draw = np.random.default_rng(3)
+    for _ in range(5):
+        x, y, height = draw.normal(size=3)
+        point = draw.normal(size=3)
+        ground = SpatialGround(normal=(x, y, 1.0), height=height)
+        n = np.array([x, y, 1.0]) / math.sqrt(x * x + y * y + 1.0)
+        there = n * ground.model().height  # a point of the plane
+        gap, normal = distance_to_face(ground.model(), 0, tuple(point.tolist()))
+        assert gap == pytest.approx(n @ (point - there), abs=1e-14)
+        assert normal == pytest.approx(n)
 
 
 @pytest.mark.parametrize("normal", [(0.0, 0.0, math.nan), (math.inf, 0.0, 1.0)])

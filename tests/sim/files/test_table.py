@@ -81,3 +81,22 @@ def test_a_table_is_no_run_to_load(tmp_path: Path) -> None:
     path = walking.walk(steps=1).save(tmp_path / "walk.csv")
     with pytest.raises(hs.RunFileError, match=r"is a table.*load the \.nc file"):
         hs.load_run(path)
+
+
+def test_forces_of_motors_on_slides_are_in_newtons() -> None:
+    """In tables, datasets and figures; torques of the others stay torques."""
+    for sliding, turning in ((True, True), (True, False), (False, True)):
+        build, parent = hs.RobotBuilder("crane"), None
+        if sliding:
+            parent = build.slide("cart", None, direction=(1, 0), mass=2, inertia=0.1, torque=9.0)
+        if turning:
+            build.hinge("jib", parent, mass=1, inertia=0.1, center_of_mass=(0, -0.3), torque=9.0)
+        robot = build.build()
+        run = hs.simulate(robot, state=robot.reference_state(), duration=2e-3)
+        headings, _ = table(to_csv(run))
+        assert ("torque cart [N]" in headings) is sliding
+        assert ("torque jib [N m]" in headings) is turning
+        both = sliding and turning
+        unit = "N m or N" if both else "N" if sliding else "N m"
+        assert run.to_dataset()["torque"].attrs["units"] == unit
+        assert run.plot("stop_torque").axes[0].get_ylabel() == unit

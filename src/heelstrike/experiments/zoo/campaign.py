@@ -151,10 +151,17 @@ def loaded(words: str, how: LoadOptions) -> dict[str, Robot]:
     Raises
     ------
     RobotError
-        If one cannot be loaded, or two have the same name.
+        If one cannot be loaded, two have the same name, or files are to be read in some way and
+        none is named.
     """
     robots: dict[str, Robot] = {}
-    for word in _words(words):
+    named = _words(words)
+    if any(how.values()) and all(word in builtin_robots() for word in named):
+        raise RobotError(
+            f"options say how files are read, and {', '.join(named)} are built in: leave out "
+            f"{', '.join(name for name, value in how.items() if value)}, or name a file"
+        )
+    for word in named:
         built_in = word in builtin_robots()
         name = word if built_in else Path(word).name
         if name in robots:

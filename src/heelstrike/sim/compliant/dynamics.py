@@ -258,8 +258,6 @@ class CompliantWorkspace(Bundle):
     absolute."""
     proposed: float = cell(float)
     """Length of the next step as far as accuracy allows (s)."""
-    row: int = cell(int)
-    """Row of the record for this sample, -1 for none."""
 
 
 def compliant_workspace(

@@ -625,6 +625,13 @@ def note_forces(
 
 
 @kernel
+def row_at(time: float, record: Record) -> int:
+    """Row that a record has of this time, its last, or -1: it may have begun after it."""
+    row = record.rows - 1
+    return row if row >= 0 and record.time[row] == time else -1
+
+
+@kernel
 def begin(
     model: Model, ground: GroundModel, memory: Memory, work: CompliantWorkspace, record: Record
 ) -> int:
@@ -678,14 +685,14 @@ def report(
     """Append a row if one is due, with the forces of this instant."""
     model, now, corners, loops = scene.model, work.now, work.corners, memory.loops
     note_means(1.0, memory.rows, now.loop, now.own.force, loops)
-    work.row = note_row_when_due(memory, clock, record)
-    if work.row >= 0:
+    row = note_row_when_due(memory, clock, record)
+    if row >= 0:
         note_forces(
-            model, work.row, work.force, now.stop_force, now.dry_force, memory.reaction.slip,
+            model, row, work.force, now.stop_force, now.dry_force, memory.reaction.slip,
             memory.assembly.answer.residual[1], memory.breakaway, loops.loop_force,
             loops.coupling_force, loops.constraint_force, loops.brake_force, record,
         )  # fmt: skip
-        force, place = record.contact_force[work.row], record.contact_point[work.row]
+        force, place = record.contact_force[row], record.contact_point[row]
         begin_joining(model, memory.contacts, corners)
         join(model, 2.0, work.force, memory.contacts, corners)
         tell_resultants(model, corners, force, place)
@@ -727,17 +734,18 @@ def move(
     tell_of_stops(end, step, reaction.stop_torque, told, reported.stopped)
     tell_of_constraints(end, work.now.own.force, sums.own, rows, told, reported.closed)
     react(model, first, memory.q, told, loops.held)
-    if 0 <= work.row < record.rows:  # a simulation that was restored has a record of its own
+    row = row_at(clock.time, record)
+    if row >= 0:
         # What acted until the next sample takes the place of what acted at the first instant.
         note_forces(
-            model, work.row, contacts.force, reaction.stop_torque, reaction.friction_torque,
+            model, row, contacts.force, reaction.stop_torque, reaction.friction_torque,
             reaction.slip, residual[1], memory.breakaway, loops.loop_force, loops.coupling_force,
             loops.constraint_force, loops.brake_force, record,
         )  # fmt: skip
         for contact in range(corners.doubled):
             if corners.joins[contact] == 1:
                 for i in range(2):
-                    record.contact_point[work.row, contact, i] = sums.place[contact, i]
+                    record.contact_point[row, contact, i] = sums.place[contact, i]
     if control.continuous == 1:
         show_forces(work.force, corners, contacts)
     clock.time = clock.start + (clock.index + 1) * step

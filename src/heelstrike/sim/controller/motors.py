@@ -25,8 +25,10 @@ integration, before an impact.
 
 from __future__ import annotations
 
+from typing import Any
+
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.memory import Tally
 
 INFINITY = float("inf")
@@ -41,7 +43,7 @@ def within(lower: float, upper: float, value: float) -> float:
 
 
 @dissolved_kernel
-def possible_command(model: Model, actuator: int, voltage: int, command: float) -> float:
+def possible_command(model: Any, actuator: int, voltage: int, command: float) -> float:
     """Return the nearest command, torque or voltage, that is one at any speed."""
     if voltage == 1:
         return within(-1.0, 1.0, command)
@@ -49,27 +51,33 @@ def possible_command(model: Model, actuator: int, voltage: int, command: float) 
 
 
 @dissolved_kernel
-def free_torque(model: Model, actuator: int, voltage: int, command: float, v: Floats) -> float:
+def free_torque(model: Any, joint: int, voltage: int, command: float, v: Floats) -> float:
     """Return what a possible command comes to at the velocities `v` if nothing limits it."""
-    joint = model.actuator_joint[actuator]
     stall = model.stall_torque[joint]
     if voltage == 0:
         return command
-    return stall * command - stall / model.no_load_speed[joint] * v[joint]
+    return float(stall * command - stall / model.no_load_speed[joint] * v[joint])
+
+
+@dissolved_kernel
+def torque_at(
+    model: Any, actuator: int, joint: int, voltage: int, command: float, v: Floats
+) -> float:
+    """Return what acts at a joint of a possible command at the velocities `v`."""
+    stall = model.stall_torque[joint]
+    if stall == INFINITY:
+        return command
+    torque = free_torque(model, joint, voltage, command, v)
+    if voltage == 1:
+        torque = within(model.torque_lower[actuator], model.torque_upper[actuator], torque)
+    drag = stall / model.no_load_speed[joint] * v[joint]
+    return within(-stall - drag, stall - drag, torque)
 
 
 @dissolved_kernel
 def motor_torque(model: Model, actuator: int, voltage: int, command: float, v: Floats) -> float:
     """Return what acts of a possible command at the velocities `v`."""
-    joint = model.actuator_joint[actuator]
-    stall = model.stall_torque[joint]
-    if stall == INFINITY:
-        return command
-    torque = free_torque(model, actuator, voltage, command, v)
-    if voltage == 1:
-        torque = within(model.torque_lower[actuator], model.torque_upper[actuator], torque)
-    drag = stall / model.no_load_speed[joint] * v[joint]
-    return within(-stall - drag, stall - drag, torque)
+    return torque_at(model, actuator, model.actuator_joint[actuator], voltage, command, v)
 
 
 @kernel
@@ -84,14 +92,40 @@ def motor_damping(model: Model, actuator: int, voltage: int, command: float, v: 
 
 
 @dissolved_kernel
-def is_obeyed(model: Model, actuator: int, voltage: int, command: float) -> bool:
+def is_obeyed(model: Any, actuator: int, joint: int, voltage: int, command: float) -> bool:
     """Whether a command is a torque within its limits, and that of a motor without a line."""
-    return (
+    return bool(
         voltage == 0
         and abs(command) < INFINITY
         and model.torque_lower[actuator] <= command <= model.torque_upper[actuator]
-        and model.stall_torque[model.actuator_joint[actuator]] == INFINITY
+        and model.stall_torque[joint] == INFINITY
     )
+
+
+@dissolved_kernel
+def limit_torques(
+    model: Any, driven: Integers, voltage: int, v: Floats, tally: Any, commands: Floats,
+    torques: Floats,
+) -> bool:  # fmt: skip
+    """Find the torques of an instant from its commands; return whether all of these were finite.
+
+    `driven` has the place in `v` of what each actuator drives, in the plane or in space.
+    """
+    for i in range(driven.shape[0]):
+        wanted = commands[i]
+        if is_obeyed(model, i, driven[i], voltage, wanted):
+            torques[i] = wanted
+            continue
+        if not abs(wanted) < INFINITY:
+            tally.bad_torque = i
+            return False
+        command = possible_command(model, i, voltage, wanted)
+        torque = torque_at(model, i, driven[i], voltage, command, v)
+        if command != wanted or torque != free_torque(model, driven[i], voltage, command, v):
+            tally.saturations += 1
+        commands[i] = command
+        torques[i] = torque
+    return True
 
 
 @dissolved_kernel
@@ -99,21 +133,7 @@ def limit_torque(
     model: Model, voltage: int, v: Floats, tally: Tally, commands: Floats, torques: Floats
 ) -> bool:
     """Find the torques of an instant from its commands; return whether all of these were finite."""
-    for i in range(model.actuator_joint.shape[0]):
-        wanted = commands[i]
-        if is_obeyed(model, i, voltage, wanted):
-            torques[i] = wanted
-            continue
-        if not abs(wanted) < INFINITY:
-            tally.bad_torque = i
-            return False
-        command = possible_command(model, i, voltage, wanted)
-        torque = motor_torque(model, i, voltage, command, v)
-        if command != wanted or torque != free_torque(model, i, voltage, command, v):
-            tally.saturations += 1
-        commands[i] = command
-        torques[i] = torque
-    return True
+    return limit_torques(model, model.actuator_joint, voltage, v, tally, commands, torques)
 
 
 @kernel
@@ -126,7 +146,7 @@ def try_torque(
     """
     bad = 0
     for i in range(torque.shape[0]):
-        if is_obeyed(model, i, voltage, command[i]):
+        if is_obeyed(model, i, model.actuator_joint[i], voltage, command[i]):
             torque[i] = command[i]
         elif not abs(command[i]) < INFINITY:
             bad = i + 1

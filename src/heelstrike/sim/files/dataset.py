@@ -85,6 +85,10 @@ def to_dataset(run: AnyRun) -> xarray.Dataset:
     variables = {
         name: each.written(values[name]) for name, each in declared.items() if name in values
     }
+    for name in rows.keys() & variables.keys():
+        dims, array, told = variables[name]
+        if "actuator" in dims:
+            told["units"] = layout.unit_along(run.robot, "actuator", array.shape[1], told["units"])
     variables["event_kind"][2].update(
         flag_values=np.array([kind.value for kind in EventKind]),
         flag_meanings=" ".join(kind.name.lower() for kind in EventKind),

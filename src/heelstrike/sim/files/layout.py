@@ -116,6 +116,11 @@ class Layout(ABC):
             return unit
         return next(one for one in unit.split(" or ") if (one in OF_HINGES) is turns)
 
+    def unit_along(self, robot: Any, along: str, count: int, unit: str) -> str:
+        """Unit of all numbers along a dimension of a dataset; both where they differ."""
+        units = {self.unit_of(robot, along, place, unit) for place in range(count)}
+        return units.pop() if len(units) == 1 else unit
+
     @abstractmethod
     def turns(self, robot: Any, along: str, place: int) -> bool | None:
         """Whether what counts along a dimension of a dataset turns; None if it does neither."""
@@ -200,6 +205,7 @@ class _Plane(Layout):
         model = robot.model
         joints: dict[str, Sequence[int]] = {
             "coordinate": range(robot.nj),
+            "actuator": model.actuator_joint.tolist(),
             "coupling": model.coupling_joint[:, 0].tolist(),
             "brake": model.brake_joint.tolist(),
         }

@@ -164,6 +164,8 @@ class _Space(Layout):
 
     def turns(self, robot: SpatialRobot, along: str, place: int) -> bool | None:
         model = robot.model
+        if along == "actuator":
+            along, place = "v", int(model.actuator_velocity[place])
         if along not in ("q", "v"):
             return None
         firsts = model.first_position if along == "q" else model.first_velocity

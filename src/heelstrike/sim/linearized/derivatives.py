@@ -13,6 +13,7 @@ from heelstrike.contact.linearized.partials import FRICTION
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.sim.closed_sets import RunStatus
+from heelstrike.sim.compliant.method import Compliant
 from heelstrike.sim.contacts.loops import TAKES_HOLD
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.frame import is_due
@@ -24,6 +25,7 @@ from heelstrike.sim.linearized.mode_changes import ModeChange, other_modes
 from heelstrike.sim.linearized.refusals import refuse_inputs, refuse_step
 from heelstrike.sim.linearized.step import linearized
 from heelstrike.sim.linearized.time_step import allocate_slopes, differentiate_step
+from heelstrike.sim.linearized.yielding import Yielding
 from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.time_stepping.method import TimeStepping
@@ -205,12 +207,14 @@ def step_derivatives(
     Contact modes are those that the certified solution has. While they last, equations hold that
     are differentiated implicitly: exact to rounding, but for the law's own derivative, which is a
     difference. Events of an event-driven motion, touchdowns, slips and stops, are gone through with
-    their saltations (:func:`~heelstrike.saltation_matrix`).
+    their saltations (:func:`~heelstrike.saltation_matrix`). So are those of compliant ground, whose
+    motion is differentiated, not the steps of its integration, whose lengths depend on it; bristles
+    begin as they are bent.
 
     Parameters
     ----------
     simulation : Simulation
-        By time stepping or event-driven; it goes on to the end.
+        It goes on to the end.
     until : float, optional
         End in s; one step of the method by default.
     numbers : sequence of str
@@ -271,7 +275,7 @@ def run_derivatives(
     every : float, optional
         Seconds from one state to the next; by default one step of time stepping, or the period of a
         sampled controller, of which it must be a multiple; and the whole time of an event-driven
-        motion.
+        motion, and on compliant ground, where bristles keep errors between two states.
 
     Returns
     -------
@@ -292,6 +296,7 @@ def run_derivatives(
     (8,)
     """
     own = max(simulation.method.step_length or 0.0, simulation.control_period)
+    own = 0.0 if isinstance(simulation.method, Compliant) else own
     span = every or own or until - simulation.time
     begin, stepper = simulation.time, _stepper(simulation, numbers, gains, answers)
     ends = begin + span * np.arange(1, max(1, round((until - begin) / span)) + 1)
@@ -300,13 +305,13 @@ def run_derivatives(
 
 def _stepper(
     simulation: Simulation, numbers: Sequence[str], gains: Sequence[str], answers: bool
-) -> _TimeSteps | _Flows:
+) -> _TimeSteps | _Flows | _Yields:
     """Choose how a simulation is differentiated.
 
     Raises
     ------
     SimulationError
-        If its method is neither time stepping nor event-driven, or there are no such numbers.
+        If its method is none of this package's, or there are no such numbers.
     """
     sizes = parameter_sizes(simulation.controller, gains)
     inputs = inputs_of(simulation.robot, numbers, sizes)
@@ -315,8 +320,11 @@ def _stepper(
         return _TimeSteps(simulation, inputs, answers)
     if isinstance(simulation.method, EventDriven):
         return _Flows(simulation, inputs, answers)
+    if isinstance(simulation.method, Compliant):
+        return _Yields(simulation, inputs, answers)
     raise SimulationError(
-        f"{simulation.method.name} is not differentiated; use TimeStepping() or EventDriven()"
+        f"{simulation.method.name} is not differentiated; use TimeStepping(), EventDriven() or "
+        "Compliant()"
     )
 
 
@@ -397,31 +405,85 @@ class _Flows:
         simulation, begin = self._simulation, self._simulation.time
         now = simulation.snapshot()
         if end is None:
-            beside = self._again(now)
+            beside = _again(simulation, now)
             _one_step(beside)
             end = beside.time
-        beside = self._again(now)
+        beside = _again(simulation, now)
         beside.advance(end)
         if beside.status is not RunStatus.COMPLETED:
             raise SimulationError(f"a step that ends the run has no derivative: {beside.message}")
         run = whole(beside.record)
         controller = simulation.controller
-        variation = Variation(self._again(now), controller, self._inputs, answers=self._answers)
+        again = _again(simulation, now)
+        variation = Variation(again, controller, self._inputs, answers=self._answers)
         motion = linearized(run, end, variation, section=False, begin=begin)
         simulation.advance(end)
         spread = max((event.spread for event in motion.saltations), default=0.0)
         return _told(simulation, begin, motion.matrix, self._inputs, (), spread)
 
-    def _again(self, now: Snapshot) -> Simulation:
-        """Return another simulation at the same instant."""
-        its = self._simulation
-        again = Simulation(
-            its.robot, its.controller, state=now, method=its.method, ground=its.ground,
-            control_period=its._given_period, stop_when_fallen=False,
-            record_every=int(now.identity["record_every"]),
-        )  # fmt: skip
-        again._clock.record_every = 1  # rows of all times are looked at
-        return again
+
+class _Yields:
+    """Motions on compliant ground, gone through from sample to sample."""
+
+    def __init__(self, simulation: Simulation, inputs: Inputs, answers: bool) -> None:
+        self._simulation, self._inputs, self._answers = simulation, inputs, answers
+        self._beside = _again(simulation, simulation.snapshot())
+        self._went_on = False
+        self._yielding = Yielding(self._beside, simulation.controller, inputs, answers=answers)
+
+    def until(self, end: float | None, modes: Mapping[str, str] | None = None) -> StepDerivatives:
+        """Go on until a time, or take one step, and say what that does."""
+        del modes
+        simulation, inputs, yielding = self._simulation, self._inputs, self._yielding
+        begin, step = simulation.time, simulation.method.step_length or 0.0
+        size = simulation.robot.nq + simulation.robot.nv
+        if self._went_on and np.any(simulation._work.now.friction.bend):
+            raise SimulationError(
+                "bristles of compliant ground keep errors from one interval to the next: leave "
+                "every out, or use RegularisedFriction()"
+            )
+        self._went_on = True
+        end = begin + step if end is None else end
+        change = np.eye(yielding.size + inputs.size)
+        change = np.delete(change, slice(size, yielding.size), axis=1)  # bends begin as they are
+        held = np.zeros((simulation.robot.nu, change.shape[1]))
+        self._beside.restore(simulation.snapshot())
+        yielding.begin()
+        while simulation.time < end - AT_ONCE * step:
+            self._beside.restore(simulation.snapshot())
+            held = self._held(change, held)
+            _one_step(simulation)
+            self._beside._memory.command[:] = simulation._memory.command
+            yielding.flow(change, held)
+        if self._answers and yielding.law is not None and simulation._control.continuous:
+            yielding.law.check_beginning()
+        return _told(simulation, begin, change[:size], inputs, ())
+
+    def _held(self, change: Floats, held: Floats) -> Floats:
+        """Return what errors do to torques that are held from this sample on."""
+        simulation, law = self._simulation, self._yielding.law
+        if law is None or not self._answers:
+            return held
+        if simulation._control.continuous:
+            law.check_memory()
+        elif is_due(simulation._clock):
+            instant = law.now()
+            law.check_call(instant)
+            held = instant.gains() @ change[: len(instant.state.vector)]
+            own = [self._yielding.size + column for column in self._inputs.of_parameters()]
+            held += instant.by_parameters(self._inputs.parameters) @ change[own]
+        return held
+
+
+def _again(simulation: Simulation, now: Snapshot) -> Simulation:
+    """Return another simulation at the same instant."""
+    again = Simulation(
+        simulation.robot, simulation.controller, state=now, method=simulation.method,
+        ground=simulation.ground, control_period=simulation._given_period,
+        stop_when_fallen=False, record_every=int(now.identity["record_every"]),
+    )  # fmt: skip
+    again._clock.record_every = 1  # rows of all times are looked at
+    return again
 
 
 def _told(

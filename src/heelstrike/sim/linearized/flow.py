@@ -5,12 +5,13 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.polynomial import Polynomial, legendre
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from heelstrike.contact.linearized.motion import ActiveContacts, linearize_contact
 from heelstrike.errors import SimulationError
 from heelstrike.sim.controller.interface import Controller
+from heelstrike.sim.linearized.collocation import collocation
 from heelstrike.sim.linearized.inputs import NONE, TORQUE, Inputs
 from heelstrike.sim.linearized.law import AskedAlong
 from heelstrike.sim.linearized.pushed import pushed, switches
@@ -35,19 +36,7 @@ def _rate(slope: Floats) -> float:
     return max(float(np.abs(np.linalg.eigvals(slope)).max()), 1.0)
 
 
-def _collocation() -> tuple[Floats, Floats, Floats]:
-    """Nodes in [0, 1], matrix and weights of Gauss's collocation."""
-    nodes, weights = legendre.leggauss(STAGES)
-    nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
-    matrix = np.zeros((STAGES, STAGES))
-    for j in range(STAGES):
-        others = np.delete(nodes, j)
-        one = Polynomial.fromroots(others) / np.prod(nodes[j] - others)
-        matrix[:, j] = one.integ()(nodes)
-    return nodes, matrix, weights
-
-
-NODES, MATRIX, WEIGHTS = _collocation()
+NODES, MATRIX, WEIGHTS = collocation(0.5 * (legendre.leggauss(STAGES)[0] + 1.0))
 
 
 class Variation:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -27,6 +26,7 @@ from heelstrike.sim.controller.asking import call_law, show_contacts
 from heelstrike.sim.controller.control import TRUSTED, Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import ControllerFunction, machine_code_of
+from heelstrike.sim.controller.motors import limit_torques
 from heelstrike.sim.controller.robot import NO_ENDING
 from heelstrike.sim.memory import CommonTally
 
@@ -175,32 +175,11 @@ def show_kinematics(tree: SpatialWorkspace, own: SpatialWorkspace) -> None:
 
 @dissolved_kernel
 def limit_torque_in_space(
-    model: SpatialModel,
-    voltage: int,  # noqa: ARG001 - in space there are none
-    v: Floats,
-    tally: CommonTally,
-    commands: Floats,
+    model: SpatialModel, voltage: int, v: Floats, tally: CommonTally, commands: Floats,
     torques: Floats,
-) -> bool:
-    """Find the torques of an instant from its commands; return whether all of these are finite.
-
-    Torques keep to the limits of their actuators, and to the line from stall torque to no-load
-    speed where a motor has one.
-    """
-    for i in range(model.nu):
-        wanted = commands[i]
-        if not abs(wanted) < math.inf:
-            tally.bad_torque = i
-            return False
-        commands[i] = min(max(wanted, model.torque_lower[i]), model.torque_upper[i])
-        k = model.actuator_velocity[i]
-        stall, applied = model.stall_torque[k], commands[i]
-        if stall < math.inf:
-            drag = stall / model.no_load_speed[k] * v[k]
-            applied = min(max(applied, -stall - drag), stall - drag)
-        tally.saturations += applied != wanted
-        torques[i] = applied
-    return True
+) -> bool:  # fmt: skip
+    """Find the torques of an instant from its commands; return whether all of these are finite."""
+    return limit_torques(model, model.actuator_velocity, voltage, v, tally, commands, torques)
 
 
 SEEN: dict[str, Any] = {

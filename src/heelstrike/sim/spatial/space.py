@@ -93,6 +93,11 @@ class Space(Dimension):
         """Return a state of a robot with quaternions of length one, or refuse what is none."""
         return checked_state(robot, state)
 
+    def is_plain(self, robot: SpatialRobot, ground: Any) -> bool:
+        """There is one loop for all."""
+        del robot, ground
+        return False
+
     def is_free(self, robot: SpatialRobot) -> bool:
         """Whether any finite numbers are a state: quaternions are of length one."""
         return not quaternion_places(robot.model)
