@@ -19,6 +19,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -96,6 +97,100 @@ def rising(robot: hs.Robot) -> dict[str, Any]:
     return {"repeat": "never", "start": crouched(robot, 1.6), "end": crouched(robot, 0.5)}
 
 
+@cache
+def walk_of(robot: hs.Robot) -> hs.Motion:
+    """Return the usual gait of bravo7 as a motion, which starting and stopping go to and from."""
+    gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, starts=1)
+    return gait.motion(robot)
+
+
+def state_of(motion: hs.Motion, time: float) -> hs.State:
+    """State of a motion at a time."""
+    return hs.State(motion.position(time), motion.velocity(time))
+
+
+def striding(robot: hs.Robot, stride: float) -> hs.State:
+    """bravo7 at rest on bent knees, the right foot at the origin and the left one ahead."""
+    q = crouched(robot, 0.5).q
+    q[0] += 0.5 * stride
+    for foot, place in enumerate((0.0, stride)):
+        contacts = robot.model.contact_position[list(robot.feet[foot].contacts)]
+        target = np.array([place, 0.0, 0.0])
+        q = dynamics.inverse_kinematics(robot, q, foot, target, local=contacts.mean(axis=0)).q
+    return hs.State(q, np.zeros(robot.nv))
+
+
+def lifted(robot: hs.Robot, share: float) -> np.ndarray:
+    """How joints of the left leg bend in the course of its swing, to start the optimiser from."""
+    bent = np.zeros(robot.nv)
+    for name, angle in (("hip", -0.4), ("knee", 0.8), ("ankle", -0.4)):
+        bent[robot.joint_names.index(f"left_{name}")] = 4.0 * share * (1.0 - share) * angle
+    return bent
+
+
+def passing(robot: hs.Robot, knots: list[tuple[float, np.ndarray]]) -> Callable[[float], Any]:
+    """Return positions that pass through others at times; the left foot swings in the second leg.
+
+    Phases take their usual times (`ContactPhase`), which the knots are at.
+    """
+    times = np.array([time for time, _ in knots])
+
+    def at(time: float) -> Any:
+        k = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(knots) - 2))
+        share = float(np.clip((time - times[k]) / (times[k + 1] - times[k]), 0.0, 1.0))
+        even = (1.0 - share) * knots[k][1] + share * knots[k + 1][1]
+        return even + (lifted(robot, share) if k == SWING else 0.0)
+
+    return at
+
+
+SWING = 1
+"""Part of what is passed through in which the left foot swings."""
+
+
+def starting(robot: hs.Robot) -> dict[str, Any]:
+    """From rest on both feet to the middle of the walk's second step, on the left foot."""
+    walk, start = walk_of(robot), crouched(robot, 0.5)
+    end = state_of(walk, 1.5 * walk.duration)
+    landing = walk.position(walk.duration)
+    knots = [(0.0, start.q), (0.5, start.q), (1.1, landing), (1.45, end.q)]
+    return {"repeat": "never", "start": start, "end": end, "guess": passing(robot, knots)}
+
+
+def stopping(robot: hs.Robot) -> dict[str, Any]:
+    """From the middle of a step of the walk, on the right foot, to rest on both feet."""
+    walk, end = walk_of(robot), striding(robot, 0.25)
+    start = state_of(walk, 0.5 * walk.duration)
+    knots = [(-1.0, start.q), (0.0, start.q), (0.35, end.q), (1.05, end.q)]
+    return {"repeat": "never", "start": start, "end": end, "guess": passing(robot, knots)}
+
+
+HURDLE = {"place": 0.15, "height": 0.12, "half_width": 0.05}
+"""An obstacle between two footholds of the walk (m)."""
+
+
+def over_hurdle(now: hs.gait.Instant) -> Any:
+    """Heights of both soles, at five places along each, over the obstacle: not negative."""
+    heights = []
+    for ends in ((0, 1), (2, 3)):
+        heel, toe = (now.points[i, :] for i in ends)
+        for share in np.linspace(0.0, 1.0, 5):
+            x, z = casadi.horzsplit((1.0 - share) * heel + share * toe)
+            inside = 1.0 - ((x - HURDLE["place"]) / HURDLE["half_width"]) ** 2
+            heights.append(z - HURDLE["height"] * casadi.fmax(inside, 0.0) ** 3)
+    return casadi.vertcat(*heights)
+
+
+def stepping_over(robot: hs.Robot) -> dict[str, Any]:
+    """Two steps of the walk, with an obstacle between the first two footholds."""
+    walk = walk_of(robot)
+    start, end = (state_of(walk, share * walk.duration) for share in (0.2, 2.2))
+    return {
+        "repeat": "never", "start": start, "end": end, "constraint": over_hurdle,
+        "guess": lambda time: walk.position(time + 0.2 * walk.duration),
+    }  # fmt: skip
+
+
 def of_user(now: hs.gait.Instant) -> Any:
     """Torques and speeds of the motors."""
     return casadi.sumsqr(now.torque) + 50.0 * casadi.sumsqr(now.motor_velocity)
@@ -120,6 +215,56 @@ KINDS = {
     ),
     "standing up": Kind(
         BRAVO7, (Phase("right_foot", "left_foot", duration=0.6, pieces=4),), rising
+    ),
+    "starting": Kind(
+        BRAVO7,
+        (
+            Phase("right_foot", "left_foot", duration=0.5, pieces=4),
+            Phase("right_foot", duration=0.6),
+            Phase("left_foot", duration=0.35, pieces=4),
+        ),
+        starting,
+    ),
+    "stopping": Kind(
+        BRAVO7,
+        (
+            Phase("right_foot", duration=0.35, pieces=4),
+            Phase("right_foot", "left_foot", duration=0.7),
+        ),
+        stopping,
+    ),
+    "stepping over": Kind(
+        BRAVO7,
+        (
+            Phase("right_foot", duration=0.56),
+            Phase("left_foot", duration=0.7),
+            Phase("right_foot", duration=0.14, pieces=2),
+        ),
+        stepping_over,
+    ),
+    "double support": Kind(
+        BRAVO7,
+        (
+            Phase("left_foot_toe", "right_foot", duration=(0.08, 0.3), pieces=3),
+            Phase("right_foot", duration=(0.2, 0.6)),
+            TOE,
+        ),
+        {"distance": 0.30, "duration": 0.80},
+    ),
+    "run": Kind(
+        RABBIT,
+        (
+            Phase("right_tibia", duration=(0.05, 0.3), pieces=4),
+            Phase(duration=(0.05, 0.3), pieces=3),
+        ),
+        {"speed": 2.0},
+    ),
+    "mechanical energy": Kind(BRAVO7, FLAT, {**STEP, "cost": "mechanical_energy"}),
+    "several costs": Kind(
+        BRAVO7, FLAT, {**STEP, "cost": {"torque": 1.0, "mechanical_energy": 10.0}}
+    ),
+    "cost of transport": Kind(
+        BRAVO7, FLAT, {"distance": (0.15, 0.45), "cost": "mechanical_energy"}
     ),
     "springs": Kind(sprung, FLAT, STEP),
     "electrical energy": Kind(geared, FLAT, {**STEP, "cost": "electrical_energy"}),
