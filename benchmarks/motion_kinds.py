@@ -165,7 +165,7 @@ def stopping(robot: hs.Robot) -> dict[str, Any]:
     return {"repeat": "never", "start": start, "end": end, "guess": passing(robot, knots)}
 
 
-HURDLE = {"place": 0.15, "height": 0.12, "half_width": 0.05}
+HURDLE = {"place": 0.15, "height": 0.12, "half_width": 0.05, "depth": 0.01}
 """An obstacle between two footholds of the walk (m)."""
 
 
@@ -177,7 +177,9 @@ def over_hurdle(now: hs.gait.Instant) -> Any:
         for share in np.linspace(0.0, 1.0, 5):
             x, z = casadi.horzsplit((1.0 - share) * heel + share * toe)
             inside = 1.0 - ((x - HURDLE["place"]) / HURDLE["half_width"]) ** 2
-            heights.append(z - HURDLE["height"] * casadi.fmax(inside, 0.0) ** 3)
+            beside = HURDLE["depth"]  # there the constraint has room, and the ground says enough
+            top = (HURDLE["height"] + beside) * casadi.fmax(inside, 0.0) ** 3 - beside
+            heights.append(z - top)
     return casadi.vertcat(*heights)
 
 

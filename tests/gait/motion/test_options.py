@@ -98,7 +98,7 @@ def test_a_constraint_of_ones_own(bravo7: hs.Robot, flat: hs.Motion) -> None:
 
     def high(now: Instant) -> casadi.SX:
         middle = 1.0 - ((now.time - 0.35) / 0.1) ** 2
-        least = highest * casadi.fmax(middle, 0.0) ** 3
+        least = (highest + 0.01) * casadi.fmax(middle, 0.0) ** 3 - 0.01
         return casadi.vertcat(now.points[2, 1] - least, now.points[3, 1] - least)
 
     lifted = hs.optimize_motion(bravo7, step(), **asked(constraint=high, warm_start=flat))

@@ -117,7 +117,8 @@ def optimize_motion(
         nor speed and duration are fixed.
     constraint : function, optional
         Of an :class:`~heelstrike.gait.Instant`, to expressions of CasADi that are not to be
-        negative at any time: the height of a foot over an obstacle, say.
+        negative at any time: the height of a foot over an obstacle, say. What is zero while a foot
+        stands leaves the optimiser no room; let it be positive there.
     warm_start : Motion, optional
         A motion of the robot through the same phases to start from. Others are tried only if this
         one leads nowhere.
