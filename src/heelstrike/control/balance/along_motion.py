@@ -41,9 +41,9 @@ from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
-REST_LEVEL, PUSH_LEVEL, CONE_LEVEL = 1, 2, 3
+REST_LEVEL, PUSH_LEVEL, SLIDE_LEVEL = 1, 2, 3
 """In which order rows are given up, the greatest first."""
-SMALL = 1e-6
+LEAST_WEIGHT = 1e-6
 """Weight of the trunk's translation: what stands says where the trunk is, and this only makes the
 least one point."""
 
@@ -89,7 +89,7 @@ def add_wishes(count: int, robot: ControlledRobot, parameters: Parameters, memor
     """Add what the motion wants of accelerations and forces."""
     program, n = memory.program, robot.nv
     for j in range(n):
-        weight = SMALL
+        weight = LEAST_WEIGHT
         if robot.motor[j] >= 0:
             weight = 1.0
         elif robot.model.axis[j, 0] != 0.0:
@@ -134,7 +134,7 @@ def add_ground(count: int, robot: ControlledRobot, parameters: Parameters, memor
             program.rows[add_row(program, 0.0, PUSH_LEVEL), n + k] = 1.0
             continue
         for side in range(2):  # a link has one tangential force
-            row = add_row(program, 0.0, CONE_LEVEL)
+            row = add_row(program, 0.0, SLIDE_LEVEL)
             program.rows[row, n + k] = 1.0 - 2.0 * side
             for other in range(count):
                 if (

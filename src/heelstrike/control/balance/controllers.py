@@ -241,17 +241,22 @@ class FootstepFeedback(WholeBody):
     again as the disturbance dies away. A foot that meets the ground early stands at once, one that
     meets it late goes on looking for it, and the slope is estimated from the footholds.
 
+    In a motion of any phases, runs among them, footholds are moved by the error of the capture
+    point, not landings in time: see :mod:`heelstrike.control.balance.shifted_feet`.
+
     Parameters
     ----------
     robot : Robot
         A floating robot with two mirrored feet that can stand flat, and legs of thigh, shank and
-        foot; all joints but the trunk's actuated.
-    gait : Gait
-        The gait that is followed as long as nothing disturbs, on flat feet, of this robot.
+        foot; all joints but the trunk's actuated. To follow a motion, any floating robot.
+    gait : Gait or Motion
+        The gait that is followed as long as nothing disturbs, on flat feet, of this robot; or a
+        motion of any phases.
     speed : float, optional
-        Speed that is wanted (m/s); the gait's own by default, zero to stop and stand.
-    friction : float
-        Coefficient of friction that it reckons with.
+        Speed that is wanted (m/s); the gait's own by default, zero to stop and stand. A motion has
+        its own speed.
+    friction : float, optional
+        Coefficient of friction that it reckons with: 0.6 by default, or that of a motion.
     numbers : mapping of str to float, optional
         Any other number of the law by its name, as for :class:`WholeBody`.
 

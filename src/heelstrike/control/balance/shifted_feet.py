@@ -33,9 +33,9 @@ from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
-FARTHEST = 0.35
+MOST_MOVED = 0.35
 """Greatest distance by which a foothold is moved, in heights of the centre of mass."""
-STRETCHED = 1e-3
+LEG_DAMPING = 1e-3
 """Damping (m²) of the leg that follows its foot: one that is straight cannot."""
 
 
@@ -149,7 +149,7 @@ def shift_leg(
         size += 1
     for i in range(size):
         for j in range(size):
-            memory.normal[i, j] = STRETCHED if i == j else 0.0
+            memory.normal[i, j] = LEG_DAMPING if i == j else 0.0
             for k in range(min(size, 3)):
                 memory.normal[i, j] += rows[k, joints[i]] * rows[k, joints[j]]
         memory.normal[i, size] = 0.0
@@ -189,7 +189,7 @@ def moved_footholds(robot: Robot, motion: Motion, *, adapts: float) -> dict[str,
         "spell": spell,
         "ahead": ahead,
         "rate": float(np.sqrt(np.hypot(*robot.model.gravity) / height)),
-        "farthest": FARTHEST * height,
+        "farthest": MOST_MOVED * height,
         "adapts": adapts,
     }
 
