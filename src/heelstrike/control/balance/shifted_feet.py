@@ -173,9 +173,9 @@ def moved_footholds(robot: Robot, motion: Motion, *, adapts: float) -> dict[str,
     for p, phase in enumerate(cycle):
         q = phase.coordinates(0.5 * phase.duration)
         places, points = contact_positions(robot, q), sorted(points_of_phase(robot, phase))
+        heights.append(float(center_of_mass(robot, q) @ up - (places @ up).min()))
         if points:
             support[p] = float((places[points] @ ahead).mean())
-            heights.append(float(center_of_mass(robot, q) @ up - (places[points] @ up).mean()))
     height = float(np.mean(heights))
     in_air = np.array(
         [[not (foot & points_of_phase(robot, each)) for foot in feet] for each in cycle]
