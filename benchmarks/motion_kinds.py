@@ -8,7 +8,8 @@ Run, from the top folder::
 Each is designed by `hs.optimize_motion` and written to `tests/gait/motion/kinds`, where the tests
 look at it with MuJoCo's equations of motion. Those of `OPEN` are designed if they are asked for by
 name, and not kept. A motion closes if computed torque, from its initial state, brings the robot to
-where the motion goes on, to 3e-9 (m, rad, m/s, rad/s): pieces are doubled until then. The table has the time of the processor for the first design and for all of it.
+where the motion goes on, to 3e-9 (m, rad, m/s, rad/s): pieces are doubled until then. The table has
+the time of the processor for the first design and for all of it.
 """
 
 from __future__ import annotations
