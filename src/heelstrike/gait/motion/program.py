@@ -385,9 +385,7 @@ class MotionProgram:
                     lower[k] = upper[k] = 0.0
             if not np.all(lower[k] == upper[k]):
                 kept = FROM_STOPS if row.kind is Kind.RANGE else FROM_LIMITS
-                if row.kind is Kind.OWN or (
-                    row.kind is Kind.FRICTION and request.friction == 0.0
-                ):
+                if row.kind is Kind.OWN or (row.kind is Kind.FRICTION and request.friction == 0.0):
                     kept = 0.0
                 span = np.minimum(kept, 0.5 * (upper[k] - lower[k]))
                 lower[k], upper[k] = lower[k] + span, upper[k] - span
