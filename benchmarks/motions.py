@@ -6,6 +6,7 @@ Run, from the top folder::
     python benchmarks/motions.py toe "run fast"  # some of them
     python benchmarks/motions.py --steps 1000 "run fast"
     python benchmarks/motions.py --film FOLDER toe    # pictures of the middle step
+    python benchmarks/motions.py --law FootstepFeedback "run fast"
 
 For each motion it prints the processor time of its design, its cost, how many of 20 steps it goes
 under a stock law before it falls, and how well it closes: by how much, after 40 steps, two more
@@ -202,9 +203,9 @@ def closes(case: Case, walk: Any) -> float:
     return float(np.abs(states[1] - states[0]).max())
 
 
-def row(name: str, steps: int, film: Path | None) -> str:
-    """Design a motion and walk it; return its row of the table."""
-    case = CASES[name]
+def row(name: str, steps: int, film: Path | None, law: str | None) -> str:
+    """Design a motion and walk it, under another law if one is named; return its row."""
+    case = CASES[name] if law is None else replace(CASES[name], law=getattr(hs, law))
     robot_of(case.robot)
     begin = time.process_time()
     try:
@@ -212,8 +213,8 @@ def row(name: str, steps: int, film: Path | None) -> str:
     except hs.GaitError as error:
         return f"| {name} | {case.robot} | not found: {str(error)[:300]} |"
     spent = time.process_time() - begin
-    law = case.law(robot_of(case.robot), walk)
-    largest = f"{abs(law.multipliers[0]):.2f}" if isinstance(law, hs.MotionLQR) else ""
+    made = case.law(robot_of(case.robot), walk)
+    largest = f"{abs(made.multipliers[0]):.2f}" if isinstance(made, hs.MotionLQR) else ""
     run, gone = walked(case, walk, steps)
     _, pushed = walked(case, walk, steps, pushes=pushes_of(robot_of(case.robot), walk, steps))
     if film is not None:
@@ -231,12 +232,13 @@ def main() -> None:
     reader.add_argument("motions", nargs="*", help=f"some of: {'; '.join(CASES)}")
     reader.add_argument("--steps", type=int, default=20, help="steps to walk")
     reader.add_argument("--film", type=Path, help="folder for pictures of a step")
+    reader.add_argument("--law", help="a law of hs, as WholeBody, in the place of the usual one")
     asked = reader.parse_args()
     columns = ("motion", "robot", "design (s)", "cost (N²m²s)", "law", "largest multiplier")
     columns += ("closes to", f"steps of {asked.steps}", "pushed")
     print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
     for name in asked.motions or CASES:
-        print(row(name, asked.steps, asked.film), flush=True)
+        print(row(name, asked.steps, asked.film, asked.law), flush=True)
 
 
 if __name__ == "__main__":

@@ -53,6 +53,7 @@ def standing(make: Callable[..., Law]) -> tuple[hs.Robot, hs.State, Law]:
 LAWS: dict[str, Callable[[], tuple[hs.Robot, hs.State, Law]]] = {
     "ComputedTorque": lambda: on_flat_feet(hs.ComputedTorque),
     "FootstepFeedback": lambda: on_flat_feet(hs.FootstepFeedback),
+    "FootstepFeedback on a motion": lambda: in_phases(hs.FootstepFeedback),
     "FlatGaitLQR": lambda: on_flat_feet(hs.FlatGaitLQR),
     "GaitLQR": lambda: on_points(hs.GaitLQR),
     "JointFeedback": lambda: standing(
@@ -67,6 +68,7 @@ LAWS: dict[str, Callable[[], tuple[hs.Robot, hs.State, Law]]] = {
     ),
     "VirtualConstraints": lambda: on_points(hs.VirtualConstraints),
     "WholeBody": lambda: on_flat_feet(hs.WholeBody),
+    "WholeBody on a motion": lambda: in_phases(hs.WholeBody),
     "ZeroMomentPointRegulation": lambda: on_flat_feet(hs.ZeroMomentPointRegulation),
 }
 

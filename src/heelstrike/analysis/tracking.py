@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from heelstrike.analysis.support import stances
+from heelstrike.control.followed_motion import EARLIEST, LATEST
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
@@ -20,12 +21,6 @@ from heelstrike.tolerances import SAME_ROW
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
-
-
-EARLIEST = 0.5
-"""Touchdowns before this fraction of a step do not end it."""
-LATEST = 1.1
-"""The reference of a late step rests after this fraction of its duration."""
 
 
 @dataclass(frozen=True, eq=False)

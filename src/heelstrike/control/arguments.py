@@ -44,8 +44,8 @@ def check_gait(robot: Robot, gait: Gait | Motion) -> None:
     if isinstance(gait, Motion):
         raise ControllerError(
             "this law stands on one foot at a time, all of a step, and follows a Gait of "
-            "optimize_gait. A Motion of any phases is followed by hs.ComputedTorque and by "
-            "hs.MotionLQR"
+            "optimize_gait. A Motion of any phases is followed by hs.ComputedTorque, hs.MotionLQR, "
+            "hs.WholeBody and hs.FootstepFeedback"
         )
     must_be(Gait, "gait", gait)
     try:

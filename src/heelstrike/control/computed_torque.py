@@ -15,6 +15,7 @@ from heelstrike.compiler.bundle import array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import check_gait, gains_of, must_be
 from heelstrike.control.followed_gait import FollowedGait, followed
+from heelstrike.control.motion_tracking import Parameters as Tracked
 from heelstrike.control.motion_tracking import motion_tracking, tracked
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.queries.loops import loop_jacobian
@@ -259,7 +260,8 @@ class ComputedTorque(Law):
                     "joint encoders tell where the robot is only while a foot lies flat, which a "
                     "motion of any phases need not let it do; leave encoder out"
                 )
-            tracks, sizes = tracked(robot, gait, kp, kd)
+            numbers, sizes = tracked(robot, gait, kp, kd)
+            tracks = Tracked(**numbers)
             super().__init__(motion_tracking, tracks, memory=sizes, robot=robot)
             return
         refuse_loops(robot, "computed torque", ControllerError, loops=False)

@@ -14,6 +14,8 @@ these share the load.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -116,9 +118,28 @@ def motion_tracking(
     parameters: Parameters, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Torques that make the joints follow the motion."""
+    count = look_at_phase(t, state, contacts, robot, parameters, memory)
+    solve_for_nearest(count, robot, parameters, memory)
+    for i in range(robot.nu):
+        torque[i] = torque_needed(i, count, robot, parameters, memory)
+
+
+@kernel
+def look_at_phase(
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
+    parameters: Parameters, memory: Memory,
+) -> int:  # fmt: skip
+    """Find what the motion wants now, and the equations of motion; return how many rows hold.
+
+    Of coordinates without a motor the accelerations of the motion are wanted.
+    """
     advance_phase(t, contacts, parameters, memory)
     phase = memory.phase
     piece, inside, moves = place_in_phase(t, parameters, memory)
+    for f in range(robot.unactuated.shape[0]):
+        joint = robot.unactuated[f]
+        _, _, acceleration = motion_in_piece(parameters.pieces[piece], joint, inside, moves)
+        memory.wanted[joint] = acceleration
     for i in range(robot.nu):
         joint = robot.model.actuator_joint[i]
         position, velocity, acceleration = motion_in_piece(
@@ -146,16 +167,22 @@ def motion_tracking(
         reference[row] = 0.0
         for k in range(terms.shape[0] - 1, -1, -1):
             reference[row] = reference[row] * inside + terms[k, row]
-    solve_for_nearest(count, robot, parameters, memory)
-    for i in range(robot.nu):
-        j = robot.model.actuator_joint[i]
-        total = memory.bias[j] - memory.passive[j]
-        for k in range(robot.nv):
-            total += memory.mass[j, k] * memory.unknown[k]
-        for k in range(count):
-            force = parameters.weight * memory.unknown[robot.nv + k]
-            total -= memory.jacobian[memory.held[k], j] * force
-        torque[i] = total
+    return count
+
+
+@kernel
+def torque_needed(
+    actuator: int, count: int, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> float:
+    """Torque of a motor with the accelerations and forces that were found."""
+    j = robot.model.actuator_joint[actuator]
+    total = memory.bias[j] - memory.passive[j]
+    for k in range(robot.nv):
+        total += memory.mass[j, k] * memory.unknown[k]
+    for k in range(count):
+        force = parameters.weight * memory.unknown[robot.nv + k]
+        total -= memory.jacobian[memory.held[k], j] * force
+    return total
 
 
 class MotionTracking(Law):
@@ -190,22 +217,22 @@ class MotionTracking(Law):
     ) -> None:
         must_be(Robot, "robot", robot)
         must_be(Motion, "motion", motion)
-        parameters, sizes = tracked(robot, motion, kp, kd)
-        super().__init__(motion_tracking, parameters, memory=sizes, robot=robot)
+        numbers, sizes = tracked(robot, motion, kp, kd)
+        super().__init__(motion_tracking, Parameters(**numbers), memory=sizes, robot=robot)
         self.motion = motion
 
 
 def tracked(
     robot: Robot, motion: Motion, kp: ArrayLike, kd: ArrayLike
-) -> tuple[Parameters, dict[str, int]]:
+) -> tuple[dict[str, Any], dict[str, int]]:
     """Return the numbers of the law about a motion, and how much it remembers."""
     motion.check_robot(robot)
-    parameters = Parameters(
+    numbers = {
         **followed_motion(robot, motion),
-        force=np.concatenate([phase.force_pieces for phase in cycle_of(robot, motion)]),
-        kp=gains_of("kp", kp, robot),
-        kd=gains_of("kd", kd, robot),
-        weight=robot.weight,
-    )
+        "force": np.concatenate([phase.force_pieces for phase in cycle_of(robot, motion)]),
+        "kp": gains_of("kp", kp, robot),
+        "kd": gains_of("kd", kd, robot),
+        "weight": robot.weight,
+    }
     free = robot.nv - robot.nu
-    return parameters, {"unknowns": robot.nv + free + 4 * robot.nc, "rows": 2 * robot.nc}
+    return numbers, {"unknowns": robot.nv + free + 4 * robot.nc, "rows": 2 * robot.nc}

@@ -23,6 +23,7 @@ from heelstrike.control import (
     FootstepFeedback,
     GaitLQR,
     JointPD,
+    MotionLQR,
     StandingLQR,
     SteppingConstraints,
     VirtualConstraints,
@@ -252,7 +253,17 @@ BY_ENCODERS = walking(
 )
 """The paper's law on velocities that it estimates from encoders."""
 
-LAWS: tuple[Entry, ...] = (*CONTROLLERS, walking("FlatGaitLQR", FlatGaitLQR), BY_ENCODERS)
+BY_PHASES = walking(
+    "MotionLQR", lambda robot, gait: MotionLQR(robot, gait.motion(robot)), needs=two_feet
+)
+"""The regulator through touchdowns, on the gait as a motion."""
+
+LAWS: tuple[Entry, ...] = (
+    *CONTROLLERS,
+    walking("FlatGaitLQR", FlatGaitLQR),
+    BY_PHASES,
+    BY_ENCODERS,
+)
 """All laws that have a name: those of the zoo, and others."""
 
 

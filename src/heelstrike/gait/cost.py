@@ -52,9 +52,17 @@ class Instant:
     """Time since the beginning of a motion (s); None in gaits of one step, whose costs know no
     time."""
 
+    points: Any = None
+    """(nc, 2) Places of all contact points of a motion, along the ground and away from it, in m;
+    None in gaits of one step."""
+
 
 OwnCost = Callable[[Instant], Any]
 """A cost of one's own: of an instant, the rate as an expression of CasADi."""
+
+
+OwnConstraint = Callable[[Instant], Any]
+"""A constraint of one's own: of an instant, expressions of CasADi that are not to be negative."""
 
 
 def costs_of(asked: Any) -> dict[Cost, float] | OwnCost:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import casadi
@@ -70,22 +71,43 @@ def heat_of(model: Model) -> Floats | None:
 
 
 def _own_rate(cost: OwnCost, now: Instant) -> Any:
-    try:
-        rate = casadi.SX(cost(now))
-    except Exception as error:
-        raise GaitError(f"the cost function failed: {type(error).__name__}: {error}") from error
+    rate = own_expression("cost", cost, now)
     if rate.numel() != 1:
         raise GaitError(f"the cost function must return one number, got {rate.numel()}")
+    return rate
+
+
+def own_expression(what: str, function: Callable[[Instant], Any], now: Instant) -> Any:
+    """Return what a function of one's own makes of an instant, as an expression.
+
+    Parameters
+    ----------
+    what : str
+        What it is: a cost, a constraint.
+    function : callable
+        Takes an instant.
+    now : Instant
+        The instant.
+
+    Raises
+    ------
+    GaitError
+        If it fails, or uses symbols of its own.
+    """
+    try:
+        found = casadi.SX(function(now))
+    except Exception as error:
+        raise GaitError(f"the {what} function failed: {type(error).__name__}: {error}") from error
     known = casadi.vertcat(now.position, now.velocity, now.torque, now.force)
     for each in (now.acceleration, now.time):
         if each is not None:
             known = casadi.vertcat(known, each)
-    unknown = {s.name() for s in casadi.symvar(rate)} - {s.name() for s in casadi.symvar(known)}
+    unknown = {s.name() for s in casadi.symvar(found)} - {s.name() for s in casadi.symvar(known)}
     if unknown:
         raise GaitError(
-            f"the cost function uses symbols that no instant has: {', '.join(sorted(unknown))}"
+            f"the {what} function uses symbols that no instant has: {', '.join(sorted(unknown))}"
         )
-    return rate
+    return found
 
 
 def instant_of(

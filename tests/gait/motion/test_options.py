@@ -90,3 +90,34 @@ def test_a_start_and_what_is_none(bravo7: hs.Robot, flat: hs.Motion) -> None:
         hs.optimize_motion(bravo7, step(), **asked(guess=lambda t: [t]))
     with pytest.raises(GaitError, match="landing_speed must not be negative"):
         hs.optimize_motion(bravo7, step(), **asked(landing_speed=-1.0))
+
+
+def test_a_constraint_of_ones_own(bravo7: hs.Robot, flat: hs.Motion) -> None:
+    """In the middle of a swing the sole is 8 cm high, which costs more."""
+    highest = 0.08
+
+    def high(now: Instant) -> casadi.SX:
+        middle = 1.0 - ((now.time - 0.35) / 0.1) ** 2
+        least = (highest + 0.01) * casadi.fmax(middle, 0.0) ** 3 - 0.01
+        return casadi.vertcat(now.points[2, 1] - least, now.points[3, 1] - least)
+
+    lifted = hs.optimize_motion(bravo7, step(), **asked(constraint=high, warm_start=flat))
+    heights, before = (
+        dynamics.contact_positions(bravo7, each.position(0.35))[2:, 1] for each in (lifted, flat)
+    )
+    assert before.min() < 0.9 * highest
+    assert heights.min() > highest - 1e-3
+    assert lifted.cost > flat.cost
+
+
+@pytest.mark.parametrize(
+    ("constraint", "said"),
+    [
+        (0.1, "constraint must be a function of an instant"),
+        (lambda now: now.nothing, "the constraint function failed"),
+        (lambda now: casadi.SX.sym("own"), "the constraint function uses symbols .* own"),
+    ],
+)
+def test_constraints_that_are_none(bravo7: hs.Robot, constraint: object, said: str) -> None:
+    with pytest.raises(hs.GaitError, match=said):
+        hs.optimize_motion(bravo7, step(), **asked(constraint=constraint))

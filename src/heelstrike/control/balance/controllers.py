@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import sqrt
 
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.control.arguments import check_gait, must_be, number_of
+from heelstrike.control.balance.along_motion import GAINS, along_motion, keep_to_motion
 from heelstrike.control.balance.constrained import constrained_programs
 from heelstrike.control.balance.footsteps import Planning
 from heelstrike.control.balance.law import keep_balance
@@ -17,6 +18,7 @@ from heelstrike.control.balance.reference import reference_of
 from heelstrike.control.balance.tasks import CONTACT_ROWS
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
+from heelstrike.gait.motion.motion import Motion
 from heelstrike.gait.sole import Sole, leg, sole, standing_height
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.robot import Robot
@@ -112,21 +114,27 @@ class WholeBody(Law):
     A robot that stops (speed zero) brings its feet together and stands, and takes a step if it
     cannot stand otherwise. See ``docs/balance.md`` for the theory and what it cannot do.
 
+    A motion of any phases is followed by the accelerations of the joints and the rotation of the
+    trunk that come nearest to it, under the same limits, by the contacts of each phase: see
+    :mod:`heelstrike.control.balance.along_motion`.
+
     Parameters
     ----------
     robot : Robot
         A floating robot with two mirrored feet that can stand flat, and legs of thigh, shank and
-        foot; all joints but the trunk's actuated.
-    gait : Gait
-        The gait to follow, on flat feet, of this robot.
+        foot; all joints but the trunk's actuated. To follow a motion, any floating robot.
+    gait : Gait or Motion
+        The gait to follow, on flat feet, of this robot; or a motion of any phases.
     speed : float, optional
         Speed that is wanted (m/s), by steps of another length in the time of the gait's; the
         gait's own by default. ``simulation.parameters.speed`` changes it while a simulation runs.
-    friction : float
-        Coefficient of friction that it reckons with.
+        A motion has its own speed.
+    friction : float, optional
+        Coefficient of friction that it reckons with: 0.6 by default, or that of a motion.
     numbers : mapping of str to float, optional
         Any other number of the law by its name: those of
         :class:`~heelstrike.control.balance.numbers.Parameters`, of its planning and its weights.
+        Of a motion: ``kp``, ``kd``, ``pitch``, ``pitch_kp``, ``pitch_kd``.
 
     Raises
     ------
@@ -149,31 +157,28 @@ class WholeBody(Law):
     def __init__(
         self,
         robot: Robot,
-        gait: Gait,
+        gait: Gait | Motion,
         *,
         speed: float | None = None,
-        friction: float = 0.6,
+        friction: float | None = None,
         numbers: Mapping[str, float] | None = None,
     ) -> None:
         must_be(Robot, "robot", robot)
+        if numbers is not None:
+            must_be(Mapping, "numbers", numbers)
+        given = dict(numbers or {})
+        given |= {
+            name: value
+            for name, value in (("speed", speed), ("friction", friction))
+            if value is not None
+        }
+        if isinstance(gait, Motion):
+            self._follow(robot, gait, given)
+            return
         check_gait(robot, gait)
         feet = feet_to_balance_on(robot, point_feet=gait.point_feet)
         groups = _numbers(robot, gait, feet)
-        if numbers is not None:
-            must_be(Mapping, "numbers", numbers)
-        given = {"friction": friction, **(numbers or {})}
-        if speed is not None:
-            given["speed"] = speed
-        for name, value in given.items():
-            group = next((group for group in groups if name in group), None)
-            if group is None:
-                known = ", ".join(sorted(set().union(*groups)))
-                raise ControllerError(f"there is no number {name!r}; there are {known}")
-            if not np.isfinite(number_of(name, value)):
-                raise ControllerError(f"{name} must be a finite number, got {value}")
-            group[name] = float(value)
-        if friction <= 0.0:
-            raise ControllerError(f"friction must be positive, got {friction}")
+        _choose(groups, given)
         planning, weights, rest = groups
         if not self.adapts:
             planning["capture_weight"] = 0.0  # the foot lands where the gait's does
@@ -197,6 +202,17 @@ class WholeBody(Law):
         super().__init__(keep_balance, parameters, robot=robot, memory=begin)
         self.gait = gait
 
+    def _follow(self, robot: Robot, motion: Motion, given: dict[str, float]) -> None:
+        """Follow a motion of any phases."""
+        refuse_loops(robot, "whole-body control", ControllerError)
+        if "speed" in given:
+            raise ControllerError("a motion has its own speed; design one at another speed")
+        chosen = {**GAINS, "friction": motion.friction}
+        _choose((chosen,), given)
+        parameters, sizes = along_motion(robot, motion, chosen, adapts=self.adapts)
+        super().__init__(keep_to_motion, parameters, robot=robot, memory=sizes)
+        self.motion = motion
+
     def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
         """Return its parameters, and a memory to begin with, for a robot; all can be set.
 
@@ -211,6 +227,8 @@ class WholeBody(Law):
             Parameters and memory.
         """
         parameters, memory = super().numbers(robot)
+        if not isinstance(parameters, Parameters):
+            return parameters, memory
         return parameters.replaced(constrained=constrained_programs(robot)), memory
 
 
@@ -223,17 +241,22 @@ class FootstepFeedback(WholeBody):
     again as the disturbance dies away. A foot that meets the ground early stands at once, one that
     meets it late goes on looking for it, and the slope is estimated from the footholds.
 
+    In a motion of any phases, runs among them, footholds are moved by the error of the capture
+    point, not landings in time: see :mod:`heelstrike.control.balance.shifted_feet`.
+
     Parameters
     ----------
     robot : Robot
         A floating robot with two mirrored feet that can stand flat, and legs of thigh, shank and
-        foot; all joints but the trunk's actuated.
-    gait : Gait
-        The gait that is followed as long as nothing disturbs, on flat feet, of this robot.
+        foot; all joints but the trunk's actuated. To follow a motion, any floating robot.
+    gait : Gait or Motion
+        The gait that is followed as long as nothing disturbs, on flat feet, of this robot; or a
+        motion of any phases.
     speed : float, optional
-        Speed that is wanted (m/s); the gait's own by default, zero to stop and stand.
-    friction : float
-        Coefficient of friction that it reckons with.
+        Speed that is wanted (m/s); the gait's own by default, zero to stop and stand. A motion has
+        its own speed.
+    friction : float, optional
+        Coefficient of friction that it reckons with: 0.6 by default, or that of a motion.
     numbers : mapping of str to float, optional
         Any other number of the law by its name, as for :class:`WholeBody`.
 
@@ -255,6 +278,20 @@ class FootstepFeedback(WholeBody):
     """
 
     adapts = True
+
+
+def _choose(groups: Sequence[dict[str, float]], given: Mapping[str, float]) -> None:
+    """Write numbers that were given into the group that has them, or say that there are none."""
+    for name, value in given.items():
+        group = next((group for group in groups if name in group), None)
+        if group is None:
+            known = ", ".join(sorted(set().union(*groups)))
+            raise ControllerError(f"there is no number {name!r}; there are {known}")
+        if not np.isfinite(number_of(name, value)):
+            raise ControllerError(f"{name} must be a finite number, got {value}")
+        if name == "friction" and value <= 0.0:
+            raise ControllerError(f"friction must be positive, got {value}")
+        group[name] = float(value)
 
 
 def feet_to_balance_on(robot: Robot, *, point_feet: bool = False) -> list[Sole]:

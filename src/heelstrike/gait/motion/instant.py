@@ -15,8 +15,8 @@ from heelstrike.dynamics import center_of_mass, contact_positions
 from heelstrike.dynamics.places import write_point_rows
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
 from heelstrike.gait.blocks import Block
-from heelstrike.gait.cost import Instant
-from heelstrike.gait.cost_rate import heat_of, rate_of
+from heelstrike.gait.cost import Instant, OwnConstraint
+from heelstrike.gait.cost_rate import heat_of, own_expression, rate_of
 from heelstrike.gait.motion.rows import Kind
 from heelstrike.gait.rows import Limit, Rows, joint_limits
 from heelstrike.robot.robot import Robot
@@ -36,6 +36,8 @@ class MotionFunctions:
         The robot.
     cost : dict or function
         What :func:`~heelstrike.gait.cost.costs_of` returned.
+    constraint : function, optional
+        Of an instant, expressions that are not to be negative.
     per_metre : bool
         Whether the cost is divided by the distance that the motion covers.
 
@@ -48,6 +50,8 @@ class MotionFunctions:
         the duration of a piece.
     path_rows : list of Row
         What its constraints mean.
+    effort : casadi.Function
+        The same variables and parameters to ΓᵀΓ times the duration of a piece.
     landing : Block
         Variables are positions, (nq,), velocities before in shares of the last piece and after it
         in shares of the next, (nv,) each, impulses, (2 nc,), durations of both pieces (s).
@@ -55,8 +59,11 @@ class MotionFunctions:
         What its constraints mean.
     """
 
-    def __init__(self, robot: Robot, cost: Any, *, per_metre: bool) -> None:
+    def __init__(
+        self, robot: Robot, cost: Any, *, per_metre: bool, constraint: OwnConstraint | None = None
+    ) -> None:
         self.robot, self.cost, self.per_metre = robot, cost, per_metre
+        self.constraint = constraint
         self.slope, self.friction = casadi.SX.sym("slope"), casadi.SX.sym("friction")
         self.along: Symbols = np.array([casadi.cos(self.slope), casadi.sin(self.slope)])
         self.up: Symbols = np.array([-self.along[1], self.along[0]])
@@ -122,7 +129,7 @@ class MotionFunctions:
         for i, name in enumerate(robot.contact_names):
             rows.add(Kind.HEIGHT, heights[i], subject=name, of=i)
         self._add_limits(rows, dynamics, torque)
-        self.path_rows = rows.rows
+        centers = np.array([center for _, _, center in dynamics.contact_centers(None)])
         now = Instant(
             position=q,
             velocity=v,
@@ -131,11 +138,19 @@ class MotionFunctions:
             force=expression(np.array([sum(pushes[1::2]), sum(pushes[0::2])], dtype=object)),
             acceleration=expression(a),
             time=time,
+            points=casadi.horzcat(expression(centers @ self.along), expression(heights)),
         )
+        if self.constraint is not None:
+            own = own_expression("constraint", self.constraint, now)
+            for k, value in enumerate(casadi.vertsplit(casadi.vec(own)), start=1):
+                rows.add(Kind.OWN, value, subject=f"number {k}")
+        self.path_rows = rows.rows
         rate = rate_of(self.cost, now, heat_of(model), weight * self.length / self.second)
         cost = duration * rate / (casadi.fabs(distance) if self.per_metre else 1.0)
         parameters = casadi.vertcat(self.slope, self.friction)
         self.path = Block("path", y, parameters, cost, casadi.vertcat(*rows.expressions))
+        effort = duration * casadi.sumsqr(now.torque)
+        self.effort = casadi.Function("effort", [y, parameters], [effort])
 
     def _add_cones(
         self, rows: Rows, pushes: Symbols, kinds: tuple[Kind, Kind], unit: float

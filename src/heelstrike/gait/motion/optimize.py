@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from heelstrike.arguments import are_numbers, shown, takes
 from heelstrike.dynamics import contact_jacobian, contact_positions
 from heelstrike.errors import GaitError, GaitNotFoundError
-from heelstrike.gait.cost import Cost, OwnCost, costs_of
+from heelstrike.field_texts import dataclass
+from heelstrike.gait.cost import Cost, OwnConstraint, OwnCost, costs_of
 from heelstrike.gait.gait import fingerprint
 from heelstrike.gait.motion.guess import guess_of
 from heelstrike.gait.motion.instant import MotionFunctions
@@ -34,7 +35,7 @@ from heelstrike.gait.motion.program import (
 from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.gait.motion.rows import Kind
 from heelstrike.gait.polynomials import Instants
-from heelstrike.gait.program import FEASIBLE
+from heelstrike.gait.program import CLOSE, FEASIBLE
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -66,6 +67,7 @@ def optimize_motion(
     force_margin: float = 0.0,
     landing_speed: float = 0.0,
     cost: Cost | str | Mapping[Cost | str, float] | OwnCost = "torque",
+    constraint: OwnConstraint | None = None,
     warm_start: Motion | None = None,
     guess: Callable[[float], ArrayLike] | None = None,
     refine: bool = True,
@@ -113,6 +115,10 @@ def optimize_motion(
     cost : str, mapping or function
         As for :func:`~heelstrike.gait.optimize.optimize_gait`; per metre where neither the distance
         nor speed and duration are fixed.
+    constraint : function, optional
+        Of an :class:`~heelstrike.gait.Instant`, to expressions of CasADi that are not to be
+        negative at any time: the height of a foot over an obstacle, say. What is zero while a foot
+        stands leaves the optimiser no room; let it be positive there.
     warm_start : Motion, optional
         A motion of the robot through the same phases to start from. Others are tried only if this
         one leads nowhere.
@@ -157,24 +163,42 @@ def optimize_motion(
     )  # fmt: skip
     if not 1 <= starts <= len(STARTS):
         raise GaitError(f"starts must be from 1 to {len(STARTS)}, got {starts!r}")
+    if constraint is not None and not callable(constraint):
+        raise GaitError(f"constraint must be a function of an instant, got {shown(constraint)}")
     report = progress or (lambda _: None)
     free = request.distance[0] < request.distance[1] and (
         request.speed is None or request.total is None
     )
     functions = MotionFunctions(
-        robot, request.cost, per_metre=free and request.repeat is not Repeat.NEVER
-    )
+        robot, request.cost, per_metre=free and request.repeat is not Repeat.NEVER,
+        constraint=constraint,
+    )  # fmt: skip
     program = MotionProgram(
         request, functions, tuple(looked_at(phase.pieces) for phase in request.phases)
     )
     report(0.1)
-    unknowns, optimal = _solved(program, _known(program, warm_start), starts, report)
+    found = _solved(program, _known(program, warm_start), starts, report)
     if refine:
-        program, unknowns, optimal = _refined(program, unknowns, optimal)
+        found = _refined(found)
         report(0.9)
-        program, unknowns, optimal = _held_between(program, unknowns, optimal)
+        found = _held_between(found)
     report(1.0)
-    return motion_of(program, program.polished(unknowns), optimal)
+    program = found.program
+    return motion_of(program, program.polished(found.unknowns), found.optimal)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Unknowns of a program that satisfy all constraints."""
+
+    program: MotionProgram
+    """The program."""
+    unknowns: Floats
+    """Its unknowns."""
+    multipliers: Floats
+    """Its multipliers."""
+    optimal: bool
+    """Whether it is an optimum."""
 
 
 def checked_request(
@@ -331,25 +355,25 @@ def _known(program: MotionProgram, motion: Motion | None) -> list[Floats]:
 
 def _solved(
     program: MotionProgram, known: list[Floats], starts: int, report: Callable[[float], None]
-) -> tuple[Floats, bool]:
+) -> _Found:
     """Unknowns of an optimum, or of a motion that satisfies all constraints."""
     nearest, least = np.zeros(0), np.inf
-    feasible: Floats | None = None
+    feasible: _Found | None = None
     if program.request.end is not None or program.request.guess is not None:
         starts = 1  # the straight way from one state to the other, or that which is known
     drawn = (guess_of(program, lean=lean, lowered=lowered) for lean, lowered in STARTS[:starts])
     for k, start in enumerate(chain(known, drawn)):
-        unknowns, _, told = program.solve(start)
+        unknowns, multipliers, told = program.solve(start)
         if told["return_status"] == "Solve_Succeeded":
-            return unknowns, True
+            return _Found(program, unknowns, multipliers, True)
         missing = float(np.abs(program.violations(unknowns)).max())
         if missing <= FEASIBLE and feasible is None:
-            feasible = unknowns
+            feasible = _Found(program, unknowns, multipliers, False)
         if missing < least:
             nearest, least = unknowns, missing
         report(0.1 + 0.6 * (k + 1) / starts)
     if feasible is not None:
-        return feasible, False
+        return feasible
     raise GaitNotFoundError(_not_found(program, nearest))
 
 
@@ -371,11 +395,24 @@ def _not_found(program: MotionProgram, unknowns: Floats) -> str:
     )
 
 
-def _refined(
-    program: MotionProgram, unknowns: Floats, optimal: bool
-) -> tuple[MotionProgram, Floats, bool]:
+def _again(program: MotionProgram, start: Floats, multipliers: Floats | None) -> _Found:
+    """Solve from nearly an optimum.
+
+    Raises
+    ------
+    GaitNotFoundError
+        If what is found violates a constraint.
+    """
+    unknowns, found, told = program.solve(start, multipliers)
+    if np.abs(program.violations(unknowns)).max() > FEASIBLE:
+        raise GaitNotFoundError(_not_found(program, unknowns))
+    return _Found(program, unknowns, found, told["return_status"] == "Solve_Succeeded")
+
+
+def _refined(found: _Found) -> _Found:
     """Double the pieces of phases in which points that stand move between the ends of pieces."""
     while True:
+        program, unknowns = found.program, found.unknowns
         request, phases = program.request, []
         for p, phase in enumerate(request.phases):
             moves = _slip(program, unknowns, p) > STILL
@@ -383,21 +420,18 @@ def _refined(
             more = max(more, phase.pieces)
             phases.append(ContactPhase(*phase.contacts, duration=phase.duration, pieces=more))
         if [each.pieces for each in phases] == [each.pieces for each in request.phases]:
-            return program, unknowns, optimal
+            return found
         finer = replace(
             program, request=replace(request, phases=tuple(phases)),
-            grids=tuple(looked_at(phase.pieces) for phase in phases), near=True,
+            grids=tuple(looked_at(phase.pieces) for phase in phases), near=CLOSE,
         )  # fmt: skip
-        found, _, told = finer.solve(_resampled(program, unknowns, finer))
-        if np.abs(finer.violations(found)).max() > FEASIBLE:
-            raise GaitNotFoundError(_not_found(finer, found))
-        program, unknowns, optimal = finer, found, told["return_status"] == "Solve_Succeeded"
+        found = _again(finer, _resampled(program, unknowns, finer), None)
 
 
 def _slip(program: MotionProgram, unknowns: Floats, p: int) -> float:
     """Largest velocity (m/s) of a point that stands, anywhere in a phase."""
     stands = program.request.standing[p]
-    _, rows = _rows_at(program, unknowns, p, _fine(program.request.phases[p].pieces))
+    rows = _rows_at(program, unknowns, p, _fine(program.request.phases[p].pieces))
     still = [
         k
         for k, row in enumerate(program.functions.path_rows)
@@ -449,48 +483,54 @@ def _fine(pieces: int) -> Instants:
     )  # fmt: skip
 
 
-def _rows_at(
-    program: MotionProgram, unknowns: Floats, p: int, grid: Instants,
-    functions: MotionFunctions | None = None,
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """Cost rates (N,) and scaled constraints (rows, N) of a phase at instants."""
+def _rows_at(program: MotionProgram, unknowns: Floats, p: int, grid: Instants) -> Floats:
+    """Scaled constraints (rows, N) of a phase at instants."""
+    _, rows = _at(program, unknowns, p, grid, program.functions.path.value)
+    return rows
+
+
+def _at(
+    program: MotionProgram, unknowns: Floats, p: int, grid: Instants, function: Any
+) -> list[Floats]:
+    """Results of a function of the path of a phase at instants, (rows, N) each."""
     phases, _, distance = program.parts(casadi.DM(unknowns))
     count, request = grid.share.size, program.request
     y = path_variables(phases, p, grid, distance)
     numbers = casadi.repmat(casadi.DM([request.slope, request.friction]), 1, count)
-    path = (functions or program.functions).path
-    cost, rows = path.value.map(count)(y, numbers)
-    return np.array(cost).ravel(), np.array(rows)
+    return [np.array(each) for each in function.map(count).call([y, numbers])]
 
 
-def _held_between(
-    program: MotionProgram, unknowns: Floats, optimal: bool
-) -> tuple[MotionProgram, Floats, bool]:
+def _held_between(found: _Found) -> _Found:
     """Add instants where limits fail between the Gauss points, until none does."""
     for _ in range(ROUNDS):
-        grids, failed = [], False
-        for p, grid in enumerate(program.grids):
-            fine = _fine(grid.pieces)
-            _, rows = _rows_at(program, unknowns, p, fine)
-            lower, upper = program.path_bounds(p, fine)
-            missing = np.maximum(lower - rows, rows - upper)
-            worst = np.where(np.isfinite(missing), missing, -np.inf).max(axis=0)
-            # The worst instant of every piece that fails.
-            by_piece = worst.reshape(grid.pieces, -1)
-            bad = np.flatnonzero(by_piece.max(axis=1) > ALLOWED)
-            failed = failed or bad.size > 0
-            share = fine.share.reshape(grid.pieces, -1)[bad, by_piece[bad].argmax(axis=1)]
-            grids.append(grid.joined(Instants(grid.pieces, bad, share, np.zeros(bad.size))))
-        if not failed:
+        program = found.program
+        more = [_failing(program, found.unknowns, p) for p in range(len(program.grids))]
+        if not any(each.share.size for each in more):
             break
-        program = replace(program, grids=tuple(grids), near=True)
-        found, _, told = program.solve(unknowns)
-        if np.abs(program.violations(found)).max() > FEASIBLE:
-            raise GaitNotFoundError(_not_found(program, found))
-        unknowns, optimal = found, told["return_status"] == "Solve_Succeeded"
-    return program, unknowns, optimal
+        grids = tuple(grid.joined(new) for grid, new in zip(program.grids, more, strict=True))
+        finer = replace(program, grids=grids, near=CLOSER)
+        priced = finer.multipliers_of(program, found.multipliers)
+        found = _again(finer, found.unknowns, priced)
+    return found
 
 
+def _failing(program: MotionProgram, unknowns: Floats, p: int) -> Instants:
+    """Return the instants of a phase at which a limit fails most, one for each piece and limit."""
+    fine = _fine(program.grids[p].pieces)
+    rows = _rows_at(program, unknowns, p, fine)
+    lower, upper = program.path_bounds(p, fine)
+    missing = np.maximum(lower - rows, rows - upper)
+    missing = np.where(np.isfinite(missing), missing, -np.inf)
+    by_piece = missing.reshape(len(rows), fine.pieces, -1)
+    fails = by_piece.max(axis=2) > ALLOWED
+    at = by_piece.argmax(axis=2) + np.arange(fine.pieces) * by_piece.shape[2]
+    bad = np.unique(at[fails])
+    return Instants(fine.pieces, fine.piece[bad], fine.share[bad], np.zeros(bad.size))
+
+
+CLOSER = 1e-6
+"""Barrier parameter with which IPOPT begins where the multipliers of an optimum are known: 10 to
+20 iterations, where without them it takes 14 to 40."""
 ALLOWED = 1e-5
 """Scaled violation that a limit may have between the instants at which it is looked at."""
 
@@ -503,12 +543,11 @@ def motion_of(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion
     if program.functions.per_metre:
         spent *= abs(float(distance))
     margins = dict[str, float]()
-    torque = MotionFunctions(robot, costs_of("torque"), per_metre=False)
     phases = _phases(program, unknowns)
     for p, phase in enumerate(phases):
         grid = gauss_points(len(phase.pieces))
-        rates, _ = _rows_at(program, unknowns, p, grid, torque)
-        effort += float(rates @ grid.weight) * grid.pieces
+        (rates,) = _at(program, unknowns, p, grid, program.functions.effort)
+        effort += float(rates.ravel() @ grid.weight) * grid.pieces
         _add_margins(program, unknowns, p, margins)
     mirror = robot.mirror or _itself(robot)
     first, far = phases[0].pieces[0], float(distance)
@@ -567,7 +606,7 @@ def _add_margins(
 ) -> None:
     """Smallest distances from the limits in a phase."""
     grid = _fine(program.grids[p].pieces)
-    _, rows = _rows_at(program, unknowns, p, grid)
+    rows = _rows_at(program, unknowns, p, grid)
     lower, upper = program.path_bounds(p, grid)
     for k, row in enumerate(program.functions.path_rows):
         if row.kind in EQUATIONS or not np.any(lower[k] < upper[k]):

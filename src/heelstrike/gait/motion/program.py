@@ -161,8 +161,8 @@ class MotionProgram:
     """The robot at an instant, and at a landing."""
     grids: tuple[Instants, ...]
     """When the constraints of each phase hold; equations where there is a weight."""
-    near: bool = False
-    """Whether guesses are nearly optima."""
+    near: float = 0.0
+    """Barrier parameter with which IPOPT begins where guesses are nearly optima; zero elsewhere."""
 
     def __post_init__(self) -> None:
         request = self.request
@@ -253,6 +253,7 @@ class MotionProgram:
         numbers = np.array([request.slope, request.friction])
         copies, lower, upper, kept = [], [], [], []
         self.labels: list[tuple[Row, int, float]] = []
+        self.counts: list[int] = []
         for p, grid in enumerate(self.grids):
             y = path_variables(phases, p, grid, distance)
             weight = grid.weight * grid.pieces
@@ -262,6 +263,7 @@ class MotionProgram:
             lower.append(low.T[used.T])
             upper.append(high.T[used.T])
             kept.append(used.T.ravel())
+            self.counts.append(int(used.sum()))
             for i, k in np.argwhere(used.T).tolist():
                 self.labels.append((functions.path_rows[k], p, float(phases_of(grid)[i])))
         for p, impulse in enumerate(impulses):
@@ -294,7 +296,8 @@ class MotionProgram:
         self._solver = Ipopt(
             x, f, g[rows], gradient=blocks.gradient(x), jacobian=slopes,
             hessian=(price, prices, blocks.hessian(x, price, all_prices)),
-            settings=NEAR | MORE_ITERATIONS if self.near else SETTINGS | MORE_ITERATIONS | ADAPTIVE,
+            settings=(NEAR | {"mu_init": self.near} if self.near else SETTINGS | ADAPTIVE)
+            | MORE_ITERATIONS,
         )  # fmt: skip
 
     def _gaps(self, phases: list[PhaseUnknowns]) -> list[Any]:
@@ -369,7 +372,7 @@ class MotionProgram:
             elif row.kind is Kind.PUSH:
                 used = row.of[0] in stands.normal
                 lower[k] = request.force_margin_of(p, row.of[0]) / request.robot.weight
-            elif row.kind is Kind.RANGE:
+            elif row.kind in {Kind.RANGE, Kind.OWN}:
                 begins = (grid.piece == 0) & (grid.share == 0.0) & (p == 0)
                 used = ~(ends & ~free) & ~(begins & (request.start is not None))
             elif row.kind is Kind.FRICTION:
@@ -382,7 +385,7 @@ class MotionProgram:
                     lower[k] = upper[k] = 0.0
             if not np.all(lower[k] == upper[k]):
                 kept = FROM_STOPS if row.kind is Kind.RANGE else FROM_LIMITS
-                if row.kind is Kind.FRICTION and request.friction == 0.0:
+                if row.kind is Kind.OWN or (row.kind is Kind.FRICTION and request.friction == 0.0):
                     kept = 0.0
                 span = np.minimum(kept, 0.5 * (upper[k] - lower[k]))
                 lower[k], upper[k] = lower[k] + span, upper[k] - span
@@ -417,6 +420,17 @@ class MotionProgram:
             if not used:
                 lower[k], upper[k] = -np.inf, np.inf
         return lower, upper
+
+    def multipliers_of(self, other: MotionProgram, multipliers: Floats) -> Floats:
+        """Those of another program that has some of the instants of this one: of the others zero.
+
+        The instants of a phase that both have are the first ones.
+        """
+        places = [0, other.linear, *(other.linear + np.cumsum(other.counts)).tolist()]
+        parts = [multipliers[i:j] for i, j in pairwise(places)]
+        fresh = [0, *(own - its for own, its in zip(self.counts, other.counts, strict=True))]
+        parts = [np.append(part, np.zeros(new)) for part, new in zip(parts, fresh, strict=True)]
+        return np.concatenate([*parts, multipliers[places[-1] :]])
 
     def solve(self, guess: Floats, multipliers: Floats | None = None) -> tuple[Floats, Floats, Any]:
         """Solve from a guess; return the unknowns, the multipliers and what IPOPT tells."""

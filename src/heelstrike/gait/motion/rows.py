@@ -20,6 +20,7 @@ class Kind(rows.Kind):
     TORQUE = ("torque limit", "N m")
     RANGE = ("joint range", "rad")
     SPEED = ("joint speed limit", "rad/s")
+    OWN = ("constraint of your own", "")
     MOMENTUM = ("momentum through the impact", "N s or N m s")
     TOUCH = ("contact point on the ground at touchdown", "m")
     ARRIVE = ("contact point not rising at touchdown", "m/s")
