@@ -132,3 +132,6 @@ def test_its_command_has_the_settings_and_the_period_of_the_pushes(tmp_path: Pat
         "--largest-push" in section
     )
     assert "does not walk unpushed" in section
+    quick = file.with_name("pushes-FootstepFeedback-every-4-ms-quick.json")
+    file.rename(quick)
+    assert "--period 0.004 --quick --largest-push" in _pushes(quick)
