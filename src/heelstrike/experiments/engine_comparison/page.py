@@ -16,7 +16,11 @@ from heelstrike.experiments.engine_comparison.compass_table import compass_cells
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
 from heelstrike.experiments.engine_comparison.pushes import DIRECTIONS, UNPUSHED
-from heelstrike.experiments.engine_comparison.settings import best_settings
+from heelstrike.experiments.engine_comparison.settings import (
+    BEST,
+    best_settings,
+    found_for_others,
+)
 from heelstrike.experiments.engine_comparison.tables import BY_ITSELF, WALKING, short
 
 SHOWN = 1e-3
@@ -62,7 +66,7 @@ def engines_page(folder: Path, figure: str) -> str:
         _INTRODUCTION,
         _in_short(walks),
         _table_1(walks, scenes),
-        _best(),
+        _best(walks),
         *(_walks(law, found) for law, found in walks.items()),
         f"![Error over computing time]({figure})\n",
         _peaks(walks),
@@ -170,7 +174,9 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
              "open source", "documented"],
             [*theirs, *absent],
         )
-        + "\nheelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
+        + "\nWhere licences and systems were read:\n\n"
+        + "\n".join(f"- {_title(name)}: {f.read}." for name, f in FACTS.items())
+        + "\n\nheelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
         "its angle of friction, at defaults and a step of 1 ms. The last columns have the step "
         "sizes, in ms, at which bravo7 takes all its steps under a controller.\n\n"
         + _table(headings, ours)
@@ -202,7 +208,7 @@ def _walks_at(found: Mapping[str, Any], name: str, which: str) -> str:
     return ", ".join(told) or "none"
 
 
-def _best() -> str:
+def _best(walks: Mapping[str, Any]) -> str:
     rows = [
         [
             _title(name),
@@ -215,6 +221,14 @@ def _best() -> str:
         ]
         for name, found in best_settings().items()
     ]
+    best = {
+        row["engine"]: _title(row["engine"])
+        for walk in walks.values()
+        for row in walk["rows"]
+        if row["settings"] == BEST and row["figures"]
+    }
+    versions = {k: each for walk in walks.values() for k, each in walk["versions"].items()}
+    others = found_for_others(best, {name: versions[ENTRIES[name].package] for name in best})
     commands = {
         found["command"].replace(f"--engines {name} ", "--engines NAME ")
         for name, found in best_settings().items()
@@ -229,6 +243,7 @@ def _best() -> str:
             ["engine", "best", "error, defaults", "error, best", "walks tried", "version", "date"],
             rows,
         )
+        + "".join(f"\n{each}.\n" for each in others)
         + "\nThe settings follow the advice of the maintainers:\n\n" + "\n".join(advice) + "\n"
     )  # fmt: skip
 
