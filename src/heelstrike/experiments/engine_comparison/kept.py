@@ -52,7 +52,7 @@ def asked_of_engine(
     rooms: tuple[str, ...] = (f"experiments/engines/{known.adapter}",)
     if known.elsewhere:
         script = str(known.adapter).replace("_peer", "_server")
-        rooms += (f"{ELSEWHERE}/exchange", f"{ELSEWHERE}/mjcf", f"{ELSEWHERE}/{script}")
+        rooms += (f"{ELSEWHERE}/exchange", f"{ELSEWHERE}/{script}")
     return {
         "given": dict(given),
         "version": versions[package],
