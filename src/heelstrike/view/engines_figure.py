@@ -104,7 +104,7 @@ def _title(name: str) -> str:
     return f"{OURS}, time stepping" if name == OURS else name
 
 
-def _look(name: str, names: Sequence[str]) -> tuple[str, str, str]:
+def _look(name: str, names: Sequence[str]) -> tuple[str, str, Any]:
     """Return colour, mark and style of the line of an engine."""
     if name.startswith(OURS):
         own = [each for each in names if each.startswith(OURS)]
@@ -115,7 +115,7 @@ def _look(name: str, names: Sequence[str]) -> tuple[str, str, str]:
 
 
 def _draw(
-    axes: Any, look: tuple[str, str, str], opacity: float, points: list[tuple[float, float, bool]]
+    axes: Any, look: tuple[str, str, Any], opacity: float, points: list[tuple[float, float, bool]]
 ) -> None:
     color, mark, style = look
     times, errors = [t for t, *_ in points], [e for _, e, _ in points]

@@ -270,8 +270,8 @@ def compass_walk(mover: Mover, start: State) -> CompassWalk:
         around = taken[-1]
         kicks = np.random.default_rng(SEED).uniform(-1.0, 1.0, (DISTURBED, 3)) * DISTURBANCE
         after = np.array([_stride(mover, _disturbed(around, each)).numbers for each in kicks])
-    except NotWalkingError as error:
-        ending = str(error)
+    except NotWalkingError as fell:
+        ending = str(fell)
     nan = math.nan
     if ending or len(taken) <= STRIDES:
         none = CompassWalk(

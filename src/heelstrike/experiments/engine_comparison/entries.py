@@ -161,9 +161,10 @@ ABSENT: dict[str, str] = {
     ),
     "OpenHRP/Choreonoid": "no package for Python; its engine is its own",
     "Newton": (
-        "newton 1.8.0 installs for a CPU, in single precision, but has no adapter: its Featherstone "
-        "and semi-implicit solvers tell no contact forces (only MuJoCo Warp, XPBD and Kamino have "
-        "update_contacts), the main one is MuJoCo's, which has a row, and Kamino is in beta"
+        "newton 1.8.0 installs for a CPU, in single precision, but has no adapter: its "
+        "Featherstone and semi-implicit solvers tell no contact forces (only MuJoCo Warp, XPBD and "
+        "Kamino have update_contacts), the main one is MuJoCo's, which has a row, and Kamino is in "
+        "beta"
     ),
     "Genesis": (
         "genesis-world 1.4.5 installs for a CPU, in double precision, and reads the robot as MJCF, "
