@@ -398,9 +398,10 @@ def _compass(found: Mapping[str, Any]) -> str:
         "the landing. The cycle is the mean of the last five steps; *spread* is how far they still "
         "differ. The Floquet multipliers come from a fit to one step after each of 32 random "
         "disturbances, with the standard error (±) of the largest one's modulus. An engine that "
-        "resolves a landing within its steps takes it early or late by up to one step, "
-        "which moves the next step: where the spread is large, only the order of the "
-        "multipliers means something. Published: "
+        "resolves a landing within its steps takes it early or late by up to one step, and the "
+        "next step differs. Where that exceeds the disturbances, the standard error is large and "
+        "the multipliers are not resolved. Each row is `heelstrike compare bravo7 --engines NAME "
+        "--scenes`. Published: "
         "0.734346391 s, 0.535445415 m, −0.199726 ± 0.544476i and 0.131573.\n\n"
         + _table(COMPASS, [compass_cells(row) for row in found["rows"]])
     )
