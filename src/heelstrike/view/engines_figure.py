@@ -14,7 +14,7 @@ MARKS = "osD^v<>Phd*Xp"
 OURS = "heelstrike"
 FAINT = 0.35
 """Opacity of the lines of defaults, where there are better settings."""
-LEAST = 1e-12
+SMALLEST_DRAWN = 1e-12
 """Smaller errors are drawn here: they are rounding."""
 
 PANELS: Mapping[str, tuple[str, str]] = {
@@ -90,7 +90,7 @@ def _lines(
             own[step] = f["computing_s"], f["position"], bool(f["walks"])
     for row in scenes:
         own = found.setdefault((_title(row["title"]), row["shows"], "defaults"), {})
-        own[row["step_s"]] = row["computing_s"], max(row["error"], LEAST), True
+        own[row["step_s"]] = row["computing_s"], max(row["error"], SMALLEST_DRAWN), True
     return [
         (name, panel,
          FAINT if settings == "defaults" and (name, panel, "best") in found else 1.0,
