@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
 from heelstrike.experiments import engine_comparison
+from heelstrike.experiments.engine_comparison import PushTable, search
 
 
 @pytest.fixture
@@ -49,8 +50,8 @@ def test_engines_are_compared_as_asked(tmp_path: Path, asked: list[dict[str, Any
     assert call["control_period"] == 2e-3
     assert (call["steps"], call["friction"]) == (5, 0.8)
     written = sorted(file.name for file in (tmp_path / "out").iterdir())
-    assert written == ["engines-JointPD.json", "engines.png"]
-    told = json.loads((tmp_path / "out" / "engines-JointPD.json").read_text())
+    assert written == ["engines-JointPD-at-1-0.5-ms.json", "engines.png"]
+    told = json.loads((tmp_path / "out" / written[0]).read_text())
     assert [row["engine"] for row in told["rows"]][:2] == ["heelstrike", "mujoco"]
     assert "ODE is not installed" in " ".join(result.stdout.split())
 
@@ -61,6 +62,54 @@ def test_a_quick_comparison_takes_few_steps(tmp_path: Path, asked: list[dict[str
     assert asked[0]["engines"] == "all"
     assert (asked[0]["steps"], asked[0]["step_sizes"]) == (4, (1e-3,))
     assert json.loads(result.stdout)["robot"] == "bravo7"
+
+
+def test_files_of_other_comparisons_are_not_written_over(
+    tmp_path: Path, asked: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A quick one, or one at other steps, has other numbers under the same law."""
+    nothing = PushTable("bravo7", ())
+    monkeypatch.setattr(engine_comparison, "compare_pushes", lambda *_, **__: nothing)
+    for options in ([], ["--quick"], ["--sizes", "5e-5"], ["--period", "1e-3", "--quick"]):
+        result = invoke(tmp_path, "--engines", "mujoco", "--largest-push", *options)
+        assert result.exit_code == 0, result.stderr
+    written = {file.name for file in (tmp_path / "out").glob("*.json")}
+    assert written == {
+        "engines-ComputedTorque.json", "pushes-ComputedTorque.json",
+        "engines-ComputedTorque-quick.json", "pushes-ComputedTorque-quick.json",
+        "engines-ComputedTorque-at-0.05-ms.json",
+        "engines-ComputedTorque-every-1-ms-quick.json",
+        "pushes-ComputedTorque-every-1-ms-quick.json",
+    }  # fmt: skip
+
+
+def test_a_search_walks_the_steps_that_are_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    walked = []
+
+    def search_settings(name: str, entry: Any, walk: Any, *_: Any) -> search.Found:
+        walked.append(walk.steps)
+        return search.Found({"stiff": 2.0}, 1e-3, 2e-3, 3, "4.0.0", "2026-11-27", "heelstrike")
+
+    monkeypatch.setattr(search, "search_settings", search_settings)
+    result = invoke(tmp_path, "--engines", "mujoco", "--search", "--steps", "2", "--json")
+    assert result.exit_code == 0, result.stderr
+    assert walked == [2]
+    assert json.loads(result.stdout)["mujoco"]["settings"] == {"stiff": 2.0}
+
+
+def test_a_search_refuses_what_it_has_no_use_for(tmp_path: Path) -> None:
+    for options, named in (
+        (["--sizes", "1e-3", "--settings", "best"], "--settings, --sizes"),
+        (["--period", "1e-3", "--quick"], "--period, --quick"),
+        (["--scenes", "--largest-push", "--films"], "--scenes, --largest-push, --films"),
+        (["--page", "page.md"], "--page"),
+    ):
+        result = invoke(tmp_path, "--engines", "mujoco", "--search", *options)
+        assert result.exit_code == 2
+        said = " ".join(result.output.split())
+        assert f"{named}: the search for the best settings walks" in said
 
 
 def test_what_engines_are_not_asked_for_is_refused(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,7 +15,7 @@ from heelstrike.cli.values import numbers_called
 from heelstrike.errors import SimulationError
 
 if TYPE_CHECKING:
-    from heelstrike.experiments.engine_comparison import EngineComparison
+    from heelstrike.experiments.engine_comparison import EngineComparison, SceneTable
     from heelstrike.experiments.walk import Beginning, Case
 
 QUICK_STEPS, QUICK_SIZES = 4, (1e-3,)
@@ -54,7 +54,10 @@ class InEngines:
     ] = False
     scenes: Annotated[
         bool,
-        typer.Option("--scenes", help="Also run scenes with closed forms and check the robots."),
+        typer.Option(
+            "--scenes",
+            help="Also run scenes with closed forms and the compass gait, and check the robots.",
+        ),
     ] = False
     pushes: Annotated[
         bool,
@@ -75,16 +78,27 @@ class InEngines:
 
     def refuse_without_engines(self) -> None:
         """Refuse options of engines where none is asked for."""
-        usual = InEngines()
-        given = [
-            f"--{'largest-push' if name == 'pushes' else name}"
-            for name in vars(usual)
-            if name != "engines" and getattr(self, name) != getattr(usual, name)
-        ]
-        if given:
+        if given := self._given("engines"):
             raise SimulationError(
                 f"{', '.join(given)}: for other engines only. Add --engines all, or leave out"
             )
+
+    def refuse_beside_search(self) -> None:
+        """Refuse options that the search for the best settings has no use for."""
+        if given := self._given("engines", "search"):
+            raise SimulationError(
+                f"{', '.join(given)}: the search for the best settings walks at a step of 1 ms "
+                "under a law that is called every 2 ms. Leave out, or leave --search out"
+            )
+
+    def _given(self, *but: str) -> list[str]:
+        """Return options that are not as usual, but for some."""
+        usual = InEngines()
+        return [
+            f"--{'largest-push' if name == 'pushes' else name}"
+            for name in vars(usual)
+            if name not in but and getattr(self, name) != getattr(usual, name)
+        ]
 
 
 def compare_in_engines(
@@ -101,7 +115,8 @@ def compare_in_engines(
     _check(case)
     assert case.followed is not None
     if asked.search:
-        _search(case, start, asked, out)
+        asked.refuse_beside_search()
+        _search(case, start, asked, steps, out, as_json=as_json)
         return
     sizes: tuple[float, ...] = QUICK_SIZES if asked.quick else STEP_SIZES
     if asked.sizes is not None:
@@ -123,7 +138,7 @@ def compare_in_engines(
             progress=show.doing,
         )
     out.mkdir(parents=True, exist_ok=True)
-    law = _law(start, asked)
+    law = _named(start, asked, sizes)
     text = json.dumps(comparison.to_dict(), indent=2, ensure_ascii=False)
     wrote(write_whole(out / f"engines-{law}.json", text + "\n"))
     if as_json:
@@ -132,34 +147,53 @@ def compare_in_engines(
         output().print(comparison)
     save_figure(comparison.plot(), out / "engines.png")
     tell(f"in {out}: engines-{law}.json, engines.png")
-    if asked.scenes:
-        _scenes(case, names, out, as_json=as_json)
+    table = _scenes(case, asked, out, as_json=as_json) if asked.scenes else None
+    if table is not None:
+        save_figure(comparison.plot(table), out / "engines.png")
     if asked.pushes:
         _pushes(case, start, asked, out, as_json=as_json)
     if asked.page is not None:
-        _write_page(comparison, out, asked.page)
+        _write_page(comparison, table, out, asked.page)
 
 
-def _law(start: Beginning, asked: InEngines) -> str:
-    """Name of the law in files, with how often it is called if that is unusual."""
-    from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
+def _named(start: Beginning, asked: InEngines, sizes: Sequence[float] = ()) -> str:
+    """Name of a comparison in files: its law, and what is not as usual.
 
-    often = "" if asked.period == CONTROL_PERIOD else f"-every-{1e3 * asked.period:g}-ms"
-    return type(start.controller).__name__ + often
+    That is how often the law is called, at which steps (s) of the engines, and whether it is quick.
+    """
+    from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD, STEP_SIZES
+
+    name = type(start.controller).__name__
+    if asked.period != CONTROL_PERIOD:
+        name += f"-every-{1e3 * asked.period:g}-ms"
+    if asked.sizes is not None and sizes and tuple(sizes) != STEP_SIZES:
+        name += f"-at-{'-'.join(f'{1e3 * size:g}' for size in sizes)}-ms"
+    return f"{name}-quick" if asked.quick else name
 
 
-def _scenes(case: Case, names: list[str], out: Path, *, as_json: bool) -> None:
+def _scenes(case: Case, asked: InEngines, out: Path, *, as_json: bool) -> SceneTable:
     """Ask engines for scenes whose ends are known, and whether they have the robot at all."""
     from dataclasses import asdict
 
-    from heelstrike.experiments.engine_comparison import compare_scenes, guard
+    from heelstrike.experiments.engine_comparison import compare_compass, compare_scenes, guard
+    from heelstrike.experiments.engine_comparison.compass_table import STEPS as COMPASS_STEPS
     from heelstrike.experiments.engine_comparison.entries import entries_called
+    from heelstrike.experiments.engine_comparison.scene_table import STEPS
     from heelstrike.experiments.engines import InvalidRunError
     from heelstrike.whole_file import write_whole
 
+    assert asked.engines is not None
+    names = asked.engines.split(",")
     engines: str | list[str] = "all" if names == ["all"] else names
+    landing, walker = ((), QUICK_SIZES) if asked.quick else (STEPS, COMPASS_STEPS)
     with stage("simulating scenes with closed forms") as show:
-        table = compare_scenes(engines=engines, progress=show.doing)
+        table = compare_scenes(
+            engines=engines, steps=landing, folder=out / "engines", progress=show.doing
+        )
+    with stage("walking the compass gait down its slope") as show:
+        passive = compare_compass(
+            engines=engines, steps=walker, folder=out / "engines", progress=show.doing
+        )
     guards: dict[str, dict[str, object]] = {}
     with stage("asking whether engines have the robot") as show:
         for name, entry in entries_called(engines).items():
@@ -170,12 +204,14 @@ def _scenes(case: Case, names: list[str], out: Path, *, as_json: bool) -> None:
                 guards[name] = {"reason": str(error)}
             else:
                 guards[name] = asdict(found) | {"holds": found.holds}
-    told = {**table.to_dict(), "guards": guards}
+    told = {**table.to_dict(), "guards": guards, "compass": passive.to_dict()}
     text = json.dumps(told, indent=2, ensure_ascii=False)
     wrote(write_whole(out / "scenes.json", text + "\n"))
     if not as_json:
         output().print(table)
+        output().print(passive)
     tell(f"in {out}: scenes.json")
+    return table
 
 
 def _pushes(case: Case, start: Beginning, asked: InEngines, out: Path, *, as_json: bool) -> None:
@@ -200,7 +236,7 @@ def _pushes(case: Case, start: Beginning, asked: InEngines, out: Path, *, as_jso
             progress=show.doing,
             **(QUICK_SEARCH if asked.quick else {}),
         )
-    name = f"pushes-{_law(start, asked)}.json"
+    name = f"pushes-{_named(start, asked)}.json"
     text = json.dumps(table.to_dict(), indent=2, ensure_ascii=False)
     wrote(write_whole(out / name, text + "\n"))
     if not as_json:
@@ -208,7 +244,9 @@ def _pushes(case: Case, start: Beginning, asked: InEngines, out: Path, *, as_jso
     tell(f"in {out}: {name}")
 
 
-def _write_page(comparison: EngineComparison, out: Path, page: Path) -> None:
+def _write_page(
+    comparison: EngineComparison, scenes: SceneTable | None, out: Path, page: Path
+) -> None:
     """Write the page of all that lies in a folder, and its figure beside it."""
     from heelstrike.experiments.engine_comparison.page import engines_page
     from heelstrike.view.style import save_figure
@@ -218,7 +256,7 @@ def _write_page(comparison: EngineComparison, out: Path, page: Path) -> None:
     images.mkdir(parents=True, exist_ok=True)
     figure = images / f"{page.stem}.png"
     wrote(write_whole(page, engines_page(out, f"images/{figure.name}")))
-    save_figure(comparison.plot(), figure)
+    save_figure(comparison.plot(scenes), figure)
     tell(f"{page}, {figure}")
 
 
@@ -241,7 +279,9 @@ def _friction(case: Case) -> float:
     return float(case.ground.model().friction.min())
 
 
-def _search(case: Case, start: Beginning, asked: InEngines, out: Path) -> None:
+def _search(
+    case: Case, start: Beginning, asked: InEngines, steps: int, out: Path, *, as_json: bool
+) -> None:
     """Search for the best settings, and write them with what made them."""
     from dataclasses import asdict
 
@@ -257,14 +297,15 @@ def _search(case: Case, start: Beginning, asked: InEngines, out: Path) -> None:
     assert case.followed is not None
     assert start.controller is not None
     walk = Walk(
-        case.robot, start.controller, case.followed, search.STEPS, CONTROL_PERIOD,
+        case.robot, start.controller, case.followed, steps, CONTROL_PERIOD,
         _friction(case), 60.0,
     )  # fmt: skip
     versions = peers(load=False)
     file = out / "best_settings.json"
     out.mkdir(parents=True, exist_ok=True)
     found = json.loads(file.read_text()) if file.exists() else {}
-    for name, entry in entries_called(asked.engines.split(",")).items():
+    names = asked.engines.split(",")
+    for name, entry in entries_called(names).items():
         with stage(f"searching for the best settings of {entry.title}") as show:
             try:
                 best = search.search_settings(
@@ -275,5 +316,7 @@ def _search(case: Case, start: Beginning, asked: InEngines, out: Path) -> None:
                 continue
         found[name] = asdict(best)
         write_whole(file, json.dumps(found, indent=2) + "\n")
+        if as_json:
+            typer.echo(json.dumps({name: found[name]}))
         tell(f"{entry.title}: {dict(best.settings) or 'the defaults'}, {best.error:.2g}")
     wrote(file)

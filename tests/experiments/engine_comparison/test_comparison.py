@@ -15,12 +15,23 @@ import heelstrike as hs
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison import EngineComparison, EngineRow, WalkFigures
 from heelstrike.experiments.engine_comparison import comparison as module
-from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES, entries_called
-from heelstrike.experiments.engine_comparison.kept import KeptRows
-from heelstrike.experiments.engine_comparison.settings import best_settings, settings_of
+from heelstrike.experiments.engine_comparison import kept as kept_rows
+from heelstrike.experiments.engine_comparison.entries import (
+    ABSENT,
+    ENTRIES,
+    Entry,
+    entries_called,
+)
+from heelstrike.experiments.engine_comparison.kept import KeptRows, asked_of_engine
+from heelstrike.experiments.engine_comparison.settings import (
+    best_settings,
+    found_for_others,
+    settings_of,
+)
 from heelstrike.experiments.engine_comparison.tables import short
 from heelstrike.experiments.engines.packages import PACKAGES
 from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.kept_files import program_digest
 
 WALK = WalkFigures(
     walks=True, steps=3, ending="completed", tracking_rad=1e-3, position=2e-3, touchdown_s=1e-3,
@@ -58,6 +69,51 @@ def test_a_row_that_failed_says_why_and_is_asked_again(tmp_path: Path) -> None:
     assert found.figures is None
     assert found.reason == "its process was ended by SIGABRT"
     assert kept.row(ROW, {}, lambda: WALK).figures == WALK
+
+
+def test_a_row_of_another_version_or_adapter_is_walked_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    walked = []
+
+    def make() -> WalkFigures:
+        walked.append(1)
+        return WALK
+
+    def walk(version: str) -> None:
+        told = asked_of_engine("mujoco", {}, {"mujoco": version})
+        KeptRows(tmp_path, {}).row(ROW, told, make)
+
+    walk("4.0.0")
+    walk("4.0.0")
+    assert len(walked) == 1
+    walk("4.1.0")
+    assert len(walked) == 2
+
+    def changed(rooms: tuple[str, ...], package: str) -> bytes:
+        """Another text of an adapter alone."""
+        digest = program_digest(rooms, package)
+        return b"another" if "experiments/engines/mujoco_peer" in rooms else digest
+
+    monkeypatch.setattr(kept_rows, "program_digest", changed)
+    walk("4.0.0")
+    assert len(walked) == 3
+
+
+def test_settings_found_with_another_version_are_told() -> None:
+    found = best_settings()["mujoco"]["version"]
+    assert found_for_others({"mujoco": "MuJoCo"}, {"mujoco": found}) == []
+    (said,) = found_for_others({"mujoco": "MuJoCo"}, {"mujoco": "99.0"})
+    assert said == f"MuJoCo: the best settings were found with {found}, this is 99.0"
+
+
+def test_what_is_kept_does_not_follow_from_tables_and_pages() -> None:
+    """Hours of walking are not lost when a table is written otherwise, nor by another adapter."""
+    for room in kept_rows.ROOMS:
+        place = Path(hs.__file__).parent / room
+        assert place.is_dir() or place.with_suffix(".py").is_file(), room
+        assert "engine_comparison" not in room
+        assert not room.endswith("_peer")
 
 
 @pytest.fixture(scope="module")
@@ -136,6 +192,38 @@ def test_an_interruption_ends_it_and_keeps_what_was_walked(
         )
     (kept,) = tmp_path.iterdir()
     assert kept.name.startswith("heelstrike-defaults-0.001-")
+
+
+def test_an_engine_that_dies_ends_its_rows_alone_and_falls_are_filmed(
+    bravo7: hs.Robot, gait: hs.Gait, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    filmed = []
+
+    def in_engine(
+        self: object, entry: Entry, step: float, given: object, truth: object, versions: object,
+        film: Path | None = None,
+    ) -> WalkFigures:  # fmt: skip
+        if entry.title == "Bullet":
+            raise InvalidRunError("its process was ended by SIGKILL")
+        if film is not None:
+            film.write_bytes(b"")
+            filmed.append(film.name)
+        return replace(WALK, walks=False)
+
+    versions = dict.fromkeys(PACKAGES, "1.0")
+    monkeypatch.setattr(module, "peers", lambda load: versions)
+    monkeypatch.setattr(module, "TRUTH", hs.TimeStepping(step=1e-3))
+    monkeypatch.setattr(module.Walk, "in_engine", in_engine)
+    for films in (False, True, True):  # rows are kept by then; a film is made once
+        found = hs.compare_engines(
+            bravo7, hs.ComputedTorque(bravo7, gait), gait, engines=["bullet", "mujoco"], steps=1,
+            step_sizes=[1e-3], settings=["defaults"], folder=tmp_path, films=films,
+        )  # fmt: skip
+    _, bullet, mujoco = found.rows
+    assert bullet.figures is None
+    assert bullet.reason == "its process was ended by SIGKILL"
+    assert mujoco.figures is not None
+    assert filmed == ["mujoco-defaults-0.001.mp4"]
 
 
 def test_names_of_engines_are_checked(bravo7: hs.Robot, gait: hs.Gait) -> None:

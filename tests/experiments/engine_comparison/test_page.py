@@ -29,6 +29,20 @@ SCENES = {
             (BALL, "mujoco", "MuJoCo", None, DULL),
         )
     ],
+    "compass": {
+        "strides": 25,
+        "settings": "defaults",
+        "rows": [
+            {"engine": "mujoco", "title": "MuJoCo", "step_s": 2e-4, "reason": "",
+             "walk": {"strides": 25, "ending": "", "period_s": 0.7343, "step_m": 0.5355,
+                      "middle": [0.56, -0.33, -1.31], "spread": 0.012,
+                      "multipliers": [[-0.2, 0.54], [-0.2, -0.54], [0.13, 0.0]], "error": 0.02}},
+            {"engine": "bullet", "title": "Bullet", "step_s": 1e-3, "reason": "",
+             "walk": {"strides": 3, "ending": "it falls", "multipliers": None}},
+            {"engine": "ode", "title": "ODE", "step_s": 1e-3, "walk": None,
+             "reason": "ODE is not installed"},
+        ],
+    },
     "guards": {
         "mujoco": {"flight": 1e-4, "order": 1.0, "extrapolated": 3e-11, "weight": 0.9999,
                    "sunk_m": 1e-3, "float32": False, "holds": True},
@@ -110,6 +124,20 @@ def test_scenes_and_guards_are_in_their_tables(page: str) -> None:
     assert row(page, "## Guards", "ODE")[1] == "ODE is not installed"
 
 
+def test_the_compass_gait_has_its_cycle_or_why_it_has_none(page: str) -> None:
+    section = "## The compass gait"
+    assert row(page, section, "MuJoCo")[1:] == [
+        "0.2", "yes", "0.7343", "0.5355", "12", "−0.20 ± 0.54i, 0.13", "0.02",
+    ]  # fmt: skip
+    assert row(page, section, "Bullet")[2] == "no, 3: it falls"
+    assert row(page, section, "ODE")[2] == "ODE is not installed"
+
+
+def test_it_says_where_licences_were_read(page: str) -> None:
+    for name in ("MuJoCo", "PhysX"):
+        assert f"- {name}: " in page[page.index("Where licences") : page.index("heelstrike's col")]
+
+
 def test_without_files_there_is_no_page(tmp_path: Path) -> None:
     with pytest.raises(SimulationError, match="heelstrike compare --engines all --scenes"):
         engines_page(tmp_path, "figure.png")
@@ -132,3 +160,6 @@ def test_its_command_has_the_settings_and_the_period_of_the_pushes(tmp_path: Pat
         "--largest-push" in section
     )
     assert "does not walk unpushed" in section
+    quick = file.with_name("pushes-FootstepFeedback-every-4-ms-quick.json")
+    file.rename(quick)
+    assert "--period 0.004 --quick --largest-push" in _pushes(quick)

@@ -1,6 +1,11 @@
 """The same robot, gait and law of control in other engines, and what each gets right."""
 
 from heelstrike.experiments.engine_comparison.comparison import EngineComparison, compare_engines
+from heelstrike.experiments.engine_comparison.compass_table import (
+    CompassRow,
+    CompassTable,
+    compare_compass,
+)
 from heelstrike.experiments.engine_comparison.figures import WalkFigures
 from heelstrike.experiments.engine_comparison.guards import Guards, guard
 from heelstrike.experiments.engine_comparison.pushes import PushRow, PushTable, compare_pushes
@@ -13,6 +18,8 @@ from heelstrike.experiments.engine_comparison.scene_table import (
 from heelstrike.experiments.engine_comparison.walking import walk_in
 
 __all__ = [
+    "CompassRow",
+    "CompassTable",
     "EngineComparison",
     "EngineRow",
     "Guards",
@@ -21,6 +28,7 @@ __all__ = [
     "SceneRow",
     "SceneTable",
     "WalkFigures",
+    "compare_compass",
     "compare_engines",
     "compare_pushes",
     "compare_scenes",

@@ -15,7 +15,7 @@ from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.entries import ABSENT, entries_called
 from heelstrike.experiments.engine_comparison.figures import WalkFigures, walk_figures
-from heelstrike.experiments.engine_comparison.kept import KeptRows
+from heelstrike.experiments.engine_comparison.kept import KeptRows, asked_of_engine
 from heelstrike.experiments.engine_comparison.rows import EngineRow
 from heelstrike.experiments.engine_comparison.settings import (
     BEST,
@@ -35,6 +35,8 @@ from heelstrike.sim.method import Method
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from heelstrike.experiments.engine_comparison.scene_table import SceneTable
 
 STEP_SIZES = (2e-3, 1e-3, 5e-4, 2e-4)
 """Steps (s) of the engines, unless somebody asks for others."""
@@ -82,8 +84,14 @@ class EngineComparison:
         )
         return found
 
-    def plot(self) -> Figure:
-        """Draw the error over the computing time of every engine."""
+    def plot(self, scenes: SceneTable | None = None) -> Figure:
+        """Draw the error over the computing time of every engine.
+
+        Parameters
+        ----------
+        scenes : SceneTable, optional
+            Of which landing and rest are drawn beside the walk.
+        """
         from heelstrike.view.engines_figure import draw_engines
 
         return draw_engines(
@@ -91,7 +99,8 @@ class EngineComparison:
                 (row.title, row.settings, row.step_s, asdict(row.figures))
                 for row in self.rows
                 if row.figures is not None
-            ]
+            ],
+            [] if scenes is None else [asdict(row) for row in scenes.at_steps],
         )
 
     def __rich__(self) -> Group:
@@ -191,10 +200,14 @@ def compare_engines(
                 continue
             entry = entries[name]
             given = settings_of(name, entry, which)
-            told = {"given": given, "version": versions[entry.package]}
+            told = asked_of_engine(entry.package, given, versions)
             film = Path(folder) / f"{name}-{which}-{step:g}.mp4" if films and folder else None
             make = partial(walk.in_engine, entry, step, given, truth, versions, film)
-            rows.append(kept.row(row, told, make))
+            found = kept.row(row, told, make)
+            fell = found.figures is not None and not found.figures.walks
+            if fell and film is not None and not film.exists():
+                make()  # it was kept by a comparison without films
+            rows.append(found)
     finally:
         walk.close()
     return EngineComparison(

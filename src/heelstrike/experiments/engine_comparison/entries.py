@@ -160,8 +160,18 @@ ABSENT: dict[str, str] = {
         "DART, Bullet and ODE of the rows above"
     ),
     "OpenHRP/Choreonoid": "no package for Python; its engine is its own",
+    "Newton": (
+        "newton 1.8.0 installs for a CPU, in single precision, but has no adapter: its "
+        "Featherstone and semi-implicit solvers tell no contact forces (only MuJoCo Warp, XPBD and "
+        "Kamino have update_contacts), the main one is MuJoCo's, which has a row, and Kamino is in "
+        "beta"
+    ),
+    "Genesis": (
+        "genesis-world 1.4.5 installs for a CPU, in double precision, and reads the robot as MJCF, "
+        "but has no adapter: its kernels were not compiled after four minutes on a loaded machine"
+    ),
 }
-"""Simulators of the paper's Table 1 and others of its kind that are not run here, and why."""
+"""Simulators of the paper's Table 1 and others that are not run here, and why."""
 
 
 def entries_called(names: Sequence[str] | str) -> dict[str, Entry]:

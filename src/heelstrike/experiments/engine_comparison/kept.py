@@ -1,7 +1,8 @@
 """Rows that are kept as they come: an interrupted comparison goes on where it was.
 
 A row has a file of its own, named by a digest of all that it follows from: robot, gait, law, the
-engine's version and settings, and the text of the rooms that simulate and measure.
+engine's version and settings, and the text of what simulates and measures. What only writes tables
+and pages is not in it, nor are the adapters of other engines.
 """
 
 from __future__ import annotations
@@ -18,15 +19,45 @@ from heelstrike.analysis.told_summary import plain
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.figures import WalkFigures
 from heelstrike.experiments.engine_comparison.rows import EngineRow
+from heelstrike.experiments.engines.packages import PACKAGES
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.kept_files import program_digest
 from heelstrike.whole_file import write_whole
 
 ROOMS = (
-    "experiments/engines", "experiments/engine_comparison", "analysis", "sim", "control", "contact",
-    "dynamics", "gait", "robot", "compiler",
+    *(f"experiments/engines/{name}" for name in ("peer", "links", "served", "serving", "scenario")),
+    "analysis", "sim", "control", "contact", "dynamics", "gait", "robot", "compiler",
 )  # fmt: skip
-"""Rooms of this package whose text is in the digest."""
+"""Rooms and modules of this package whose text is in every digest."""
+
+ELSEWHERE = "experiments/engines/elsewhere"
+"""Room of the scripts of engines that another Python has."""
+
+
+def asked_of_engine(
+    package: str, given: Mapping[str, Any], versions: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return what a row follows from beside the walk: the engine, its adapter and its settings.
+
+    Parameters
+    ----------
+    package : str
+        Name of the engine.
+    given : mapping
+        Its settings.
+    versions : mapping
+        What :func:`~heelstrike.experiments.engines.peers` says of the engines.
+    """
+    known = PACKAGES[package]
+    rooms: tuple[str, ...] = (f"experiments/engines/{known.adapter}",)
+    if known.elsewhere:
+        script = str(known.adapter).replace("_peer", "_server")
+        rooms += (f"{ELSEWHERE}/exchange", f"{ELSEWHERE}/{script}")
+    return {
+        "given": dict(given),
+        "version": versions[package],
+        "adapter": program_digest(rooms, known.distribution).hex(),
+    }
 
 
 class KeptRows:
@@ -37,13 +68,21 @@ class KeptRows:
     folder : path or None
         Where they are; None keeps nothing.
     walk : mapping
-        All that a walk follows from but the engine, as JSON has it.
+        All that a row follows from but the engine, as JSON has it.
+    modules : tuple of str
+        Modules of this room that make the rows.
     """
 
-    def __init__(self, folder: Path | str | None, walk: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        folder: Path | str | None,
+        walk: Mapping[str, Any],
+        modules: tuple[str, ...] = ("walk", "walking", "figures"),
+    ) -> None:
         self._folder = None if folder is None else Path(folder)
         self._begun = json.dumps(walk, sort_keys=True).encode()
-        self._begun += program_digest(ROOMS, "numba")
+        own = tuple(f"experiments/engine_comparison/{name}" for name in modules)
+        self._begun += program_digest((*ROOMS, *own), "numba")
         if self._folder is not None:
             self._folder.mkdir(parents=True, exist_ok=True)
 

@@ -11,10 +11,16 @@ from typing import Any
 
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
+from heelstrike.experiments.engine_comparison.compass_table import HEADINGS as COMPASS
+from heelstrike.experiments.engine_comparison.compass_table import compass_cells
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
 from heelstrike.experiments.engine_comparison.pushes import DIRECTIONS, UNPUSHED
-from heelstrike.experiments.engine_comparison.settings import best_settings
+from heelstrike.experiments.engine_comparison.settings import (
+    BEST,
+    best_settings,
+    found_for_others,
+)
 from heelstrike.experiments.engine_comparison.tables import BY_ITSELF, WALKING, short
 
 SHOWN = 1e-3
@@ -60,12 +66,13 @@ def engines_page(folder: Path, figure: str) -> str:
         _INTRODUCTION,
         _in_short(walks),
         _table_1(walks, scenes),
-        _best(),
+        _best(walks),
         *(_walks(law, found) for law, found in walks.items()),
         f"![Error over computing time]({figure})\n",
         _peaks(walks),
         *(_pushes(file) for file in sorted(folder.glob("pushes-*.json"))),
         _scenes(scenes),
+        _compass(scenes["compass"]),
         _guards(scenes["guards"]),
     ]
     return "\n".join(parts)
@@ -179,10 +186,20 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
              "open source", "documented"],
             [*theirs, *absent],
         )
-        + "\nheelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
+        + "
+Where licences and systems were read:
+
+"
+        + "
+".join(f"- {_title(name)}: {f.read}." for name, f in FACTS.items())
+        + "
+
+heelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
         "its angle of friction, at defaults and a step of 1 ms; by Coulomb's law it is zero. The "
         "last columns have the step sizes, in ms, at which bravo7 takes all its steps under a "
-        "controller.\n\n"
+        "controller.
+
+"
         + _table(headings, ours)
     )  # fmt: skip
 
@@ -212,7 +229,7 @@ def _walks_at(found: Mapping[str, Any], name: str, which: str) -> str:
     return ", ".join(told) or "none"
 
 
-def _best() -> str:
+def _best(walks: Mapping[str, Any]) -> str:
     rows = [
         [
             _title(name),
@@ -225,6 +242,14 @@ def _best() -> str:
         ]
         for name, found in best_settings().items()
     ]
+    best = {
+        row["engine"]: _title(row["engine"])
+        for walk in walks.values()
+        for row in walk["rows"]
+        if row["settings"] == BEST and row["figures"]
+    }
+    versions = {k: each for walk in walks.values() for k, each in walk["versions"].items()}
+    others = found_for_others(best, {name: versions[ENTRIES[name].package] for name in best})
     commands = {
         found["command"].replace(f"--engines {name} ", "--engines NAME ")
         for name, found in best_settings().items()
@@ -239,6 +264,7 @@ def _best() -> str:
             ["engine", "best", "error, defaults", "error, best", "walks tried", "version", "date"],
             rows,
         )
+        + "".join(f"\n{each}.\n" for each in others)
         + "\nThe settings follow the advice of the maintainers:\n\n" + "\n".join(advice) + "\n"
     )  # fmt: skip
 
@@ -321,7 +347,9 @@ def _peaks(walks: Mapping[str, Any]) -> str:
 
 
 def _pushes(file: Path) -> str:
-    law, _, often = file.stem.removeprefix("pushes-").partition("-every-")
+    name = file.stem.removeprefix("pushes-")
+    quick = " --quick" if name.endswith("-quick") else ""
+    law, _, often = name.removesuffix("-quick").partition("-every-")
     period = f" --period {1e-3 * float(often.removesuffix('-ms')):g}" if often else ""
     found = json.loads(file.read_text(encoding="utf-8"))
     told: dict[tuple[str, str], dict[str, str]] = {}
@@ -329,6 +357,7 @@ def _pushes(file: Path) -> str:
         cells = told.setdefault((row["title"], row["settings"]), {})
         cells[row["direction"]] = row["reason"] or _largest(row["largest"])
     called = f", called every {often.replace('-', ' ')}" if often else ""
+    called += ", few pushes" if quick else ""
     settings = ",".join(dict.fromkeys(row["settings"] for row in found["rows"]))
     return (
         f"## Largest push under {law}{called}\n\n"
@@ -339,7 +368,7 @@ def _pushes(file: Path) -> str:
         "with this state and the controller's memory, at steps of 1 ms. If an engine fails, its "
         "message appears, with the time since the end of the push. Each row is "
         f"`heelstrike compare {found['robot']} --controller {law} --engines NAME "
-        f"--settings {settings}{period} --largest-push`.\n\n"
+        f"--settings {settings}{period}{quick} --largest-push`.\n\n"
         + _table(
             ["engine", "settings", *DIRECTIONS],
             [
@@ -396,6 +425,25 @@ def _scenes(found: Mapping[str, Any]) -> str:
         + ("\n\n" + "\n".join(why) if why else "")
         + "\n"
     )  # fmt: skip
+
+
+def _compass(found: Mapping[str, Any]) -> str:
+    return (
+        "## The compass gait\n\nThe passive walker of Goswami, Thuilot and Espiau (1998) starts on "
+        f"its cycle down a slope of 3 degrees and takes up to {found['strides']} steps, at "
+        f"{found['settings']}. Its legs are of one length, so the swing foot passes through the "
+        "ground at mid-stance: an engine has the walker on its stance foot until the stance leg is "
+        "upright on the slope, and on both feet from there until the foot behind is highest after "
+        "the landing. The cycle is the mean of the last five steps; *spread* is how far they still "
+        "differ. The Floquet multipliers come from a fit to one step after each of 32 random "
+        "disturbances, with the standard error (±) of the largest one's modulus. An engine that "
+        "resolves a landing within its steps takes it early or late by up to one step, and the "
+        "next step differs. Where that exceeds the disturbances, the standard error is large and "
+        "the multipliers are not resolved. Each row is `heelstrike compare bravo7 --engines NAME "
+        "--scenes`. Published: "
+        "0.734346391 s, 0.535445415 m, −0.199726 ± 0.544476i and 0.131573.\n\n"
+        + _table(COMPASS, [compass_cells(row) for row in found["rows"]])
+    )
 
 
 def _guards(found: Mapping[str, Any]) -> str:

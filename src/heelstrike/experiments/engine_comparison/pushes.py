@@ -25,7 +25,7 @@ from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
 from heelstrike.experiments.engine_comparison.entries import Entry, entries_called
-from heelstrike.experiments.engine_comparison.kept import KeptRows
+from heelstrike.experiments.engine_comparison.kept import KeptRows, asked_of_engine
 from heelstrike.experiments.engine_comparison.settings import DEFAULTS, settings_of
 from heelstrike.experiments.engine_comparison.walk import TRUTH, Start, Walk
 from heelstrike.experiments.engine_comparison.walking import seen
@@ -173,7 +173,9 @@ def compare_pushes(
     entries = entries_called(engines)
     walk = Walk(robot, controller, gait, UNDISTURBED, control_period, friction, 60.0)
     versions = peers(load=False)
-    kept = KeptRows(folder if walk.can_be_told else None, walk.entries())
+    kept = KeptRows(
+        folder if walk.can_be_told else None, walk.entries(), ("walk", "walking", "pushes")
+    )
     asked: list[tuple[str, str, str, Any, Callable[[float], bool]]] = []
     for direction, sign in DIRECTIONS.items():
         for name, method in OURS.items():
@@ -184,8 +186,8 @@ def compare_pushes(
             for which in settings:
                 given = settings_of(name, entry, which)
                 in_engine = partial(stands_in, walk, entry, given, versions, sign)
-                told = [which, given, versions[entry.package]]
-                asked.append((name, entry.title, direction, told, in_engine))
+                told = asked_of_engine(entry.package, given, versions)
+                asked.append((name, entry.title, direction, [which, told], in_engine))
     say = progress or (lambda text, share: None)  # noqa: ARG005
     rows = []
     try:

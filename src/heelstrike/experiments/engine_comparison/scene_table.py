@@ -1,9 +1,11 @@
-"""The scenes with closed forms in every engine, and by us."""
+"""The scenes with closed forms in every engine, and by us; two of them at several steps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -13,15 +15,23 @@ from rich.table import Table
 from heelstrike.analysis.told_summary import plain
 from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
-from heelstrike.experiments.engine_comparison.entries import entries_called
-from heelstrike.experiments.engine_comparison.scenes import our_scene_error, scene_error, scenes
+from heelstrike.experiments.engine_comparison.entries import Entry, entries_called
+from heelstrike.experiments.engine_comparison.kept import KeptRows, asked_of_engine
+from heelstrike.experiments.engine_comparison.scenes import (
+    Scene,
+    our_scene_error,
+    scene_error,
+    scenes,
+)
 from heelstrike.experiments.engine_comparison.settings import DEFAULTS, settings_of
 from heelstrike.experiments.engine_comparison.tables import short
 from heelstrike.experiments.engines.packages import PACKAGES, compared, peers
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.served import engine_process
 from heelstrike.field_texts import dataclass
-from heelstrike.sim import EventDriven, TimeStepping
+from heelstrike.reader_process import ReaderProcess
+from heelstrike.sim import Compliant, EventDriven, TimeStepping
+from heelstrike.sim.method import Method
 
 STEP = 1e-3
 """Step of the engines, in s."""
@@ -31,6 +41,16 @@ EXACT = EventDriven(rtol=1e-11, atol=1e-13)
 
 OURS = {"event-driven": EXACT, "time stepping": TimeStepping(step=STEP)}
 """Our rows."""
+
+AT_STEPS: Mapping[str, str] = {
+    "landing": "cube thrown onto a corner",
+    "rest": "cube below the angle of friction",
+}
+"""Scenes whose error and computing time are measured at several steps, by what they show."""
+STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2e-4)
+"""Those steps, in s."""
+TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
+"""Relative tolerances of our event-driven runs, which have no step, in their stead."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +69,22 @@ class SceneRow:
     """Why there is nothing."""
 
 
+@dataclass(frozen=True)
+class StepRow:
+    """A scene in an engine at one of several steps."""
+
+    shows: str
+    """``landing`` or ``rest``."""
+    title: str
+    """What tables call the engine."""
+    step_s: float
+    """Step, in s; of our event-driven runs their relative tolerance."""
+    error: float
+    """What is measured less what the closed form gives, without its sign."""
+    computing_s: float
+    """Computing time, in s."""
+
+
 @dataclass(frozen=True, eq=False)
 class SceneTable:
     """The scenes in every engine."""
@@ -61,6 +97,8 @@ class SceneTable:
     """Step of the engines, in s."""
     rows: tuple[SceneRow, ...]
     """Errors, scene by scene."""
+    at_steps: tuple[StepRow, ...] = ()
+    """Errors and computing times of `AT_STEPS`, engine by engine; what fails has no row."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain numbers and texts."""
@@ -70,6 +108,7 @@ class SceneTable:
                 "settings": self.settings,
                 "step_s": self.step_s,
                 "rows": [asdict(row) for row in self.rows],
+                "at_steps": [asdict(row) for row in self.at_steps],
             }
         )
         return found
@@ -98,6 +137,8 @@ def compare_scenes(
     engines: Sequence[str] | str = "all",
     settings: str = DEFAULTS,
     step: float = STEP,
+    steps: Sequence[float] = STEPS,
+    folder: Path | str | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> SceneTable:
     """Simulate scenes whose ends are known in every engine.
@@ -110,6 +151,10 @@ def compare_scenes(
         ``"defaults"`` or ``"best"``.
     step : float
         Step of the engines in s.
+    steps : sequence of float
+        Steps at which landing and rest are simulated, too.
+    folder : path, optional
+        Where rows are kept as they come, to go on from there.
     progress : callable, optional
         Called before each scene with a text, and the share of scenes that is done.
 
@@ -126,29 +171,90 @@ def compare_scenes(
     entries = entries_called(engines)
     versions = peers(load=False)
     everything = scenes()
-    rows = []
+    asked = _Engines(folder, settings, versions)
+    rows, at_steps = [], []
     say = progress or (lambda text, share: None)  # noqa: ARG005
-    processes = {entry.package: engine_process(entry.package) for entry in entries.values()}
     try:
         for k, scene in enumerate(everything):
             for name, method in OURS.items():
-                error = our_scene_error(scene, method)
+                error, _ = our_scene_error(scene, method)
                 rows.append(SceneRow(scene.name, name, f"heelstrike, {name}", error, ""))
             for name, entry in entries.items():
-                say(f"{scene.name}, {entry.title}", k / len(everything))
-                found, reason = None, ""
-                state = versions[entry.package]
-                if compared({entry.package: state}):
-                    try:
-                        given = settings_of(name, entry, settings)
-                        found, _ = scene_error(scene, entry, step, given, processes[entry.package])
-                    except InvalidRunError as refused:
-                        reason = str(refused)
+                say(f"{scene.name}, {entry.title}", k / (len(everything) + len(AT_STEPS)))
+                try:
+                    found, _ = asked.error(scene, name, entry, step)
+                except InvalidRunError as refused:
+                    rows.append(SceneRow(scene.name, name, entry.title, None, str(refused)))
                 else:
-                    reason = f"{PACKAGES[entry.package].title} is {state}"
-                rows.append(SceneRow(scene.name, name, entry.title, found, reason))
+                    rows.append(SceneRow(scene.name, name, entry.title, found, ""))
+        called = {scene.name: scene for scene in everything}
+        for shows, of_scene in AT_STEPS.items():
+            if of_scene not in called or not steps:
+                continue
+            scene = called[of_scene]
+            at_steps += _by_ours(shows, scene, steps)
+            for name, entry in entries.items():
+                say(f"{scene.name}, {entry.title}, at several steps", 1.0)
+                for each in steps:
+                    try:
+                        found, seconds = asked.error(scene, name, entry, each)
+                    except InvalidRunError:
+                        continue  # its row above says why
+                    at_steps.append(StepRow(shows, entry.title, each, abs(found), seconds))
     finally:
-        for process in processes.values():
-            process.end()
+        asked.close()
     told = tuple((s.name, s.exact, s.unit, s.source) for s in everything)
-    return SceneTable(told, settings, step, tuple(rows))
+    return SceneTable(told, settings, step, tuple(rows), tuple(at_steps))
+
+
+def _by_ours(shows: str, scene: Scene, steps: Sequence[float]) -> list[StepRow]:
+    """Simulate a scene by our methods at several steps or tolerances."""
+    methods: list[tuple[str, float, Method]] = [
+        ("heelstrike, event-driven", rtol, EventDriven(rtol=rtol, atol=1e-2 * rtol))
+        for rtol in TOLERANCES
+    ]
+    for title, of in (("time stepping", TimeStepping), ("compliant", Compliant)):
+        methods += [(f"heelstrike, {title}", step, of(step=step)) for step in steps]
+    rows = []
+    for title, step, method in methods:
+        our_scene_error(scene, method)  # what is compiled or made for the first time is not timed
+        error, seconds = our_scene_error(scene, method)
+        rows.append(StepRow(shows, title, step, abs(error), seconds))
+    return rows
+
+
+class _Engines:
+    """Engines that are asked for scenes, each in its process; what they answer is kept."""
+
+    def __init__(
+        self, folder: Path | str | None, settings: str, versions: Mapping[str, str]
+    ) -> None:
+        self._kept = KeptRows(folder, {}, ("scenes",))
+        self._settings, self._versions = settings, versions
+        self._processes: dict[str, ReaderProcess] = {}
+
+    def close(self) -> None:
+        """End the processes."""
+        for process in self._processes.values():
+            process.end()
+
+    def error(self, scene: Scene, name: str, entry: Entry, step: float) -> tuple[float, float]:
+        """Simulate a scene; return its error and the seconds that it took."""
+        state = self._versions[entry.package]
+        if not compared({entry.package: state}):
+            raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
+        given = settings_of(name, entry, self._settings)
+        if entry.package not in self._processes:
+            self._processes[entry.package] = engine_process(entry.package)
+
+        def make() -> dict[str, Any]:
+            process = self._processes[entry.package]
+            error, seconds = scene_error(scene, entry, step, given, process)
+            return {"error": error, "seconds": seconds}
+
+        words = "-".join(re.findall(r"[\w.]+", scene.name))
+        told = [name, scene.exact, step, asked_of_engine(entry.package, given, self._versions)]
+        found = self._kept.entries(f"scene-{words}-{name}-{step:g}", told, make)
+        if found["error"] is None:
+            raise InvalidRunError("what it ends with is not finite")
+        return found["error"], found["seconds"]

@@ -397,8 +397,8 @@ def scene_error(
     return found - scene.exact, peer.seconds
 
 
-def our_scene_error(scene: Scene, method: Method) -> float:
-    """Simulate a scene by a method of ours; return the error as of :func:`scene_error`.
+def our_scene_error(scene: Scene, method: Method) -> tuple[float, float]:
+    """Simulate a scene by a method of ours; return error and time as of :func:`scene_error`.
 
     Parameters
     ----------
@@ -408,4 +408,4 @@ def our_scene_error(scene: Scene, method: Method) -> float:
         The simulation method.
     """
     run = scene.scenario.run(method)
-    return scene.measured(run.position[-1], run.velocity[-1]) - scene.exact
+    return scene.measured(run.position[-1], run.velocity[-1]) - scene.exact, run.timing.wall_s

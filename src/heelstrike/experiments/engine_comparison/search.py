@@ -62,7 +62,7 @@ def search_settings(
     entry : Entry
         The row, with its choices.
     walk : Walk
-        What is walked, for `STEPS` steps.
+        What is walked, usually for `STEPS` steps.
     versions : mapping
         What :func:`~heelstrike.experiments.engines.peers` says of the engines.
     progress : callable, optional
@@ -115,5 +115,6 @@ def search_settings(
         command=(
             f"heelstrike compare {walk.robot.name} --engines {name} --search --controller "
             f"{type(walk.controller).__name__}"
+            + (f" --steps {walk.steps}" if walk.steps != STEPS else "")
         ),
     )

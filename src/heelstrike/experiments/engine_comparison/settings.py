@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -53,3 +54,23 @@ def settings_of(name: str, entry: Entry, which: str) -> dict[str, Any]:
     if which == BEST:
         found |= best_settings().get(name, {}).get("settings", {})
     return found
+
+
+def found_for_others(titles: Mapping[str, str], versions: Mapping[str, str]) -> list[str]:
+    """Say of which engines the best settings were found with another version than is used.
+
+    Parameters
+    ----------
+    titles : mapping
+        Names of rows, and what tables call them.
+    versions : mapping
+        Versions that are used, by the names of rows.
+    """
+    return [
+        f"{title}: the best settings were found with {best_settings()[name]['version']}, "
+        f"this is {versions[name]}"
+        for name, title in titles.items()
+        if name in best_settings()
+        and name in versions
+        and versions[name] != best_settings()[name]["version"]
+    ]

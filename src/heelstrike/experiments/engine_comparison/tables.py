@@ -10,6 +10,9 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Group
 from rich.table import Table
 
+from heelstrike.experiments.engine_comparison.entries import ENTRIES
+from heelstrike.experiments.engine_comparison.settings import BEST, found_for_others
+
 if TYPE_CHECKING:
     from heelstrike.experiments.engine_comparison.comparison import EngineComparison
     from heelstrike.experiments.engine_comparison.figures import WalkFigures
@@ -55,6 +58,11 @@ def walk_table(comparison: EngineComparison) -> Group:
     for row in failed:
         said.setdefault(f"{row.title}: {row.reason}")
     parts += list(said)
+    best = {
+        row.engine: row.title for row in comparison.rows if row.settings == BEST and row.figures
+    }
+    used = {name: comparison.versions[ENTRIES[name].package] for name in best}
+    parts += found_for_others(best, used)
     parts += [f"{name}: {why}" for name, why in comparison.absent.items()]
     return Group(*parts)
 

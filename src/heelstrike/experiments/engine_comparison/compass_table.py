@@ -1,0 +1,213 @@
+"""The compass gait in every engine, and by us."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from heelstrike.analysis.told_summary import plain
+from heelstrike.arguments import takes
+from heelstrike.errors import SimulationError
+from heelstrike.experiments.engine_comparison.compass import (
+    STRIDES,
+    ByOurs,
+    CompassWalk,
+    InEngine,
+    compass_walk,
+    our_cycle,
+)
+from heelstrike.experiments.engine_comparison.entries import Entry, entries_called
+from heelstrike.experiments.engine_comparison.kept import KeptRows, asked_of_engine
+from heelstrike.experiments.engine_comparison.settings import DEFAULTS, settings_of
+from heelstrike.experiments.engine_comparison.tables import short
+from heelstrike.experiments.engines.packages import PACKAGES, compared, peers
+from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.field_texts import dataclass
+from heelstrike.robot import State
+from heelstrike.sim import TimeStepping
+
+STEPS = (1e-3, 2e-4)
+"""Steps of the engines, in s."""
+
+EXACT, OURS = "event-driven", "time stepping"
+"""Our rows."""
+
+
+@dataclass(frozen=True)
+class CompassRow:
+    """The compass gait in an engine."""
+
+    engine: str
+    """Name of the row's engine, or of our simulation method."""
+    title: str
+    """What tables call it."""
+    step_s: float
+    """Step, in s; NaN for our event-driven run."""
+    walk: Mapping[str, Any] | None
+    """Numbers of `CompassWalk`, complex ones as pairs; None if there are none."""
+    reason: str
+    """Why there are none."""
+
+
+@dataclass(frozen=True, eq=False)
+class CompassTable:
+    """The compass gait in every engine."""
+
+    strides: int
+    """Steps that it was to take."""
+    settings: str
+    """``defaults`` or ``best``."""
+    rows: tuple[CompassRow, ...]
+    """Engine by engine."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain numbers and texts."""
+        found: dict[str, Any] = plain(
+            {
+                "strides": self.strides,
+                "settings": self.settings,
+                "rows": [asdict(row) for row in self.rows],
+            }
+        )
+        return found
+
+    def __rich__(self) -> Table:
+        table = Table(
+            title="compass gait on 3 degrees", title_justify="left", box=SIMPLE_HEAD,
+            show_edge=False,
+        )  # fmt: skip
+        for heading in HEADINGS:
+            table.add_column(heading)
+        for row in self.to_dict()["rows"]:
+            table.add_row(*compass_cells(row))
+        return table
+
+
+HEADINGS = (
+    "engine", "h ms", "walks", "period s", "step m", "spread mrad", "multipliers", "±"
+)  # fmt: skip
+"""Of tables of the compass gait."""
+
+
+def compass_cells(row: Mapping[str, Any]) -> list[str]:
+    """Write a row in texts, one for each of `HEADINGS`.
+
+    Parameters
+    ----------
+    row : mapping
+        Of ``CompassTable.to_dict()``.
+    """
+    step = "–" if row["step_s"] is None else f"{1e3 * row['step_s']:g}"
+    walk = row["walk"]
+    if walk is None:
+        return [row["title"], step, row["reason"], "–", "–", "–", "–", "–"]
+    if walk["ending"]:
+        said = f"no, {walk['strides']}: {walk['ending']}"
+        return [row["title"], step, said, "–", "–", "–", "–", "–"]
+    digits = 9 if row["engine"] == EXACT else 4
+    return [
+        row["title"], step, "yes", f"{walk['period_s']:.{digits}f}",
+        f"{walk['step_m']:.{digits}f}", short(1e3 * walk["spread"]),
+        _written(walk["multipliers"], 6 if row["engine"] == EXACT else 2),
+        short(walk["error"]) if walk["error"] else "–",
+    ]  # fmt: skip
+
+
+def _written(multipliers: Sequence[Sequence[float]], digits: int) -> str:
+    """Write multipliers, of a pair one with ±."""
+    told = []
+    for real, imaginary in multipliers:
+        if imaginary > 0.0:
+            told.append(f"{real:.{digits}f} ± {imaginary:.{digits}f}i")
+        elif imaginary == 0.0:
+            told.append(f"{real:.{digits}f}")
+    return ", ".join(told).replace("-", "−")
+
+
+@takes(SimulationError)
+def compare_compass(
+    *,
+    engines: Sequence[str] | str = "all",
+    settings: str = DEFAULTS,
+    steps: Sequence[float] = STEPS,
+    folder: Path | str | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> CompassTable:
+    """Let the passive compass gait walk down its slope in every engine.
+
+    Parameters
+    ----------
+    engines : sequence of str or str
+        Names of the engines; ``"all"`` is all of them.
+    settings : str
+        ``"defaults"`` or ``"best"``.
+    steps : sequence of float
+        Steps of the engines, in s.
+    folder : path, optional
+        Where rows are kept as they come, to go on from there.
+    progress : callable, optional
+        Called before each walk with a text, and the share of them that is done.
+
+    Returns
+    -------
+    CompassTable
+        Cycles and multipliers, ours first.
+
+    Raises
+    ------
+    SimulationError
+        If there is no engine of a name.
+    """
+    entries = entries_called(engines)
+    versions = peers(load=False)
+    kept = KeptRows(folder, {}, ("compass", "scenes"))
+    cycle, start = our_cycle()
+    rows = [CompassRow(EXACT, f"heelstrike, {EXACT}", math.nan, _told(cycle), "")]
+    for step in steps:
+        walk = compass_walk(ByOurs(lambda h: TimeStepping(step=h), step), start)
+        rows.append(CompassRow(OURS, f"heelstrike, {OURS}", step, _told(walk), ""))
+    say = progress or (lambda text, share: None)  # noqa: ARG005
+    asked = [(name, entry, step) for name, entry in entries.items() for step in steps]
+    for k, (name, entry, step) in enumerate(asked):
+        say(f"compass gait in {entry.title}, {1e3 * step:g} ms", k / len(asked))
+        row = CompassRow(name, entry.title, step, None, "")
+        state = versions[entry.package]
+        if not compared({entry.package: state}):
+            rows.append(replace(row, reason=f"{PACKAGES[entry.package].title} is {state}"))
+            continue
+        given = settings_of(name, entry, settings)
+        told = [name, step, asked_of_engine(entry.package, given, versions)]
+        try:
+            found = kept.entries(
+                f"compass-{name}-{settings}-{step:g}",
+                told,
+                partial(_in_engine, entry, step, given, start),
+            )
+        except InvalidRunError as refused:
+            rows.append(replace(row, reason=str(refused)))
+        else:
+            rows.append(replace(row, walk=found))
+    return CompassTable(STRIDES, settings, tuple(rows))
+
+
+def _in_engine(entry: Entry, step: float, given: Mapping[str, Any], start: State) -> dict[str, Any]:
+    mover = InEngine(entry, step, given)
+    try:
+        return _told(compass_walk(mover, start))
+    finally:
+        mover.close()
+
+
+def _told(walk: CompassWalk) -> dict[str, Any]:
+    """Return a walk as plain numbers and texts."""
+    found = asdict(walk)
+    found["multipliers"] = [[complex(each).real, complex(each).imag] for each in walk.multipliers]
+    told: dict[str, Any] = plain(found)
+    return told
