@@ -173,7 +173,7 @@ def test_what_is_wrong_is_said() -> None:
         with pytest.raises(ValueError, match=r"task|num_envs"):
             make()
     with pytest.raises(ValueError, match="render_mode"):
-        TaskEnv("Walker2d", render_mode="human")
+        TaskEnv("Walker2d", render_mode="ansi")
     copy = pickle.loads(pickle.dumps(single))
     np.testing.assert_array_equal(copy.reset(seed=0)[0], single.reset(seed=0)[0])
     for each in (lanes, single):
