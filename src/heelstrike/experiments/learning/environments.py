@@ -355,16 +355,23 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         if seed is None:
             return
         if isinstance(seed, int | np.integer):
-            seeds: list[int | None] = [int(seed) + lane for lane in range(self.num_envs)]
+            seeds: list[Any] = [int(seed) + lane for lane in range(self.num_envs)]
         else:
-            seeds = list(seed)
-        if len(seeds) != self.num_envs:
-            raise error.Error(
-                f"give one number, or {self.num_envs} seeds, one a lane; got {len(seeds)}"
-            )
-        for lane, each in enumerate(seeds):
-            if each is not None:
-                self._lanes.seed(lane, seeding.np_random(each)[0])
+            try:
+                seeds = np.asarray(seed, dtype=object).tolist()
+                count = len(seeds)
+            except (TypeError, ValueError):  # one of them, or several that are several themselves
+                raise error.Error(
+                    f"a seed is a whole number ≥ 0, or None; give one, or one a lane, got {seed!r}"
+                ) from None
+            if count != self.num_envs:
+                raise error.Error(
+                    f"give one number, or {self.num_envs} seeds, one a lane; got {count}"
+                )
+        randoms = [None if each is None else seeding.np_random(each)[0] for each in seeds]
+        for lane, random in enumerate(randoms):
+            if random is not None:
+                self._lanes.seed(lane, random)
 
     def _mask(self, options: Info | None) -> Array:
         mask = None if options is None else options.get("reset_mask")
