@@ -9,6 +9,7 @@ memory grows, why episodes ended, and the worst certificates. ``... walk --polic
 speeds to a policy of Walk-v0 and to footstep feedback, pushes both, and prints who is upright after
 20 s and how far mean speeds are off. ``... defects --policy FILE`` runs a policy in MuJoCo at
 several time steps and on floors of several coefficients of friction, and here likewise.
+``... call`` times a policy of two layers of 64 in the compiled loop.
 
 Times are processor times of this process but for async, whose work is done by others (clock); of
 each the best of several repetitions is printed, which are interleaved.
@@ -24,6 +25,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -37,7 +39,7 @@ if find_spec("imageio") is None:  # Gymnasium imports it for films, which nobody
 
 import gymnasium
 
-from heelstrike.control.policy.network import load_network
+from heelstrike.control.policy.network import Layer, load_network
 from heelstrike.experiments.learning import environments
 from heelstrike.experiments.learning import transfer as worlds
 from heelstrike.experiments.learning.courses import told_task
@@ -236,6 +238,35 @@ def endure(task: str, lanes: int, decisions: int) -> None:
     print(f"  {ends - sum(causes.values()):8d} truncated; {going} of {lanes} lanes can go on")
 
 
+def call(lanes: int, repetitions: int) -> None:
+    """Print what a call of a policy of Walker2d costs, beside torques that are held."""
+    task, random = RUNNING["Walker2d"], np.random.default_rng(0)
+    robot = task.robot()
+    sizes = (robot.nq + robot.nv - 1, 64, 64, robot.nu)
+    layers = [  # the last gives no torque, so that both move alike
+        Layer(random.normal(0, 0.1 * (after == 64), (after, before)), np.zeros(after),
+              activation="tanh" if after == 64 else "linear")
+        for before, after in pairwise(sizes)
+    ]  # fmt: skip
+    network = RunningCourse(task).network(tuple(layers), np.zeros(sizes[0]), np.ones(sizes[0]))
+    network = replace(network, period=task.step)  # called in every step
+    best = dict.fromkeys(("held", "policy"), np.inf)
+    batches = {
+        name: hs.Batch(
+            robot, law, lanes=lanes, state=robot.reference_state(), stop_when_fallen=False,
+            method=hs.TimeStepping(step=task.step), ground=hs.Ground(friction=task.friction),
+        )
+        for name, law in (("held", hs.HeldTorque(robot)), ("policy", hs.Policy(network, robot)))
+    }  # fmt: skip
+    for _ in range(repetitions):
+        for name, batch in batches.items():
+            batch.reset()
+            begin = time.process_time()
+            batch.step(50)
+            best[name] = min(best[name], (time.process_time() - begin) / (50 * lanes))
+    print(f"a policy of 64 x 64: {1e6 * (best['policy'] - best['held']):.2f} us a call")
+
+
 def walk(policy: Path, count: int, impulse: float, seed: int) -> None:
     """Command speeds to a policy and to footstep feedback, under the same pushes."""
     duration, settled, every = 20.0, 2.0, 3.5
@@ -323,7 +354,7 @@ def defects(policy: Path, count: int) -> None:
 def main() -> None:
     """Do what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("what", choices=["speed", "identical", "endure", "walk", "defects"])
+    parser.add_argument("what", choices=["speed", "identical", "endure", "walk", "defects", "call"])
     parser.add_argument("--task", default="Walker2d", choices=list(RUNNING))
     parser.add_argument("--lanes", type=int, default=0)
     parser.add_argument("--decisions", type=int, default=500)
@@ -338,6 +369,8 @@ def main() -> None:
             given.task, given.lanes or 64, given.decisions, given.repetitions,
             peers=not given.no_peers,
         )  # fmt: skip
+    elif given.what == "call":
+        call(given.lanes or 64, given.repetitions)
     elif given.what == "walk":
         walk(given.policy, given.lanes or 100, given.impulse, given.seed)
     elif given.what == "defects":
