@@ -23,6 +23,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from importlib.util import find_spec
 from itertools import pairwise
@@ -217,21 +218,22 @@ def endure(task: str, lanes: int, decisions: int) -> None:
     vector.reset(seed=0)
     causes: Counter[str] = Counter()
     worst, ends, begin = 0.0, 0, time.process_time()
-    for decision in range(1, decisions + 1):
-        action = random.uniform(-1, 1, (lanes, vector.single_action_space.shape[0]))
-        *_, terminated, truncated, info = vector.step(action)
-        worst = max(worst, float(info["certificate"].max()))
-        ends += int(terminated.sum() + truncated.sum())
-        if terminated.any():
-            causes.update(re.sub(r"-?[0-9.]+(e[-+]?[0-9]+)?", "N", each)
-                          for each in info["cause"][terminated])  # fmt: skip
-        if decision % max(decisions // 10, 1) == 0:
-            pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-            seconds = time.process_time() - begin
-            print(
-                f"{decision * lanes:12d} steps, {pages * 4096 / 2**20:7.1f} MB, {ends} ends, worst "
-                f"certificate {worst:.2g}, {decision * lanes / seconds:.0f} steps/s", flush=True,
-            )  # fmt: skip
+    with suppress(KeyboardInterrupt):  # what there is by then is told all the same
+        for decision in range(1, decisions + 1):
+            action = random.uniform(-1, 1, (lanes, vector.single_action_space.shape[0]))
+            *_, terminated, truncated, info = vector.step(action)
+            worst = max(worst, float(info["certificate"].max()))
+            ends += int(terminated.sum() + truncated.sum())
+            if terminated.any():
+                causes.update(re.sub(r"-?[0-9.]+(e[-+]?[0-9]+)?", "N", each)
+                              for each in info["cause"][terminated])  # fmt: skip
+            if decision % max(decisions // 10, 1) == 0:
+                pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+                done, seconds = decision * lanes, time.process_time() - begin
+                print(
+                    f"{done:12d} steps, {pages * 4096 / 2**20:7.1f} MB, {ends} ends, "
+                    f"worst certificate {worst:.2g}, {done / seconds:.0f} steps/s", flush=True,
+                )  # fmt: skip
     for cause, count in causes.most_common():
         print(f"  {count:8d} {cause}")
     going = int(vector._lanes.batch.going.sum())
