@@ -9,6 +9,7 @@ memory grows, why episodes ended, and the worst certificates. ``... walk --polic
 speeds to a policy of Walk-v0 and to footstep feedback, pushes both, and prints who is upright after
 20 s and how far mean speeds are off. ``... defects --policy FILE`` runs a policy in MuJoCo at
 several time steps and on floors of several coefficients of friction, and here likewise.
+``... call`` times a policy of two layers of 64 in the compiled loop.
 
 Times are processor times of this process but for async, whose work is done by others (clock); of
 each the best of several repetitions is printed, which are interleaved.
@@ -22,8 +23,10 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -37,7 +40,7 @@ if find_spec("imageio") is None:  # Gymnasium imports it for films, which nobody
 
 import gymnasium
 
-from heelstrike.control.policy.network import load_network
+from heelstrike.control.policy.network import Layer, load_network
 from heelstrike.experiments.learning import environments
 from heelstrike.experiments.learning import transfer as worlds
 from heelstrike.experiments.learning.courses import told_task
@@ -215,25 +218,55 @@ def endure(task: str, lanes: int, decisions: int) -> None:
     vector.reset(seed=0)
     causes: Counter[str] = Counter()
     worst, ends, begin = 0.0, 0, time.process_time()
-    for decision in range(1, decisions + 1):
-        action = random.uniform(-1, 1, (lanes, vector.single_action_space.shape[0]))
-        *_, terminated, truncated, info = vector.step(action)
-        worst = max(worst, float(info["certificate"].max()))
-        ends += int(terminated.sum() + truncated.sum())
-        if terminated.any():
-            causes.update(re.sub(r"-?[0-9.]+(e[-+]?[0-9]+)?", "N", each)
-                          for each in info["cause"][terminated])  # fmt: skip
-        if decision % max(decisions // 10, 1) == 0:
-            pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-            seconds = time.process_time() - begin
-            print(
-                f"{decision * lanes:12d} steps, {pages * 4096 / 2**20:7.1f} MB, {ends} ends, worst "
-                f"certificate {worst:.2g}, {decision * lanes / seconds:.0f} steps/s", flush=True,
-            )  # fmt: skip
+    with suppress(KeyboardInterrupt):  # what there is by then is told all the same
+        for decision in range(1, decisions + 1):
+            action = random.uniform(-1, 1, (lanes, vector.single_action_space.shape[0]))
+            *_, terminated, truncated, info = vector.step(action)
+            worst = max(worst, float(info["certificate"].max()))
+            ends += int(terminated.sum() + truncated.sum())
+            if terminated.any():
+                causes.update(re.sub(r"-?[0-9.]+(e[-+]?[0-9]+)?", "N", each)
+                              for each in info["cause"][terminated])  # fmt: skip
+            if decision % max(decisions // 10, 1) == 0:
+                pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+                done, seconds = decision * lanes, time.process_time() - begin
+                print(
+                    f"{done:12d} steps, {pages * 4096 / 2**20:7.1f} MB, {ends} ends, "
+                    f"worst certificate {worst:.2g}, {done / seconds:.0f} steps/s", flush=True,
+                )  # fmt: skip
     for cause, count in causes.most_common():
         print(f"  {count:8d} {cause}")
     going = int(vector._lanes.batch.going.sum())
     print(f"  {ends - sum(causes.values()):8d} truncated; {going} of {lanes} lanes can go on")
+
+
+def call(lanes: int, repetitions: int) -> None:
+    """Print what a call of a policy of Walker2d costs, beside torques that are held."""
+    task, random = RUNNING["Walker2d"], np.random.default_rng(0)
+    robot = task.robot()
+    sizes = (robot.nq + robot.nv - 1, 64, 64, robot.nu)
+    layers = [  # the last gives no torque, so that both move alike
+        Layer(random.normal(0, 0.1 * (after == 64), (after, before)), np.zeros(after),
+              activation="tanh" if after == 64 else "linear")
+        for before, after in pairwise(sizes)
+    ]  # fmt: skip
+    network = RunningCourse(task).network(tuple(layers), np.zeros(sizes[0]), np.ones(sizes[0]))
+    network = replace(network, period=task.step)  # called in every step
+    best = dict.fromkeys(("held", "policy"), np.inf)
+    batches = {
+        name: hs.Batch(
+            robot, law, lanes=lanes, state=robot.reference_state(), stop_when_fallen=False,
+            method=hs.TimeStepping(step=task.step), ground=hs.Ground(friction=task.friction),
+        )
+        for name, law in (("held", hs.HeldTorque(robot)), ("policy", hs.Policy(network, robot)))
+    }  # fmt: skip
+    for _ in range(repetitions):
+        for name, batch in batches.items():
+            batch.reset()
+            begin = time.process_time()
+            batch.step(50)
+            best[name] = min(best[name], (time.process_time() - begin) / (50 * lanes))
+    print(f"a policy of 64 x 64: {1e6 * (best['policy'] - best['held']):.2f} us a call")
 
 
 def walk(policy: Path, count: int, impulse: float, seed: int) -> None:
@@ -323,7 +356,7 @@ def defects(policy: Path, count: int) -> None:
 def main() -> None:
     """Do what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
-    parser.add_argument("what", choices=["speed", "identical", "endure", "walk", "defects"])
+    parser.add_argument("what", choices=["speed", "identical", "endure", "walk", "defects", "call"])
     parser.add_argument("--task", default="Walker2d", choices=list(RUNNING))
     parser.add_argument("--lanes", type=int, default=0)
     parser.add_argument("--decisions", type=int, default=500)
@@ -338,6 +371,8 @@ def main() -> None:
             given.task, given.lanes or 64, given.decisions, given.repetitions,
             peers=not given.no_peers,
         )  # fmt: skip
+    elif given.what == "call":
+        call(given.lanes or 64, given.repetitions)
     elif given.what == "walk":
         walk(given.policy, given.lanes or 100, given.impulse, given.seed)
     elif given.what == "defects":

@@ -164,22 +164,67 @@ def test_what_is_wrong_is_said() -> None:
             lanes.step(wrong)
     with pytest.raises(ValueError, match="not finite"):
         single.step(np.full(6, np.inf))
-    for seed in (-1, "a", 1.5, [1, 2]):
-        with pytest.raises((gymnasium.error.Error, TypeError)):
-            lanes.reset(seed=seed)
+    for env in (lanes, single):
+        for seed in (-1, "a", 1.5, [1, 2], [1, "a", 2], [[1], [2], [3]], {"a": 1}):
+            with pytest.raises(gymnasium.error.Error, match=r"(?i)seed"):
+                env.reset(seed=seed)
+    np.testing.assert_array_equal(
+        lanes.reset(seed=np.array([4, 5, 6]))[0], lanes.reset(seed=np.int64(4))[0]
+    )
     with pytest.raises(gymnasium.error.Error, match="truth value"):
         lanes.reset(options={"reset_mask": [0, 1, 1]})
     for make in (lambda: TaskEnv("Ant"), lambda: TaskVectorEnv("Walker2d", 0)):
         with pytest.raises(ValueError, match=r"task|num_envs"):
             make()
     with pytest.raises(ValueError, match="render_mode"):
-        TaskEnv("Walker2d", render_mode="human")
+        TaskEnv("Walker2d", render_mode="ansi")
     copy = pickle.loads(pickle.dumps(single))
     np.testing.assert_array_equal(copy.reset(seed=0)[0], single.reset(seed=0)[0])
     for each in (lanes, single):
-        each.close()
-        with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="closed"):
-            each.reset()
+        for _ in range(2):
+            each.close()
+        for late in (each.reset, each.render, lambda: each.step(actions(3, 1)[0])):  # noqa: B023
+            with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="closed"):
+                late()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.zeros(5), np.zeros((6, 1)), 0.5, np.zeros(0), "abcdef", None, np.full(6, None),
+        np.zeros(6, dtype=bool), np.zeros(6, dtype=complex), np.full(6, np.nan),
+        np.array([0, 0, 0, 0, 0, -np.inf]), [[1.0], [2.0, 3.0]],
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_a_refused_action_changes_nothing(wrong: Any) -> None:
+    """The next good one leads to where it would have led without it, in one and in many."""
+    given = actions(2, 2)
+    single, lanes, untouched = TaskEnv("Walker2d"), vector(lanes=2), vector(lanes=2)
+    single.reset(seed=9)
+    for each in (lanes, untouched):
+        each.reset(seed=9)
+    for action in given:
+        with pytest.raises(ValueError, match=r"action|shape|sequence"):
+            single.step(wrong)
+        with pytest.raises(ValueError, match=r"action|shape|sequence"):
+            lanes.step([wrong, wrong])
+        expected = untouched.step(action)
+        for found, wanted in zip(lanes.step(action)[:4], expected, strict=False):
+            np.testing.assert_array_equal(found, wanted)
+        np.testing.assert_array_equal(single.step(action[0])[0], expected[0][0])
+
+
+def test_actions_of_whole_numbers_and_beyond_the_range_are_taken() -> None:
+    """What is beyond is cut, and costs as much as it asked for, as in Gymnasium."""
+    for wide, cut in ((np.full(6, 3), np.ones(6)), ([-1e3] * 6, -np.ones(6))):
+        one, other = TaskEnv("Walker2d"), TaskEnv("Walker2d")
+        for each in (one, other):
+            each.reset(seed=2)
+        found, wanted = one.step(wide), other.step(cut)
+        np.testing.assert_array_equal(found[0], wanted[0])
+        cost = 1e-3 * (np.square(wide).sum() - np.square(cut).sum())
+        assert found[1] == pytest.approx(wanted[1] - cost, rel=1e-12)
 
 
 def observed_by(lanes: Any, seed: int = 5) -> list[str]:
@@ -212,6 +257,21 @@ def test_environments_go_on_in_a_fork_and_in_another_process(tmp_path: Path) -> 
         "print(*[float(each).hex() for each in np.array(seen).ravel()])"
     )
     assert fresh_python("-c", program, str(kept)).stdout.split() == expected
+
+
+@pytest.mark.slow
+def test_they_work_in_processes_that_are_spawned() -> None:
+    """Gymnasium's own vector of processes, which begin from nothing, makes and moves them."""
+    name = f"{environments.__name__}:heelstrike/Hopper-v0"
+    given = {"num_envs": 2, "vectorization_mode": "async"}
+    spawned = gymnasium.make_vec(name, **given, vector_kwargs={"context": "spawn"})
+    ours = TaskVectorEnv("Hopper", 2)
+    try:
+        np.testing.assert_array_equal(spawned.reset(seed=5)[0], ours.reset(seed=5)[0])
+        for action in actions(2, 5, 3):
+            np.testing.assert_array_equal(spawned.step(action)[0], ours.step(action)[0])
+    finally:
+        spawned.close()
 
 
 def test_walks_are_environments_too() -> None:

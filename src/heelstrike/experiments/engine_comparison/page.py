@@ -186,20 +186,12 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
              "open source", "documented"],
             [*theirs, *absent],
         )
-        + "
-Where licences and systems were read:
-
-"
-        + "
-".join(f"- {_title(name)}: {f.read}." for name, f in FACTS.items())
-        + "
-
-heelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
+        + "\nWhere licences and systems were read:\n\n"
+        + "\n".join(f"- {_title(name)}: {f.read}." for name, f in FACTS.items())
+        + "\n\nheelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
         "its angle of friction, at defaults and a step of 1 ms; by Coulomb's law it is zero. The "
         "last columns have the step sizes, in ms, at which bravo7 takes all its steps under a "
-        "controller.
-
-"
+        "controller.\n\n"
         + _table(headings, ours)
     )  # fmt: skip
 

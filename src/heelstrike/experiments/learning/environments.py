@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.errors import SimulationError
+from heelstrike.errors import SimulationError, ViewError
 from heelstrike.experiments.learning.course import AT_RESET, Course
 from heelstrike.experiments.learning.courses import NAMES, course_of, named_task
-from heelstrike.experiments.learning.pictures import Camera
+from heelstrike.experiments.learning.pictures import Camera, Screen
 from heelstrike.robot.model import Floats, Integers
 
 try:
@@ -36,6 +36,9 @@ except ImportError as missing:
 
 Array = NDArray[Any]
 Info = dict[str, Any]
+
+MODES = ("human", "rgb_array")
+"""How environments can be seen: in the browser, in real time, or as pictures."""
 
 FRAMES = 50
 """Frames a second that are told to those who make films: that of a decision, if it is less."""
@@ -59,14 +62,14 @@ class TaskEnv(gymnasium.Env[Floats, Array]):
     task : str
         Name of the task: ``"Walker2d"``, ``"Hopper"``, ``"HalfCheetah"`` or ``"Walk"``.
     render_mode : str, optional
-        ``"rgb_array"`` for pictures.
+        ``"rgb_array"`` for pictures; ``"human"`` to show each step in the browser, in real time.
     **changes
         Fields of :class:`~heelstrike.experiments.learning.tasks.RunningTask` or
         :class:`~heelstrike.experiments.learning.walk_task.WalkTask` that are to be others, as
         ``ctrl_cost_weight=0.01``.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": FRAMES}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": [*MODES], "render_fps": FRAMES}  # noqa: RUF012
 
     def __init__(self, task: str, render_mode: str | None = None, **changes: Any) -> None:
         self._lanes = _course(task, 1, changes)
@@ -76,6 +79,7 @@ class TaskEnv(gymnasium.Env[Floats, Array]):
         self.observation_space, self.action_space = _spaces(self._lanes)
         self._given = task, render_mode, changes
         self._camera: Camera | None = None
+        self._screen = _screen(self.render_mode, self._lanes)
         self._state = "new"
         self._first = np.zeros(1, dtype=np.int64)
 
@@ -107,6 +111,8 @@ class TaskEnv(gymnasium.Env[Floats, Array]):
             self._lanes.seed(0, self.np_random)
         self._lanes.begin(self._first)
         self._state = "begun"
+        if self._screen is not None:
+            self._screen.show()
         return self._lanes.observation[0].copy(), self._terms(AT_RESET)
 
     def step(self, action: Array) -> tuple[Floats, float, bool, bool, Info]:
@@ -143,6 +149,8 @@ class TaskEnv(gymnasium.Env[Floats, Array]):
         terminated = bool(lanes.terminated[0])
         if terminated:
             info["cause"] = lanes.cause(0)
+        if self._screen is not None:
+            self._screen.show()
         return lanes.observation[0].copy(), float(lanes.reward[0]), terminated, False, info
 
     def _terms(self, count: int) -> Info:
@@ -150,9 +158,12 @@ class TaskEnv(gymnasium.Env[Floats, Array]):
         return dict(zip(lanes.names[:count], lanes.terms[0].tolist(), strict=False))
 
     def render(self) -> Any:
-        """Return a picture, (height, width, 3) of 8 bits, if that is the mode."""
+        """Return a picture, (height, width, 3) of 8 bits, if that is the mode.
+
+        In the browser each step is shown without it.
+        """
         _check_begun(self._state)
-        if self.render_mode is None:
+        if self.render_mode != "rgb_array":
             return None
         if self._camera is None:
             self._camera = Camera(self._lanes.robot, self._lanes.batch.lane(0).ground)
@@ -162,6 +173,8 @@ class TaskEnv(gymnasium.Env[Floats, Array]):
         """Let everything go."""
         self._state = "closed"
         self._lanes.batch.close()
+        if self._screen is not None:
+            self._screen.close()
 
 
 class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
@@ -181,7 +194,8 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
     threads : int
         Threads that move them.
     render_mode : str, optional
-        ``"rgb_array"`` for pictures of all.
+        ``"rgb_array"`` for pictures of all; ``"human"`` to show each step of the first lane in the
+        browser, in real time.
     **changes
         Fields of the task that are to be others.
     """
@@ -212,6 +226,7 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         self._all = np.ones(num_envs, dtype=np.bool_)
         self._masks = [f"_{name}" for name in (*course.names, "contact_force", "certificate")]
         self._cameras: list[Camera] = []
+        self._screen = _screen(self.render_mode, course)
         self._state = "new"
 
     def __reduce__(self) -> Any:
@@ -251,6 +266,8 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
             for place, name in enumerate(self._lanes.names[:AT_RESET])
         }
         info |= {f"_{name}": mask.copy() for name in self._lanes.names[:AT_RESET]}
+        if self._screen is not None and mask[0]:
+            self._screen.show()
         return self._lanes.observation.copy(), info
 
     def check_begun(self) -> None:
@@ -301,12 +318,17 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         self._over, self._waiting = ended, ended.nonzero()[0]
         if self._waiting.size:
             self._tell_ends(ended, terminated, info)
+        if self._screen is not None:
+            self._screen.show()
         return lanes.observation.copy(), reward, terminated, truncated, info
 
     def render(self) -> tuple[Array, ...] | None:
-        """Return pictures of all lanes, if that is the mode."""
+        """Return pictures of all lanes, if that is the mode.
+
+        In the browser each step is shown without it.
+        """
         _check_begun(self._state)
-        if self.render_mode is None:
+        if self.render_mode != "rgb_array":
             return None
         lanes = self._lanes
         while len(self._cameras) < self.num_envs:
@@ -320,6 +342,8 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         """Let everything go."""
         self._state = "closed"
         self._lanes.batch.close()
+        if self._screen is not None:
+            self._screen.close()
 
     def _begin(self, chosen: Integers) -> None:
         self._lanes.begin(chosen)
@@ -331,16 +355,23 @@ class TaskVectorEnv(VectorEnv[Floats, Array, Array]):
         if seed is None:
             return
         if isinstance(seed, int | np.integer):
-            seeds: list[int | None] = [int(seed) + lane for lane in range(self.num_envs)]
+            seeds: list[Any] = [int(seed) + lane for lane in range(self.num_envs)]
         else:
-            seeds = list(seed)
-        if len(seeds) != self.num_envs:
-            raise error.Error(
-                f"give one number, or {self.num_envs} seeds, one a lane; got {len(seeds)}"
-            )
-        for lane, each in enumerate(seeds):
-            if each is not None:
-                self._lanes.seed(lane, seeding.np_random(each)[0])
+            try:
+                seeds = np.asarray(seed, dtype=object).tolist()
+                count = len(seeds)
+            except (TypeError, ValueError):  # one of them, or several that are several themselves
+                raise error.Error(
+                    f"a seed is a whole number ≥ 0, or None; give one, or one a lane, got {seed!r}"
+                ) from None
+            if count != self.num_envs:
+                raise error.Error(
+                    f"give one number, or {self.num_envs} seeds, one a lane; got {count}"
+                )
+        randoms = [None if each is None else seeding.np_random(each)[0] for each in seeds]
+        for lane, random in enumerate(randoms):
+            if random is not None:
+                self._lanes.seed(lane, random)
 
     def _mask(self, options: Info | None) -> Array:
         mask = None if options is None else options.get("reset_mask")
@@ -402,13 +433,22 @@ def _course(task: str, lanes: int, changes: Info, threads: int = 1) -> Course:
 
 def _metadata(course: Course) -> Info:
     fps = round(1.0 / course.task.decision_period)
-    return {"render_modes": ["rgb_array"], "render_fps": fps}
+    return {"render_modes": [*MODES], "render_fps": fps}
 
 
 def _checked_mode(mode: str | None, metadata: Info) -> str | None:
     if mode is not None and mode not in metadata["render_modes"]:
         raise ValueError(f"render_mode is one of {metadata['render_modes']} or None, got {mode!r}")
     return mode
+
+
+def _screen(mode: str | None, course: Course) -> Screen | None:
+    if mode != "human":
+        return None
+    try:
+        return Screen(course)
+    except ViewError as missing:
+        raise error.DependencyNotInstalled(str(missing)) from None
 
 
 def _check_open(state: str) -> None:

@@ -1,8 +1,8 @@
-"""Pictures of a robot on its ground, as arrays."""
+"""Pictures of a robot on its ground, as arrays, and in the browser."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -15,6 +15,9 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.view.drawing import body, extent
 from heelstrike.view.style import styled
+
+if TYPE_CHECKING:
+    from heelstrike.experiments.learning.course import Course
 
 DPI = 100
 MARGIN = 1.3
@@ -75,3 +78,48 @@ class Camera:
     def _segments(self, state: State) -> NDArray[np.float64]:
         poses = link_poses(self._robot, state.q)
         return self._body.segments(poses.origin, poses.angle)
+
+
+class Screen:
+    """Shows the first lane of a course in the browser, in real time.
+
+    Parameters
+    ----------
+    course : Course
+        The lanes.
+
+    Raises
+    ------
+    ViewError
+        If the package that serves the page is not installed.
+    """
+
+    def __init__(self, course: Course) -> None:
+        from heelstrike.view.live.display import Display  # with it come servers and browsers
+
+        self._course, self._time = course, np.inf
+        self._display = Display(course.robot)
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return self._display.url
+
+    def show(self) -> None:
+        """Show the lane as it is now, when its time has come."""
+        batch = self._course.batch
+        time = float(batch.time[0])
+        if time == 0.0 or time < self._time:  # another episode
+            self._display.begin(batch.lane(0).ground, str(batch.method))
+        self._time = time
+        residual = max(
+            batch.complementarity.item(0), batch.cone.item(0), batch.non_penetration.item(0)
+        )
+        self._display.show(
+            time, self._course.state_of(0), force=batch.contact_force[0], torque=batch.torque[0],
+            residual=residual,
+        )  # fmt: skip
+
+    def close(self) -> None:
+        """End the view."""
+        self._display.close()

@@ -11,7 +11,7 @@ import webbrowser
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
@@ -35,6 +35,19 @@ HEIGHT = 640
 """Pixels of the view in a notebook."""
 
 
+class Watched(Protocol):
+    """What is watched."""
+
+    def start(self) -> None:
+        """Begin."""
+
+    def close(self) -> None:
+        """End, soon."""
+
+    def join(self, timeout: float) -> None:
+        """Wait until it has ended, at most so long (s)."""
+
+
 class Viewer:
     """A live view in the browser, until it is closed.
 
@@ -43,7 +56,7 @@ class Viewer:
 
     Parameters
     ----------
-    session : Session
+    session : Session or Display
         What is watched.
     server : Server
         Who serves it.
@@ -56,7 +69,7 @@ class Viewer:
         Where the server listens, on 127.0.0.1.
     """
 
-    def __init__(self, session: Session, server: Server) -> None:
+    def __init__(self, session: Watched, server: Server) -> None:
         self._session, self._server = session, server
         self._closed = threading.Event()
         self._way: tempfile.TemporaryDirectory[str] | None = None
