@@ -232,10 +232,14 @@ class Motion(ShownInNotebooks):
             That names both.
         """
         if self.fingerprint != fingerprint(robot):
+            other = (
+                f"not for robot {robot.name!r}"
+                if robot.name != self.robot
+                else "whose masses, lengths or other numbers were different from now"
+            )
             raise GaitError(
-                f"this motion was designed for {self.robot!r} when its masses, lengths or other "
-                f"numbers were different from those of {robot.name!r} now. Load the robot that it "
-                "was designed for, or design a new motion."
+                f"this motion was designed for robot {self.robot!r}, {other}. Load the robot that "
+                "it was designed for, or design a new motion."
             )
 
     @takes(GaitError)
