@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import shutil
 import sys
 import time
@@ -25,6 +24,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import machine
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -113,7 +113,7 @@ def train_leg(world: str, seed: int, leg: int, folder: Path) -> None:
     model.learn(LEG, episodes, reset_num_timesteps=leg == 0)
     told = {
         "steps": model.num_timesteps, "processor": time.process_time() - processor,
-        "clock": time.perf_counter() - clock, "load": os.getloadavg()[0],
+        "clock": time.perf_counter() - clock, "load": machine.load(),
         "episodes": episodes.rows,
     }  # fmt: skip
     begun = folder / f"{leg}.begun"

@@ -17,6 +17,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+import machine
 import numpy as np
 
 import heelstrike as hs
@@ -94,7 +95,7 @@ def main() -> None:
         "HoldBalance": (hs.HoldBalance(robot, posture=q), 2e-3),
         "HoldPosture": (hs.HoldPosture(robot, posture=q, kp=kp, kd=kd), None),
     }
-    print(f"{robot!r}; load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    print(f"{robot!r}; load {machine.load():.1f} on {os.cpu_count()} cores")
     for name, side in SIDES.items():
         told = ", ".join(
             f"{law} {largest(robot, made, q, link, side, period):.1f} N s"

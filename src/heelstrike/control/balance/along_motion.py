@@ -23,7 +23,7 @@ from heelstrike.compiler.bundle import array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance import shifted_feet
 from heelstrike.control.balance.shifted_feet import moved_footholds, shift_feet
-from heelstrike.control.balance.tasks import MOTOR_LEVEL, clear, torque_range
+from heelstrike.control.balance.tasks import MOTOR_LEVEL, torque_range
 from heelstrike.control.followed_motion import place_in_phase
 from heelstrike.control.motion_tracking import (
     PRICE_OF_FORCES,
@@ -33,6 +33,7 @@ from heelstrike.control.motion_tracking import (
 )
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import SOLVED, Program
+from heelstrike.control.quadratic.tasks import clear
 from heelstrike.gait.motion.motion import Motion
 from heelstrike.gait.polynomials import motion_in_piece
 from heelstrike.robot.model import Floats, Integers
