@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -58,3 +59,16 @@ def test_what_is_no_optimum_gives_way_and_never_replaces() -> None:
     gaits[2,] = Fake(2, 1, optimal=False)
     assert spread(gaits)[0] == [0, 0, 0, 0, 0, 0, 1, 1, 1, 1]
     assert all(gait.optimal for gait in gaits.values())
+
+
+def test_a_gait_of_unknown_cost_gives_way() -> None:
+    """As in files from before what was spent is known."""
+    gaits = family(1, 0, 0, 0, 0)
+    unknown = SimpleNamespace(**vars(gaits[0,]), spent=None, position=gaits[0,].position)
+    gaits[0,] = unknown  # type: ignore[assignment]
+    on_the_cheaper_branch(
+        gaits,  # type: ignore[arg-type]
+        lambda place, near: Fake(place[0], near.branch),  # type: ignore
+        lambda: None,
+    )
+    assert gaits[0,].branch == 0

@@ -7,6 +7,7 @@ again from the other, and the cheaper branch spreads as far as it is cheaper.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from itertools import combinations
 
@@ -58,12 +59,17 @@ def on_the_cheaper_branch(
             found = sought(place, gaits[other])
             if found is None or not found.optimal:
                 continue
-            if gaits[place].optimal and found.spent > (1.0 - CHEAPER) * gaits[place].spent:
+            if gaits[place].optimal and spending(found) > (1.0 - CHEAPER) * spending(gaits[place]):
                 continue
             gaits[place], postures[place] = found, _postures(found)
             waiting += [each for each in _neighbours(postures) if place in each and each != pair]
             changed()
             break
+
+
+def spending(gait: Gait) -> float:
+    """What a gait spends, to be compared; without limit where it is not known."""
+    return math.inf if gait.spent is None else gait.spent
 
 
 def _postures(gait: Gait) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 from heelstrike.arguments import takes
 from heelstrike.errors import GaitError, InfeasibleGaitError, WriteError
 from heelstrike.field_texts import dataclass
-from heelstrike.gait.branches import Place, on_the_cheaper_branch
+from heelstrike.gait.branches import Place, on_the_cheaper_branch, spending
 from heelstrike.gait.file import LARGEST_NUMBER, check_robot, entries_of, gait_of
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.optimize import optimize_gait, request_of
@@ -89,7 +89,7 @@ class GaitFamily:
         around = self._weights(values, 4)
         if len(around) > len(corners) and all(place in self.gaits for place, _ in around):
             mixtures.append([(self.gaits[place], weight) for place, weight in around])
-        return min((between(request, each) for each in mixtures), key=lambda gait: gait.spent)
+        return min((between(request, each) for each in mixtures), key=spending)
 
     def _weights(self, values: Mapping[str, float], width: int) -> list[tuple[Place, float]]:
         """Places about a point, so many along each axis, with Lagrange's weights but for zeros."""
