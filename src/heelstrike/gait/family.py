@@ -62,8 +62,9 @@ class GaitFamily:
         The motion is interpolated, linearly between the gaits at the corners of the cell and by
         polynomials of third degree through those around it, then changed as little as makes it
         satisfy all equations of a step: the foot lands in its place, and the velocities after the
-        impact are those with which the step began. The cheaper one of the two is returned. Limits
-        between the gaits are not enforced; `gait.margins` tells how far they are.
+        impact are those with which the step began. The linear one is returned, unless the other is
+        cheaper and breaks no limit more than it. Limits between the gaits are not enforced;
+        `gait.margins` tells how far they are.
 
         Parameters
         ----------
@@ -85,11 +86,16 @@ class GaitFamily:
             return corners[0][0]
         from heelstrike.gait.design import between
 
-        request, mixtures = request_of(self.robot, **self.asked, **values), [corners]
-        around = self._weights(values, 4)
-        if len(around) > len(corners) and all(place in self.gaits for place, _ in around):
-            mixtures.append([(self.gaits[place], weight) for place, weight in around])
-        return min((between(request, each) for each in mixtures), key=spending)
+        request = request_of(self.robot, **self.asked, **values)
+        linear, around = between(request, corners), self._weights(values, 4)
+        if len(around) <= len(corners) or any(place not in self.gaits for place, _ in around):
+            return linear
+        try:
+            cubic = between(request, [(self.gaits[place], weight) for place, weight in around])
+        except GaitError:  # it swings too far for a gait
+            return linear
+        cheaper = spending(cubic) < spending(linear)
+        return cubic if cheaper and cubic.margins.breaks_no_more_than(linear.margins) else linear
 
     def _weights(self, values: Mapping[str, float], width: int) -> list[tuple[Place, float]]:
         """Places about a point, so many along each axis, with Lagrange's weights but for zeros."""
