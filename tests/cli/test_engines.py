@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from heelstrike.cli.main import app
 from heelstrike.experiments import engine_comparison
 from heelstrike.experiments.engine_comparison import PushTable, search
+from heelstrike.experiments.engines import InvalidRunError
 
 
 @pytest.fixture
@@ -97,6 +98,25 @@ def test_a_search_walks_the_steps_that_are_asked_for(
     assert result.exit_code == 0, result.stderr
     assert walked == [2]
     assert json.loads(result.stdout)["mujoco"]["settings"] == {"stiff": 2.0}
+
+
+def test_a_search_tells_one_document_of_all_engines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def search_settings(name: str, *_: Any) -> search.Found:
+        if name == "bullet":
+            raise InvalidRunError("it walks at no setting")
+        return search.Found({"stiff": 2.0}, 1e-3, 2e-3, 3, "4.0.0", "2026-11-27", "heelstrike")
+
+    monkeypatch.setattr(search, "search_settings", search_settings)
+    result = invoke(tmp_path, "--engines", "mujoco,bullet,ode", "--search", "--json")
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert list(told) == ["mujoco", "bullet", "ode"]
+    assert told["ode"]["settings"] == {"stiff": 2.0}
+    assert told["bullet"] == {"reason": "it walks at no setting"}
+    kept = json.loads((tmp_path / "out" / "best_settings.json").read_text())
+    assert set(kept) == {"mujoco", "ode"}
 
 
 def test_a_search_refuses_what_it_has_no_use_for(tmp_path: Path) -> None:

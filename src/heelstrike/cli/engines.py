@@ -305,6 +305,7 @@ def _search(
     out.mkdir(parents=True, exist_ok=True)
     found = json.loads(file.read_text()) if file.exists() else {}
     names = asked.engines.split(",")
+    told: dict[str, object] = {}
     for name, entry in entries_called(names).items():
         with stage(f"searching for the best settings of {entry.title}") as show:
             try:
@@ -313,10 +314,11 @@ def _search(
                 )
             except InvalidRunError as error:
                 tell(f"{entry.title}: {error}")
+                told[name] = {"reason": str(error)}
                 continue
-        found[name] = asdict(best)
+        told[name] = found[name] = asdict(best)
         write_whole(file, json.dumps(found, indent=2) + "\n")
-        if as_json:
-            typer.echo(json.dumps({name: found[name]}))
         tell(f"{entry.title}: {dict(best.settings) or 'the defaults'}, {best.error:.2g}")
+    if as_json:
+        typer.echo(json.dumps(told, indent=2, ensure_ascii=False))
     wrote(file)
