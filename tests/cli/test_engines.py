@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
 from heelstrike.experiments import engine_comparison
-from heelstrike.experiments.engine_comparison import PushTable, search
+from heelstrike.experiments.engine_comparison import CompassTable, PushTable, SceneTable, search
 from heelstrike.experiments.engines import InvalidRunError
 
 
@@ -82,6 +82,30 @@ def test_files_of_other_comparisons_are_not_written_over(
         "engines-ComputedTorque-every-1-ms-quick.json",
         "pushes-ComputedTorque-every-1-ms-quick.json",
     }  # fmt: skip
+
+
+def test_a_quick_comparison_leaves_scenes_and_figures_of_full_ones(
+    tmp_path: Path, asked: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenes = [SceneTable((), "defaults", step, ()) for step in (1e-3, 2e-3)]
+    passive = CompassTable(3, "defaults", ())
+    monkeypatch.setattr(engine_comparison, "compare_scenes", lambda **_: scenes.pop())
+    monkeypatch.setattr(engine_comparison, "compare_compass", lambda **_: passive)
+    out = tmp_path / "out"
+    assert invoke(tmp_path, "--engines", "ode", "--scenes").exit_code == 0
+    full = {file.name: file.read_bytes() for file in out.iterdir() if file.is_file()}
+    assert {"scenes.json", "engines.png"} <= set(full)
+    quick = invoke(tmp_path, "--engines", "ode", "--scenes", "--quick")
+    assert quick.exit_code == 0, quick.stderr
+    assert "scenes-quick.json" in quick.stderr
+    written = {file.name for file in out.iterdir() if file.is_file()}
+    assert written - set(full) == {
+        "engines-ComputedTorque-quick.json", "engines-quick.png", "scenes-quick.json"
+    }  # fmt: skip
+    assert all((out / name).read_bytes() == data for name, data in full.items())
+    refused = invoke(tmp_path, "--engines", "ode", "--quick", "--page", str(tmp_path / "page.md"))
+    assert refused.exit_code == 2
+    assert "quick comparisons are left out of pages" in " ".join(refused.output.split())
 
 
 def test_a_search_walks_the_steps_that_are_asked_for(
