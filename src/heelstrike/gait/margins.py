@@ -54,6 +54,11 @@ class Margins:
         ----------
         other : Margins
             Those of the other gait.
+
+        Returns
+        -------
+        bool
+            Whether it is so.
         """
         pairs = zip(self._left(), other._left(), strict=True)
         return all(own >= min(of_other, 0.0) - ALIKE for own, of_other in pairs)
