@@ -162,10 +162,19 @@ def read_tosses(folder: Path) -> list[Toss]:
         If there is none, or one is no toss.
     """
     found = []
-    for path in sorted(folder.glob("*.pt"), key=lambda each: int(each.stem)):
+    files = list(folder.glob("*.pt"))
+    for path in files:
+        if not (path.stem.isascii() and path.stem.isdecimal()):
+            raise RefusedError(f"{path} is no NUMBER.pt")
+    for path in sorted(files, key=lambda each: int(each.stem)):
         rows = read_matrix(path)
-        if rows.shape[1] != COLUMNS or not np.all(np.isfinite(rows)) or len(rows) < 2:
+        if rows.shape[1] != COLUMNS:
             raise RefusedError(f"{path} has rows of {rows.shape[1]} numbers, not of {COLUMNS}")
+        if len(rows) < 2:
+            raise RefusedError(f"{path} has fewer than two samples")
+        if not np.all(np.isfinite(rows)):
+            row = int(np.argmin(np.isfinite(rows).all(axis=1)))
+            raise RefusedError(f"{path}: a number of sample {row + 1} is not finite")
         found.append(
             Toss(int(path.stem), HALF_WIDTH * rows[:, :3], rows[:, 3:7], HALF_WIDTH * rows[:, 7:10],
                  rows[:, 10:13])

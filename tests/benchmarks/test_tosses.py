@@ -67,6 +67,23 @@ def test_what_is_no_tensor_is_refused_and_not_run(spoilt: bytes, told: str, tmp_
         read_matrix(path)
 
 
+def test_each_reason_to_refuse_a_toss_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "0.pt"
+    missing = rows_of()
+    missing[2, 5] = np.nan
+    for rows, told in (
+        (rows_of()[:, :18], "has rows of 18 numbers, not of 19"),
+        (rows_of(1), "has fewer than two samples"),
+        (missing, "a number of sample 3 is not finite"),
+    ):
+        path.write_bytes(tensor_file(rows))
+        with pytest.raises(RefusedError, match=told):
+            read_tosses(tmp_path)
+    path.rename(tmp_path / "first.pt")
+    with pytest.raises(RefusedError, match=r"first\.pt is no NUMBER\.pt"):
+        read_tosses(tmp_path)
+
+
 def toss_of(position: np.ndarray) -> Toss:
     still = np.zeros_like(position)
     return Toss(0, position, np.tile([1.0, 0.0, 0.0, 0.0], (len(position), 1)), still, still)

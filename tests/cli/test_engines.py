@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
 from heelstrike.experiments import engine_comparison
-from heelstrike.experiments.engine_comparison import PushTable, search
+from heelstrike.experiments.engine_comparison import CompassTable, PushTable, SceneTable, search
+from heelstrike.experiments.engines import InvalidRunError
 
 
 @pytest.fixture
@@ -83,6 +84,30 @@ def test_files_of_other_comparisons_are_not_written_over(
     }  # fmt: skip
 
 
+def test_a_quick_comparison_leaves_scenes_and_figures_of_full_ones(
+    tmp_path: Path, asked: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenes = [SceneTable((), "defaults", step, ()) for step in (1e-3, 2e-3)]
+    passive = CompassTable(3, "defaults", ())
+    monkeypatch.setattr(engine_comparison, "compare_scenes", lambda **_: scenes.pop())
+    monkeypatch.setattr(engine_comparison, "compare_compass", lambda **_: passive)
+    out = tmp_path / "out"
+    assert invoke(tmp_path, "--engines", "ode", "--scenes").exit_code == 0
+    full = {file.name: file.read_bytes() for file in out.iterdir() if file.is_file()}
+    assert {"scenes.json", "engines.png"} <= set(full)
+    quick = invoke(tmp_path, "--engines", "ode", "--scenes", "--quick")
+    assert quick.exit_code == 0, quick.stderr
+    assert "scenes-quick.json" in quick.stderr
+    written = {file.name for file in out.iterdir() if file.is_file()}
+    assert written - set(full) == {
+        "engines-ComputedTorque-quick.json", "engines-quick.png", "scenes-quick.json"
+    }  # fmt: skip
+    assert all((out / name).read_bytes() == data for name, data in full.items())
+    refused = invoke(tmp_path, "--engines", "ode", "--quick", "--page", str(tmp_path / "page.md"))
+    assert refused.exit_code == 2
+    assert "quick comparisons are left out of pages" in " ".join(refused.output.split())
+
+
 def test_a_search_walks_the_steps_that_are_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -97,6 +122,25 @@ def test_a_search_walks_the_steps_that_are_asked_for(
     assert result.exit_code == 0, result.stderr
     assert walked == [2]
     assert json.loads(result.stdout)["mujoco"]["settings"] == {"stiff": 2.0}
+
+
+def test_a_search_tells_one_document_of_all_engines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def search_settings(name: str, *_: Any) -> search.Found:
+        if name == "bullet":
+            raise InvalidRunError("it walks at no setting")
+        return search.Found({"stiff": 2.0}, 1e-3, 2e-3, 3, "4.0.0", "2026-11-27", "heelstrike")
+
+    monkeypatch.setattr(search, "search_settings", search_settings)
+    result = invoke(tmp_path, "--engines", "mujoco,bullet,ode", "--search", "--json")
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert list(told) == ["mujoco", "bullet", "ode"]
+    assert told["ode"]["settings"] == {"stiff": 2.0}
+    assert told["bullet"] == {"reason": "it walks at no setting"}
+    kept = json.loads((tmp_path / "out" / "best_settings.json").read_text())
+    assert set(kept) == {"mujoco", "ode"}
 
 
 def test_a_search_refuses_what_it_has_no_use_for(tmp_path: Path) -> None:

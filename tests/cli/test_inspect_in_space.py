@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
@@ -30,3 +31,16 @@ def test_words_data_and_a_picture(tmp_path: Path) -> None:
     refused = CliRunner().invoke(app, pushed)
     assert refused.exit_code != 0
     assert not picture.exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--ground", "slope:3"), ("--push", "trunk:50:1:0.1")]
+)
+def test_a_refusal_names_the_option(tmp_path: Path, option: str, value: str) -> None:
+    path = tmp_path / "one.xml"
+    path.write_text(ROBOT, encoding="utf-8")
+    refused = CliRunner().invoke(app, ["inspect", str(path), option, value])
+    assert refused.exit_code == 2
+    said = " ".join(refused.output.split())
+    assert option in said
+    assert "--out" not in said

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+import json
+from functools import wraps
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +12,9 @@ import pytest
 
 import heelstrike as hs
 from heelstrike.errors import GaitError
+from heelstrike.gait import branches
+
+families = importlib.import_module("heelstrike.gait.family")
 
 pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
 
@@ -72,6 +78,29 @@ def test_what_was_interrupted_goes_on(bravo7: hs.Robot, tmp_path: Path) -> None:
     np.testing.assert_array_equal(first.pieces, kept.pieces)
     with pytest.raises(GaitError, match="holds a family with other axes"):
         hs.gait_family(bravo7, speed=[0.40, 0.46], **ASKED, file=file)
+
+
+def test_a_finished_family_is_only_read(
+    bravo7: hs.Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neighbours that differ much are not sought again; a file that does not know of them is."""
+    file = tmp_path / "family.json"
+    told: list[float] = []
+    monkeypatch.setattr(branches, "APART", 0.0)  # all neighbours
+    hs.gait_family(bravo7, speed=SPEEDS, **ASKED, file=file, progress=told.append)
+    assert told == [0.0, 0.35, 0.7, 1.0, 1.0]
+    assert hs.load_gait_family(file, bravo7).settled == {((0,), (1,))}
+    written = file.read_bytes()
+    with monkeypatch.context() as patch:
+        never = wraps(families.optimize_gait)(lambda *_, **__: pytest.fail("designed again"))
+        patch.setattr(families, "optimize_gait", never)
+        again = hs.gait_family(bravo7, speed=SPEEDS, **ASKED, file=file)
+    assert len(again.gaits) == 2
+    assert file.read_bytes() == written
+    older = json.loads(written)
+    del older["settled"], older["sha256"]
+    file.write_text(json.dumps(older), encoding="utf-8")
+    assert not hs.load_gait_family(file, bravo7).settled
 
 
 def test_gaps_are_named(bravo7: hs.Robot) -> None:

@@ -76,6 +76,11 @@ class InEngines:
         bool, typer.Option("--quick", help="For engines: only four steps at 1 ms, and few pushes.")
     ] = False
 
+    @property
+    def suffix(self) -> str:
+        """What ends the names of files of quick comparisons, which others are not lost to."""
+        return "-quick" if self.quick else ""
+
     def refuse_without_engines(self) -> None:
         """Refuse options of engines where none is asked for."""
         if given := self._given("engines"):
@@ -118,6 +123,10 @@ def compare_in_engines(
         asked.refuse_beside_search()
         _search(case, start, asked, steps, out, as_json=as_json)
         return
+    if asked.quick and asked.page is not None:
+        raise SimulationError(
+            "--page: quick comparisons are left out of pages. Leave out, or leave --quick out"
+        )
     sizes: tuple[float, ...] = QUICK_SIZES if asked.quick else STEP_SIZES
     if asked.sizes is not None:
         sizes = tuple(numbers_called(asked.sizes, "--sizes"))
@@ -145,11 +154,12 @@ def compare_in_engines(
         typer.echo(text)
     else:
         output().print(comparison)
-    save_figure(comparison.plot(), out / "engines.png")
-    tell(f"in {out}: engines-{law}.json, engines.png")
+    figure = out / f"engines{asked.suffix}.png"
+    save_figure(comparison.plot(), figure)
+    tell(f"in {out}: engines-{law}.json, {figure.name}")
     table = _scenes(case, asked, out, as_json=as_json) if asked.scenes else None
     if table is not None:
-        save_figure(comparison.plot(table), out / "engines.png")
+        save_figure(comparison.plot(table), figure)
     if asked.pushes:
         _pushes(case, start, asked, out, as_json=as_json)
     if asked.page is not None:
@@ -168,7 +178,7 @@ def _named(start: Beginning, asked: InEngines, sizes: Sequence[float] = ()) -> s
         name += f"-every-{1e3 * asked.period:g}-ms"
     if asked.sizes is not None and sizes and tuple(sizes) != STEP_SIZES:
         name += f"-at-{'-'.join(f'{1e3 * size:g}' for size in sizes)}-ms"
-    return f"{name}-quick" if asked.quick else name
+    return name + asked.suffix
 
 
 def _scenes(case: Case, asked: InEngines, out: Path, *, as_json: bool) -> SceneTable:
@@ -206,11 +216,12 @@ def _scenes(case: Case, asked: InEngines, out: Path, *, as_json: bool) -> SceneT
                 guards[name] = asdict(found) | {"holds": found.holds}
     told = {**table.to_dict(), "guards": guards, "compass": passive.to_dict()}
     text = json.dumps(told, indent=2, ensure_ascii=False)
-    wrote(write_whole(out / "scenes.json", text + "\n"))
+    name = f"scenes{asked.suffix}.json"
+    wrote(write_whole(out / name, text + "\n"))
     if not as_json:
         output().print(table)
         output().print(passive)
-    tell(f"in {out}: scenes.json")
+    tell(f"in {out}: {name}")
     return table
 
 
@@ -305,6 +316,7 @@ def _search(
     out.mkdir(parents=True, exist_ok=True)
     found = json.loads(file.read_text()) if file.exists() else {}
     names = asked.engines.split(",")
+    told: dict[str, object] = {}
     for name, entry in entries_called(names).items():
         with stage(f"searching for the best settings of {entry.title}") as show:
             try:
@@ -313,10 +325,11 @@ def _search(
                 )
             except InvalidRunError as error:
                 tell(f"{entry.title}: {error}")
+                told[name] = {"reason": str(error)}
                 continue
-        found[name] = asdict(best)
+        told[name] = found[name] = asdict(best)
         write_whole(file, json.dumps(found, indent=2) + "\n")
-        if as_json:
-            typer.echo(json.dumps({name: found[name]}))
         tell(f"{entry.title}: {dict(best.settings) or 'the defaults'}, {best.error:.2g}")
+    if as_json:
+        typer.echo(json.dumps(told, indent=2, ensure_ascii=False))
     wrote(file)

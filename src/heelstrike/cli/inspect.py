@@ -55,10 +55,6 @@ def inspect(
 
     surface = None if ground == "flat" else ground_called(ground)
     pushes = pushes_called(push)
-    if picture is None and (surface is not None or pushes):
-        raise typer.BadParameter(
-            "ground and pushes need a picture: give its file", param_hint="--out"
-        )
     if dimension == SPACE:
         if surface is not None or pushes:
             raise typer.BadParameter(
@@ -110,7 +106,11 @@ def look_at(
         raise typer.BadParameter(
             f"{robot.name} is a robot in space; ground and pushes are drawn for planar robots "
             "only: leave them out, or use --projected",
-            param_hint="--out",
+            param_hint="--push" if ground is None else "--ground",
+        )
+    if picture is None and (ground is not None or pushes):
+        raise typer.BadParameter(
+            "ground and pushes need a picture: give its file", param_hint="--out"
         )
     if robot is not None:
         for push in pushes:

@@ -7,6 +7,7 @@ again from the other, and the cheaper branch spreads as far as it is cheaper.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from itertools import combinations
 
@@ -17,6 +18,9 @@ from heelstrike.robot.model import Floats
 
 Place = tuple[int, ...]
 """Indices of a point of the grid, an axis each."""
+
+Pair = tuple[Place, Place]
+"""Neighbours, the one first whose indices come first."""
 
 APART = 3.0
 """Neighbours of another branch differ at least so many times as much as neighbours usually do."""
@@ -29,7 +33,8 @@ POSTURES = 21
 def on_the_cheaper_branch(
     gaits: dict[Place, Gait],
     sought: Callable[[Place, Gait], Gait | None],
-    changed: Callable[[], None],
+    settled: set[Pair],
+    told: Callable[[float], None],
 ) -> None:
     """Let the cheaper one of two branches spread over a family.
 
@@ -39,8 +44,11 @@ def on_the_cheaper_branch(
         The gaits by their place in the grid; better ones take their place.
     sought : callable
         Seeks the gait of a place from another; None if there is none.
-    changed : callable
-        Called after a gait has been replaced.
+    settled : set of pair
+        Neighbours between which nothing is left to seek, which grows to all of them.
+    told : callable
+        Called with the share of the work that is done after each pair of neighbours has been
+        settled, and in the beginning; never if there is nothing to do.
     """
     postures = {place: _postures(gait) for place, gait in gaits.items()}
     usual = _usual(postures)
@@ -49,21 +57,39 @@ def on_the_cheaper_branch(
         limit = APART * usual[_axis(one, other)]
         return _distance(postures[one], postures[other]) > limit
 
-    waiting = [pair for pair in _neighbours(postures) if apart(*pair)]
+    new = [pair for pair in _neighbours(postures) if pair not in settled]
+    if not new:
+        return
+    waiting = [pair for pair in new if apart(*pair)]
+    settled.update(set(new).difference(waiting))
+    done, share = 0, 0.0
     while waiting:
+        share = max(share, done / (done + len(waiting)))
+        told(share)
         pair = waiting.pop()
+        done += 1
+        if pair in settled:
+            continue
+        settled.add(pair)
         if not apart(*pair):
             continue
         for place, other in (pair, pair[::-1]):
             found = sought(place, gaits[other])
             if found is None or not found.optimal:
                 continue
-            if gaits[place].optimal and found.spent > (1.0 - CHEAPER) * gaits[place].spent:
+            if gaits[place].optimal and spending(found) > (1.0 - CHEAPER) * spending(gaits[place]):
                 continue
             gaits[place], postures[place] = found, _postures(found)
-            waiting += [each for each in _neighbours(postures) if place in each and each != pair]
-            changed()
+            again = [each for each in _neighbours(postures) if place in each and each != pair]
+            settled.difference_update(again)
+            waiting += again
             break
+    told(1.0)
+
+
+def spending(gait: Gait) -> float:
+    """What a gait spends, to be compared; without limit where it is not known."""
+    return math.inf if gait.spent is None else gait.spent
 
 
 def _postures(gait: Gait) -> Floats:
@@ -81,7 +107,7 @@ def _axis(one: Place, other: Place) -> int:
     return next(k for k, (i, j) in enumerate(zip(one, other, strict=True)) if i != j)
 
 
-def _neighbours(places: Mapping[Place, Floats]) -> list[tuple[Place, Place]]:
+def _neighbours(places: Mapping[Place, Floats]) -> list[Pair]:
     """Pairs of places that differ by one along one axis."""
     return [
         (one, other)

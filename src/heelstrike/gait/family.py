@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from itertools import product
 from os import PathLike
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 from heelstrike.arguments import takes
 from heelstrike.errors import GaitError, InfeasibleGaitError, WriteError
 from heelstrike.field_texts import dataclass
-from heelstrike.gait.branches import Place, on_the_cheaper_branch
+from heelstrike.gait.branches import Pair, Place, on_the_cheaper_branch, spending
 from heelstrike.gait.file import LARGEST_NUMBER, check_robot, entries_of, gait_of
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.optimize import optimize_gait, request_of
@@ -51,6 +52,8 @@ class GaitFamily:
     """The gaits by their place in the grid."""
     gaps: Mapping[Place, str]
     """Why there is none, where there is none."""
+    settled: AbstractSet[Pair] = frozenset()
+    """Neighbours of which none leads to a cheaper gait of the other."""
 
     def __getitem__(self, place: int | Place) -> Gait | None:
         where = place if isinstance(place, tuple) else (place,)
@@ -62,8 +65,9 @@ class GaitFamily:
         The motion is interpolated, linearly between the gaits at the corners of the cell and by
         polynomials of third degree through those around it, then changed as little as makes it
         satisfy all equations of a step: the foot lands in its place, and the velocities after the
-        impact are those with which the step began. The cheaper one of the two is returned. Limits
-        between the gaits are not enforced; `gait.margins` tells how far they are.
+        impact are those with which the step began. The linear one is returned, unless the other is
+        cheaper and breaks no limit more than it. Limits between the gaits are not enforced;
+        `gait.margins` tells how far they are.
 
         Parameters
         ----------
@@ -85,11 +89,16 @@ class GaitFamily:
             return corners[0][0]
         from heelstrike.gait.design import between
 
-        request, mixtures = request_of(self.robot, **self.asked, **values), [corners]
-        around = self._weights(values, 4)
-        if len(around) > len(corners) and all(place in self.gaits for place, _ in around):
-            mixtures.append([(self.gaits[place], weight) for place, weight in around])
-        return min((between(request, each) for each in mixtures), key=lambda gait: gait.spent)
+        request = request_of(self.robot, **self.asked, **values)
+        linear, around = between(request, corners), self._weights(values, 4)
+        if len(around) <= len(corners) or any(place not in self.gaits for place, _ in around):
+            return linear
+        try:
+            cubic = between(request, [(self.gaits[place], weight) for place, weight in around])
+        except GaitError:  # it swings too far for a gait
+            return linear
+        cheaper = spending(cubic) < spending(linear)
+        return cubic if cheaper and cubic.margins.breaks_no_more_than(linear.margins) else linear
 
     def _weights(self, values: Mapping[str, float], width: int) -> list[tuple[Place, float]]:
         """Places about a point, so many along each axis, with Lagrange's weights but for zeros."""
@@ -153,6 +162,7 @@ class GaitFamily:
                 {"place": list(place), **entries_of(gait)} for place, gait in self.gaits.items()
             ],
             "gaps": [{"place": list(place), "why": why} for place, why in self.gaps.items()],
+            "settled": [{"place": one, "next": other} for one, other in sorted(self.settled)],
         }
         try:
             write_whole(path, json_text("gait family", VERSION, entries))
@@ -186,7 +196,7 @@ def gait_family(
         As of :func:`heelstrike.optimize_gait`; a sequence is an axis.
     file : path, optional
         Where the family is saved after every gait. If the file exists, the call resumes the family
-        in it, as after Ctrl-C.
+        in it, as after Ctrl-C; a finished one is only read.
     progress : callable, optional
         Called now and then with the fraction of the work that is done.
     **asked
@@ -226,9 +236,14 @@ def gait_family(
     fixed = {name: value for name, value in given.items() if np.ndim(value) == 0 and value}
     gaits: dict[Place, Gait] = {}
     gaps: dict[Place, str] = {}
-    family = GaitFamily(robot, axes, {**asked, **fixed}, gaits, gaps)
+    settled: set[Pair] = set()
+    family = GaitFamily(robot, axes, {**asked, **fixed}, gaits, gaps, settled)
     if file is not None and Path(file).exists():
-        _go_on(family, load_gait_family(file, robot), gaits, gaps)
+        saved = load_gait_family(file, robot)
+        _check_same(family, saved)
+        gaits.update(saved.gaits)
+        gaps.update(saved.gaps)
+        settled.update(saved.settled)
 
     def designed(place: Place, near: Gait | None) -> Gait:
         point: dict[str, Any] = {
@@ -246,6 +261,11 @@ def gait_family(
         if file is not None:
             family.save(file)
 
+    def settled_so_far(share: float) -> None:
+        save()
+        if progress is not None:
+            progress(FIRST + (1.0 - FIRST) * share)
+
     places = list(_from_the_middle([axis.size for axis in axes.values()]))
     for done, place in enumerate(places):
         if progress is not None:
@@ -257,7 +277,7 @@ def gait_family(
         except InfeasibleGaitError as error:
             gaps[place] = str(error)
         save()
-    on_the_cheaper_branch(gaits, sought, save)
+    on_the_cheaper_branch(gaits, sought, settled, settled_so_far)
     if progress is not None:
         progress(1.0)
     return family
@@ -295,11 +315,14 @@ def load_gait_family(path: str | PathLike[str], robot: Robot) -> GaitFamily:
         for gait in gaits.values():
             check_robot(gait, robot)
         gaps = {_place(each, axes): each.text("why") for each in entries.objects("gaps")}
-        return GaitFamily(robot, axes, entries.object("asked").data, gaits, gaps)
+        # Files from before it was kept have none.
+        pairs = entries.objects("settled") if "settled" in entries.data else []
+        settled = {(_place(each, axes), _place(each, axes, "next")) for each in pairs}
+        return GaitFamily(robot, axes, entries.object("asked").data, gaits, gaps, settled)
 
 
-def _place(entries: Entries, axes: Mapping[str, Floats]) -> Place:
-    place = tuple(int(i) for i in entries.numbers("place", len(axes)))
+def _place(entries: Entries, axes: Mapping[str, Floats], key: str = "place") -> Place:
+    place = tuple(int(i) for i in entries.numbers(key, len(axes)))
     if not all(0 <= i < axis.size for i, axis in zip(place, axes.values(), strict=True)):
         raise GaitError(f"place {place} is not in the grid")
     return place
@@ -320,15 +343,11 @@ def _axis(name: str, values: Any) -> Floats:
     return axis
 
 
-def _go_on(
-    family: GaitFamily, saved: GaitFamily, gaits: dict[Place, Gait], gaps: dict[Place, str]
-) -> None:
-    """Take over what a file holds of a family."""
+def _check_same(family: GaitFamily, saved: GaitFamily) -> None:
+    """Raise a `GaitError` if a file holds another family."""
     same = list(family.axes) == list(saved.axes) and dict(family.asked) == dict(saved.asked)
     if not same or any(not np.array_equal(a, saved.axes[k]) for k, a in family.axes.items()):
         raise GaitError("the file holds a family with other axes or arguments; give another file")
-    gaits.update(saved.gaits)
-    gaps.update(saved.gaps)
 
 
 def _from_the_middle(sizes: Sequence[int]) -> Iterator[Place]:

@@ -158,6 +158,28 @@ def test_a_scheduler_that_is_gone_ends_the_campaign_in_words(tmp_path: Path) -> 
     assert as_text(made().run(tmp_path)) == as_text(made().run(workers=1))
 
 
+@pytest.mark.parametrize("executor", [None, Client()])
+def test_an_error_of_who_is_told_of_the_progress_is_no_loss_of_workers(executor: Any) -> None:
+    def progress(so_far: Any) -> None:
+        if so_far.finished:
+            raise BrokenPipeError("who read it has gone")
+
+    with pytest.raises(BrokenPipeError, match="who read it has gone"):
+        made(2).run(executor=executor, workers=1, progress=progress)
+
+
+def test_a_scheduler_that_is_gone_before_a_result_ends_it_in_words() -> None:
+    class Lost(Client):
+        def submit(self, *_: Any, **__: Any) -> Any:
+            return self
+
+        def result(self) -> Any:
+            raise ConnectionError("the scheduler is gone")
+
+    with pytest.raises(SimulationError, match="any more: the scheduler is gone"):
+        made(2).run(executor=Lost())
+
+
 def test_what_is_no_death_ends_the_campaign() -> None:
     class Broken(Client):
         def submit(self, *_: Any, **__: Any) -> Any:

@@ -160,6 +160,13 @@ def test_its_command_has_the_settings_and_the_period_of_the_pushes(tmp_path: Pat
         "--largest-push" in section
     )
     assert "does not walk unpushed" in section
-    quick = file.with_name("pushes-FootstepFeedback-every-4-ms-quick.json")
-    file.rename(quick)
-    assert "--period 0.004 --quick --largest-push" in _pushes(quick)
+
+
+def test_quick_comparisons_are_left_out(page: str, tmp_path: Path) -> None:
+    for file in list(tmp_path.glob("*.json")):
+        (tmp_path / f"{file.stem}-quick.json").write_bytes(file.read_bytes())
+    assert engines_page(tmp_path, "images/engines.png") == page
+    for file in set(tmp_path.glob("*.json")).difference(tmp_path.glob("*-quick.json")):
+        file.unlink()
+    with pytest.raises(SimulationError, match="heelstrike compare --engines all --scenes"):
+        engines_page(tmp_path, "images/engines.png")

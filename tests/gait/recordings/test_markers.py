@@ -69,6 +69,13 @@ def test_times_of_trc_that_are_rounded_are_even(tmp_path: Path) -> None:
         assert load_markers(path).time[1] == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.parametrize("rate", ["²", "1.²", "-", "nan"])
+def test_a_rate_that_is_no_number_is_not_used(tmp_path: Path, rate: str) -> None:
+    path = trc(tmp_path, places())
+    path.write_text(path.read_text(encoding="utf-8").replace("100.0", rate, 1), encoding="utf-8")
+    np.testing.assert_allclose(load_markers(path).time, 0.01 * np.arange(ROWS), atol=1e-12)
+
+
 def test_who_walks_another_way_is_turned_round(tmp_path: Path) -> None:
     """Along -z of the file, in cm."""
     position = places()

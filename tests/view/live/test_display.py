@@ -19,6 +19,7 @@ from heelstrike.view.live.board import KEPT
 pytest.importorskip("websockets", reason="the live view is not installed: heelstrike[watch]")
 
 from heelstrike.view.live.display import NOT_HERE, Display
+from heelstrike.view.live.session import RATES
 
 
 @pytest.fixture
@@ -92,6 +93,18 @@ def test_a_pause_halts_the_program_a_step_lets_it_go_on_once(display: Display) -
     listener.leave()  # and nobody is there who could let it go on
     program.join(20.0)
     assert display._frames[-1][0] == 0.04
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), "fast"])
+def test_commands_without_a_finite_number_change_nothing(display: Display, value: Any) -> None:
+    display.ask("me", {"do": "rate", "value": 2.0})
+    for command in ({"do": "rate", "value": value}, {"do": "seek", "time": value}):
+        display.ask("me", command)
+        assert f"command '{command['do']}' cannot be read" in display._note
+    assert display._rate == 2.0
+    assert display._playing
+    display.ask("me", {"do": "rate", "value": 1e9})
+    assert display._rate == RATES[1]
 
 
 def test_closing_lets_the_program_go_on(display: Display) -> None:

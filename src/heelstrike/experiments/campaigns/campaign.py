@@ -261,13 +261,6 @@ class Campaign:
                     good += sum(each.success for each in outcomes)
                     seconds = perf_counter() - begin
                     show(Progress(len(self), finished, good, found, seconds))
-        except Exception as error:
-            if isinstance(error, HeelstrikeError) or not is_lost(error):
-                raise
-            raise SimulationError(
-                f"nobody works on the campaign any more: {error or type(error).__name__}. What was "
-                "finished is kept; the same command goes on"
-            ) from error
         finally:
             if store is not None:
                 store.close()
@@ -459,13 +452,15 @@ def _by_others(executor: Any, blocks: Iterable[Block]) -> Generator[Done]:
             try:
                 for block in source:
                     waiting.append((block, None))
-                    waiting[-1] = block, worker.submit(run_block, block)
+                    with _somebody_works():
+                        waiting[-1] = block, worker.submit(run_block, block)
                     if len(waiting) >= AHEAD:
                         break
                 if not waiting:
                     break
                 block, future = waiting[0]
-                outcomes = future.result()
+                with _somebody_works():
+                    outcomes = future.result()
                 waiting.popleft()
                 yield block, outcomes
             except BrokenExecutor:
@@ -493,6 +488,20 @@ def _by_others(executor: Any, blocks: Iterable[Block]) -> Generator[Done]:
             worker.shutdown()
 
 
+@contextmanager
+def _somebody_works() -> Iterator[None]:
+    """Tell in words that nobody is there any more who would work."""
+    try:
+        yield
+    except Exception as error:
+        if isinstance(error, HeelstrikeError) or not is_lost(error):
+            raise
+        raise SimulationError(
+            f"nobody works on the campaign any more: {error or type(error).__name__}. What was "
+            "finished is kept; the same command goes on"
+        ) from error
+
+
 def _alone(make: Callable[[], Any], block: Block) -> list[Outcome]:
     """Work on a block with an executor of its own; if that dies, on each half of it."""
     worker = make()
@@ -506,9 +515,11 @@ def _alone(make: Callable[[], Any], block: Block) -> list[Outcome]:
 
 def _together(worker: Any, block: Block, died: int = 0, cancelled: int = 0) -> list[Outcome]:
     """Work on a block with an executor that goes on when a worker dies, as some did before."""
-    future = worker.submit(run_block, block)
+    with _somebody_works():
+        future = worker.submit(run_block, block)
     try:
-        found: list[Outcome] = future.result()
+        with _somebody_works():
+            found: list[Outcome] = future.result()
         return found
     except Exception as error:
         if isinstance(error, BrokenExecutor) or not is_death(error):

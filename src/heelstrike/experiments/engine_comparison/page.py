@@ -36,6 +36,7 @@ def engines_page(folder: Path, figure: str) -> str:
     ----------
     folder : Path
         Where ``heelstrike compare --engines`` has left ``engines-LAW.json`` and ``scenes.json``.
+        Files of quick comparisons, whose names end with ``-quick``, are left out.
     figure : str
         Link to the figure.
 
@@ -53,7 +54,7 @@ def engines_page(folder: Path, figure: str) -> str:
         file.stem.removeprefix("engines-").replace("-", " "): json.loads(
             file.read_text(encoding="utf-8")
         )
-        for file in sorted(folder.glob("engines-*.json"))
+        for file in _files(folder, "engines")
     }
     scenes_file = folder / "scenes.json"
     if not walks or not scenes_file.exists():
@@ -70,12 +71,18 @@ def engines_page(folder: Path, figure: str) -> str:
         *(_walks(law, found) for law, found in walks.items()),
         f"![Error over computing time]({figure})\n",
         _peaks(walks),
-        *(_pushes(file) for file in sorted(folder.glob("pushes-*.json"))),
+        *(_pushes(file) for file in _files(folder, "pushes")),
         _scenes(scenes),
         _compass(scenes["compass"]),
         _guards(scenes["guards"]),
     ]
     return "\n".join(parts)
+
+
+def _files(folder: Path, kind: str) -> list[Path]:
+    """Files of a kind in a folder, but for those of quick comparisons."""
+    found = sorted(folder.glob(f"{kind}-*.json"))
+    return [file for file in found if not file.stem.endswith("-quick")]
 
 
 _INTRODUCTION = """# Other engines
@@ -340,8 +347,7 @@ def _peaks(walks: Mapping[str, Any]) -> str:
 
 def _pushes(file: Path) -> str:
     name = file.stem.removeprefix("pushes-")
-    quick = " --quick" if name.endswith("-quick") else ""
-    law, _, often = name.removesuffix("-quick").partition("-every-")
+    law, _, often = name.partition("-every-")
     period = f" --period {1e-3 * float(often.removesuffix('-ms')):g}" if often else ""
     found = json.loads(file.read_text(encoding="utf-8"))
     told: dict[tuple[str, str], dict[str, str]] = {}
@@ -349,7 +355,6 @@ def _pushes(file: Path) -> str:
         cells = told.setdefault((row["title"], row["settings"]), {})
         cells[row["direction"]] = row["reason"] or _largest(row["largest"])
     called = f", called every {often.replace('-', ' ')}" if often else ""
-    called += ", few pushes" if quick else ""
     settings = ",".join(dict.fromkeys(row["settings"] for row in found["rows"]))
     return (
         f"## Largest push under {law}{called}\n\n"
@@ -360,7 +365,7 @@ def _pushes(file: Path) -> str:
         "with this state and the controller's memory, at steps of 1 ms. If an engine fails, its "
         "message appears, with the time since the end of the push. Each row is "
         f"`heelstrike compare {found['robot']} --controller {law} --engines NAME "
-        f"--settings {settings}{period}{quick} --largest-push`.\n\n"
+        f"--settings {settings}{period} --largest-push`.\n\n"
         + _table(
             ["engine", "settings", *DIRECTIONS],
             [

@@ -57,7 +57,7 @@ def points_of_trc(path: Name) -> tuple[Floats, tuple[str, ...], Floats]:
     if not SLOWEST <= (len(time) - 1) / (time[-1] - time[0]) <= FASTEST:
         raise GaitError(f"{path}: its times are in no seconds")
     rate = said.get("datarate", "")
-    if rate.replace(".", "", 1).isdigit() and float(rate) > 0.0:
+    if rate.replace(".", "", 1).isdecimal() and float(rate) > 0.0:
         even = time[0] + np.arange(len(time)) / float(rate)
         if np.abs(time - even).max() <= ROUNDED:
             time = even

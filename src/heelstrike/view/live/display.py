@@ -20,7 +20,7 @@ from heelstrike.view.live.light import CERTIFIED, NOTHING_YET
 from heelstrike.view.live.page import live_page
 from heelstrike.view.live.plane import LIVE_PLANE
 from heelstrike.view.live.server import Server, check_installed
-from heelstrike.view.live.session import RATES
+from heelstrike.view.live.session import clamped_rate, finite
 from heelstrike.view.live.viewer import LOOK_EVERY, Viewer
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ class Display:
             if self._playing and self._frames:
                 self._look(last)
         elif what == "rate":
-            self._rate = min(max(float(command["value"]), RATES[0]), RATES[1])
+            self._rate = clamped_rate(command["value"])
         elif what == "step":
             ahead, self._playing = int(command["rows"]) > 0, False
             if ahead and self._place in (-1, last):
@@ -181,9 +181,9 @@ class Display:
                 place = last if self._place < 0 else self._place
                 self._look(max(place + (1 if ahead else -1), 0))
         elif what == "seek":
-            times = [frame[0] for frame in self._frames]
+            wanted, times = finite(command["time"]), [frame[0] for frame in self._frames]
             self._playing = False
-            place = int(np.searchsorted(times, float(command["time"]) + SAME_ROW)) - 1
+            place = int(np.searchsorted(times, wanted + SAME_ROW)) - 1
             if times:
                 self._look(min(max(place, 0), last))
         elif what == "event":

@@ -219,7 +219,7 @@ class Session:
 
     def _seek(self, _: str, command: Mapping[str, Any]) -> None:
         self.playing = False
-        self._move(_finite(command["time"]))
+        self._move(finite(command["time"]))
 
     def _event(self, _: str, command: Mapping[str, Any]) -> None:
         ahead = int(command["direction"]) > 0
@@ -243,12 +243,12 @@ class Session:
         self._note = self._happened(self.cursor)
 
     def _rate(self, _: str, command: Mapping[str, Any]) -> None:
-        self.rate = min(max(_finite(command["value"]), RATES[0]), RATES[1])
+        self.rate = clamped_rate(command["value"])
         self._goal = self.cursor  # what the machine owes the rate before is let go
 
     def _hold(self, viewer: str, command: Mapping[str, Any]) -> None:
         live = self._needs_live()
-        force, place = (tuple(map(_finite, command[name])) for name in ("force", "point"))
+        force, place = (tuple(map(finite, command[name])) for name in ("force", "point"))
         link = int(command["link"])
         push = Push(link, force=force, start=0.0, duration=0.0, point=place)
         self.dimension.check(push, live.robot)
@@ -275,7 +275,7 @@ class Session:
 
     def _pose(self, _: str, command: Mapping[str, Any]) -> None:
         live = self._needs_live()
-        joint, position = str(command["joint"]), _finite(command["value"])
+        joint, position = str(command["joint"]), finite(command["value"])
         self.playing = False
         if not self._at_end:
             self._go_on_from_cursor()
@@ -563,7 +563,25 @@ class Session:
         return self._at_end and (self.live is None or not self.live.can_go_on)
 
 
-def _finite(value: Any) -> float:
+def clamped_rate(value: Any) -> float:
+    """Simulated seconds a second that a viewer asks for, within `RATES`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If it is no finite number.
+    """
+    return min(max(finite(value), RATES[0]), RATES[1])
+
+
+def finite(value: Any) -> float:
+    """Return a number that a viewer sent.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If it is no finite number.
+    """
     number = float(value)
     if not math.isfinite(number):
         raise ValueError(f"{value!r} is not a finite number")
