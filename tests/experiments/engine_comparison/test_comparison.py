@@ -226,6 +226,30 @@ def test_an_engine_that_dies_ends_its_rows_alone_and_falls_are_filmed(
     assert filmed == ["mujoco-defaults-0.001.mp4"]
 
 
+def test_an_engine_that_dies_while_a_kept_fall_is_filmed_keeps_its_row(
+    bravo7: hs.Robot, gait: hs.Gait, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def in_engine(*given: object) -> WalkFigures:
+        if given[-1] is not None:  # a film
+            raise InvalidRunError("its process was ended by SIGKILL")
+        return replace(WALK, walks=False)
+
+    monkeypatch.setattr(module, "peers", lambda load: dict.fromkeys(PACKAGES, "1.0"))
+    monkeypatch.setattr(module, "TRUTH", hs.TimeStepping(step=1e-3))
+    monkeypatch.setattr(module.Walk, "in_engine", in_engine)
+    said: list[str] = []
+    for films in (False, True):
+        found = hs.compare_engines(
+            bravo7, hs.ComputedTorque(bravo7, gait), gait, engines=["mujoco", "bullet"], steps=1,
+            step_sizes=[1e-3], settings=["defaults"], folder=tmp_path, films=films,
+            progress=lambda text, _: said.append(text),
+        )  # fmt: skip
+    for row in found.rows[1:]:
+        assert row.figures is not None
+        assert not row.figures.walks
+    assert "no film of MuJoCo, defaults: its process was ended by SIGKILL" in said
+
+
 def test_names_of_engines_are_checked(bravo7: hs.Robot, gait: hs.Gait) -> None:
     with pytest.raises(SimulationError, match=r"no engine 'mujocco'\. Did you mean 'mujoco'"):
         hs.compare_engines(bravo7, hs.ComputedTorque(bravo7, gait), gait, engines=["mujocco"])
