@@ -112,10 +112,13 @@ def compass_cells(row: Mapping[str, Any]) -> list[str]:
         said = f"no, {walk['strides']}: {walk['ending']}"
         return [row["title"], step, said, "–", "–", "–", "–", "–"]
     digits = 9 if row["engine"] == EXACT else 4
+    if walk.get("undetermined"):  # files from before have none
+        multipliers = f"none, disturbed: {walk['undetermined']}"
+    else:
+        multipliers = _written(walk["multipliers"], 6 if row["engine"] == EXACT else 2)
     return [
         row["title"], step, "yes", f"{walk['period_s']:.{digits}f}",
-        f"{walk['step_m']:.{digits}f}", short(1e3 * walk["spread"]),
-        _written(walk["multipliers"], 6 if row["engine"] == EXACT else 2),
+        f"{walk['step_m']:.{digits}f}", short(1e3 * walk["spread"]), multipliers,
         short(walk["error"]) if walk["error"] else "–",
     ]  # fmt: skip
 
