@@ -101,7 +101,7 @@ class EngineComparison:
                 for row in self.rows
                 if row.figures is not None
             ],
-            [] if scenes is None else [asdict(row) for row in scenes.at_steps],
+            [asdict(row) for row in scenes.at_steps if row.error is not None] if scenes else [],
         )
 
     def __rich__(self) -> Group:

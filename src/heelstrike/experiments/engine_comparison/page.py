@@ -16,6 +16,7 @@ from heelstrike.experiments.engine_comparison.compass_table import compass_cells
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
 from heelstrike.experiments.engine_comparison.pushes import DIRECTIONS, UNPUSHED
+from heelstrike.experiments.engine_comparison.scene_table import why_not_at_steps
 from heelstrike.experiments.engine_comparison.settings import (
     BEST,
     best_settings,
@@ -407,6 +408,7 @@ def _scenes(found: Mapping[str, Any]) -> str:
         for row in found["rows"]
         if row["error"] is None and "restitution" not in row["reason"]
     )
+    why |= dict.fromkeys(f"- {each}." for each in why_not_at_steps(found))
     return (
         "## Scenes with closed forms\n\nThe exact result of each scene:\n\n" + "\n".join(listed)
         + f"\n\n{_SYMBOLS}\n\nThe table has the errors (simulated less exact, in the units above) "

@@ -79,10 +79,12 @@ class StepRow:
     """What tables call the engine."""
     step_s: float
     """Step, in s; of our event-driven runs their relative tolerance."""
-    error: float
-    """What is measured less what the closed form gives, without its sign."""
-    computing_s: float
+    error: float | None
+    """What is measured less what the closed form gives, without its sign; None if nothing is."""
+    computing_s: float | None
     """Computing time, in s."""
+    reason: str = ""
+    """Why there is nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +100,7 @@ class SceneTable:
     rows: tuple[SceneRow, ...]
     """Errors, scene by scene."""
     at_steps: tuple[StepRow, ...] = ()
-    """Errors and computing times of `AT_STEPS`, engine by engine; what fails has no row."""
+    """Errors and computing times of `AT_STEPS`, engine by engine."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain numbers and texts."""
@@ -128,7 +130,24 @@ class SceneTable:
                     error = row.reason if row.error is None else short(row.error)
                     table.add_row(row.title, error)
             parts.append(table)
+        parts += [f"{each}." for each in why_not_at_steps(self.to_dict())]
         return Group(*parts)
+
+
+def why_not_at_steps(found: Mapping[str, Any]) -> list[str]:
+    """Tell why there is nothing at some of several steps, where the scene's row does not say so.
+
+    Parameters
+    ----------
+    found : mapping
+        Of ``SceneTable.to_dict()``.
+    """
+    said = {(row["scene"], row["title"], row["reason"]) for row in found["rows"]}
+    return [
+        f"{row['title']}, {AT_STEPS[row['shows']]}, {1e3 * row['step_s']:g} ms: {row['reason']}"
+        for row in found.get("at_steps", ())
+        if row.get("reason") and (AT_STEPS[row["shows"]], row["title"], row["reason"]) not in said
+    ]
 
 
 @takes(SimulationError)
@@ -198,9 +217,11 @@ def compare_scenes(
                 for each in steps:
                     try:
                         found, seconds = asked.error(scene, name, entry, each)
-                    except InvalidRunError:
-                        continue  # its row above says why
-                    at_steps.append(StepRow(shows, entry.title, each, abs(found), seconds))
+                    except InvalidRunError as refused:
+                        row = StepRow(shows, entry.title, each, None, None, str(refused))
+                    else:
+                        row = StepRow(shows, entry.title, each, abs(found), seconds)
+                    at_steps.append(row)
     finally:
         asked.close()
     told = tuple((s.name, s.exact, s.unit, s.source) for s in everything)
