@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
@@ -173,7 +174,7 @@ def compare_scenes(
     steps : sequence of float
         Steps at which landing and rest are simulated, too.
     folder : path, optional
-        Where rows are kept as they come, to go on from there.
+        Where errors are kept as they come, to go on from there. What is timed runs again.
     progress : callable, optional
         Called before each scene with a text, and the share of scenes that is done.
 
@@ -201,7 +202,7 @@ def compare_scenes(
             for name, entry in entries.items():
                 say(f"{scene.name}, {entry.title}", k / (len(everything) + len(AT_STEPS)))
                 try:
-                    found, _ = asked.error(scene, name, entry, step)
+                    found = asked.error(scene, name, entry, step)
                 except InvalidRunError as refused:
                     rows.append(SceneRow(scene.name, name, entry.title, None, str(refused)))
                 else:
@@ -216,7 +217,7 @@ def compare_scenes(
                 say(f"{scene.name}, {entry.title}, at several steps", 1.0)
                 for each in steps:
                     try:
-                        found, seconds = asked.error(scene, name, entry, each)
+                        found, seconds = asked.timed(scene, name, entry, each)
                     except InvalidRunError as refused:
                         row = StepRow(shows, entry.title, each, None, None, str(refused))
                     else:
@@ -245,7 +246,10 @@ def _by_ours(shows: str, scene: Scene, steps: Sequence[float]) -> list[StepRow]:
 
 
 class _Engines:
-    """Engines that are asked for scenes, each in its process; what they answer is kept."""
+    """Engines that are asked for scenes, each in its process.
+
+    Their errors are kept, but not how long they took: that is of this machine and day, as is ours.
+    """
 
     def __init__(
         self, folder: Path | str | None, settings: str, versions: Mapping[str, str]
@@ -259,23 +263,33 @@ class _Engines:
         for process in self._processes.values():
             process.end()
 
-    def error(self, scene: Scene, name: str, entry: Entry, step: float) -> tuple[float, float]:
-        """Simulate a scene; return its error and the seconds that it took."""
-        state = self._versions[entry.package]
-        if not compared({entry.package: state}):
-            raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
-        given = settings_of(name, entry, self._settings)
-        if entry.package not in self._processes:
-            self._processes[entry.package] = engine_process(entry.package)
+    def error(self, scene: Scene, name: str, entry: Entry, step: float) -> float:
+        """Return the error of a scene, which may be kept."""
+        given = self._given(name, entry)
 
         def make() -> dict[str, Any]:
-            process = self._processes[entry.package]
-            error, seconds = scene_error(scene, entry, step, given, process)
-            return {"error": error, "seconds": seconds}
+            error, _ = self.timed(scene, name, entry, step)
+            return {"error": error}
 
         words = "-".join(re.findall(r"[\w.]+", scene.name))
         told = [name, scene.exact, step, asked_of_engine(entry.package, given, self._versions)]
-        found = self._kept.entries(f"scene-{words}-{name}-{step:g}", told, make)
-        if found["error"] is None:
+        error: float = self._kept.entries(f"scene-{words}-{name}-{step:g}", told, make)["error"]
+        return error
+
+    def timed(self, scene: Scene, name: str, entry: Entry, step: float) -> tuple[float, float]:
+        """Simulate a scene now; return its error and the seconds that it took."""
+        given = self._given(name, entry)
+        if entry.package not in self._processes:
+            self._processes[entry.package] = engine_process(entry.package)
+        process = self._processes[entry.package]
+        error, seconds = scene_error(scene, entry, step, given, process)
+        if not math.isfinite(error):
             raise InvalidRunError("what it ends with is not finite")
-        return found["error"], found["seconds"]
+        return error, seconds
+
+    def _given(self, name: str, entry: Entry) -> dict[str, Any]:
+        """Return the settings of an engine that is there."""
+        state = self._versions[entry.package]
+        if not compared({entry.package: state}):
+            raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
+        return settings_of(name, entry, self._settings)
