@@ -143,6 +143,16 @@ def test_without_files_there_is_no_page(tmp_path: Path) -> None:
         engines_page(tmp_path, "figure.png")
 
 
+@pytest.mark.parametrize("lacks", ["compass", "guards"])
+def test_scenes_from_before_are_refused(tmp_path: Path, lacks: str) -> None:
+    (tmp_path / "engines-JointPD.json").write_text(json.dumps(made_up().to_dict()))
+    scenes = {part: found for part, found in SCENES.items() if part != lacks}
+    (tmp_path / "scenes.json").write_text(json.dumps(scenes))
+    words = f"scenes.json is from before: it lacks '{lacks}'. heelstrike compare --engines all --s"
+    with pytest.raises(SimulationError, match=words):
+        engines_page(tmp_path, "figure.png")
+
+
 def test_it_says_which_push_each_stands(page: str) -> None:
     section = "## Largest push under FootstepFeedback"
     assert row(page, section, "MuJoCo")[1:] == ["defaults", "90 (94)", "≥ 240"]

@@ -57,12 +57,12 @@ def engines_page(folder: Path, figure: str) -> str:
         for file in sorted(folder.glob("engines-*.json"))
     }
     scenes_file = folder / "scenes.json"
+    first = "heelstrike compare --engines all --scenes comes first"
     if not walks or not scenes_file.exists():
-        raise SimulationError(
-            f"there is nothing to write a page of in {folder}: heelstrike compare --engines all "
-            "--scenes comes first"
-        )
+        raise SimulationError(f"there is nothing to write a page of in {folder}: {first}")
     scenes = json.loads(scenes_file.read_text(encoding="utf-8"))
+    if lacks := [part for part in ("compass", "guards") if part not in scenes]:
+        raise SimulationError(f"{scenes_file} is from before: it lacks {lacks[0]!r}. {first}")
     parts = [
         _INTRODUCTION,
         _in_short(walks),
