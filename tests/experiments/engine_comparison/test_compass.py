@@ -146,6 +146,10 @@ def test_the_table_says_who_walks_and_why_others_do_not(
     for _ in range(2):
         table = compare_compass(engines=["mujoco", "bullet", "ode"], steps=[1e-3], folder=tmp_path)
     assert asked == ["MuJoCo", "Bullet", "Bullet"]  # what is there is kept, what failed asked again
+    later = State(cycle[1].q + 1e-9, cycle[1].v)
+    monkeypatch.setattr(compass_table, "our_cycle", lambda: (cycle[0], later))
+    compare_compass(engines=["mujoco"], steps=[1e-3], folder=tmp_path)
+    assert asked[-1] == "MuJoCo"  # it begins elsewhere
     console = Console(file=io.StringIO(), width=160)
     console.print(table)
     told = console.file.getvalue()  # type: ignore[attr-defined]

@@ -34,6 +34,9 @@ from heelstrike.reader_process import ReaderProcess
 from heelstrike.sim import Compliant, EventDriven, TimeStepping
 from heelstrike.sim.method import Method
 
+MODULES = ("scenes",)
+"""Modules of this room that make errors."""
+
 STEP = 1e-3
 """Step of the engines, in s."""
 
@@ -254,7 +257,7 @@ class _Engines:
     def __init__(
         self, folder: Path | str | None, settings: str, versions: Mapping[str, str]
     ) -> None:
-        self._kept = KeptRows(folder, {}, ("scenes",))
+        self._kept = KeptRows(folder, {}, MODULES)
         self._settings, self._versions = settings, versions
         self._processes: dict[str, ReaderProcess] = {}
 
