@@ -9,9 +9,10 @@ import pytest
 from experiments.engine_comparison.synthetic import made_up
 
 from heelstrike.errors import SimulationError
+from heelstrike.experiments.engine_comparison.compass_table import STEPS
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
-from heelstrike.experiments.engine_comparison.page import _pushes, engines_page
+from heelstrike.experiments.engine_comparison.page import _compass, _pushes, engines_page
 
 BELOW, BALL = "cube below the angle of friction", "ball bouncing, e = 0.9"
 DULL, OURS = "takes no coefficient of restitution", "heelstrike, event-driven"
@@ -131,6 +132,16 @@ def test_the_compass_gait_has_its_cycle_or_why_it_has_none(page: str) -> None:
     ]  # fmt: skip
     assert row(page, section, "Bullet")[2] == "no, 3: it falls"
     assert row(page, section, "ODE")[2] == "ODE is not installed"
+
+
+def test_it_says_which_rows_of_the_compass_gait_were_not_run(page: str) -> None:
+    said = page[page.index("Missing rows were not run here: ") : page.index("| engine | h ms |")]
+    assert "MuJoCo at 1 ms" in said
+    assert "Bullet at 0.2 ms" in said
+    assert "Siconos at 1 and 0.2 ms" in said
+    one = SCENES["compass"]["rows"][0]  # type: ignore[index]
+    rows = [one | {"engine": name, "step_s": step} for name in ENTRIES for step in STEPS]
+    assert "Missing" not in _compass(SCENES["compass"] | {"rows": rows})  # type: ignore[operator]
 
 
 def test_it_says_where_licences_were_read(page: str) -> None:
