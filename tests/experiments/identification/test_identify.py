@@ -47,8 +47,13 @@ def swinging(count: int = 1500) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     )
 
 
-def of_pendulum(file: hs.Robot | None = None, **noise: float) -> Identified:
-    """What a pendulum tells whose torque is the textbook's, with friction of its pivot.
+def of_pendulum(**noise: float) -> Identified:
+    """What a pendulum tells."""
+    return hs.identify(pendulum(), log_of_pendulum(**noise), **noise)
+
+
+def log_of_pendulum(**noise: float) -> RobotLog:
+    """The motion of a pendulum whose torque is the textbook's, with friction of its pivot.
 
     About +y, with the centre of mass at (c_x, c_z) from the pivot as it hangs: J θ̈ = Γ − d θ̇ −
     c sign θ̇ + m g (c_x cos θ + c_z sin θ).
@@ -60,8 +65,7 @@ def of_pendulum(file: hs.Robot | None = None, **noise: float) -> Identified:
     rng = np.random.default_rng(1)  # for intervals only
     measured = angle + noise.get("encoder_noise", 0.0) * rng.standard_normal(len(time))
     torque = torque + noise.get("torque_noise", 0.0) * rng.standard_normal(len(time))
-    log = RobotLog(time, measured[:, None], torque[:, None])
-    return hs.identify(file or pendulum(), log, **noise)
+    return RobotLog(time, measured[:, None], torque[:, None])
 
 
 PENDULUM = {
@@ -105,7 +109,7 @@ def test_two_files_of_one_robot_give_the_same_values_and_intervals() -> None:
     """With noise so large that a file that counted as an observation would move them by 3 %."""
     noise = {"encoder_noise": 1e-4, "torque_noise": 60.0}
     one, other = (
-        of_pendulum(file, **noise).numbers
+        hs.identify(file, log_of_pendulum(**noise), **noise).numbers
         for file in (pendulum(), pendulum(1.4, center=(0.04, -0.55), inertia=0.08))
     )
     for a, b in zip(one, other, strict=True):

@@ -91,8 +91,8 @@ process, takes torques, and returns its state and contact forces. The controller
 compiled one, called with the engine's state and forces every 2 ms, or as often as the table says.
 Times cover the engine's steps and the Python calls that they need; heelstrike's include the
 controller. Other work ran at the same time: ignore differences below a factor of two. The tables
-may come from several runs; each states its steps, controller and step size. Walks that were kept
-from an earlier run have its computing times; times of scenes are all of one run.
+may come from several runs; each states its steps, controller and step size. What was kept from
+an earlier run has its computing times.
 
 `heelstrike compare bravo7 --engines all` makes the tables; with `--scenes --page docs/engines.md`
 it writes this page. For one engine use `--engines mujoco`, for a quick trial `--quick`. `--films`
