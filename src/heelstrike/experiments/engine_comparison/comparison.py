@@ -92,6 +92,11 @@ class EngineComparison:
         ----------
         scenes : SceneTable, optional
             Of which landing and rest are drawn beside the walk.
+
+        Returns
+        -------
+        Figure
+            Matplotlib's figure.
         """
         from heelstrike.view.engines_figure import draw_engines
 
