@@ -1,6 +1,6 @@
 """How often the intervals of identified numbers hold, and how near friction comes.
 
-    python benchmarks/identification.py cover --seeds 2000
+    python benchmarks/identification.py cover --seeds 100 --first 60000
 
 bravo7 walks its reference gait under computed torque, event-driven, and its encoders, torques and
 forces are measured with noise of 1e-4 rad, 0.2 N m and 2 N (standard deviations), again in each

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import io
 import json
 import math
@@ -13,7 +14,13 @@ from rich.console import Console
 
 import heelstrike as hs
 from heelstrike.errors import SimulationError
-from heelstrike.experiments.engine_comparison import EngineComparison, EngineRow, WalkFigures
+from heelstrike.experiments.engine_comparison import (
+    EngineComparison,
+    EngineRow,
+    WalkFigures,
+    compass_table,
+    scene_table,
+)
 from heelstrike.experiments.engine_comparison import comparison as module
 from heelstrike.experiments.engine_comparison import kept as kept_rows
 from heelstrike.experiments.engine_comparison.entries import (
@@ -114,6 +121,61 @@ def test_what_is_kept_does_not_follow_from_tables_and_pages() -> None:
         assert place.is_dir() or place.with_suffix(".py").is_file(), room
         assert "engine_comparison" not in room
         assert not room.endswith("_peer")
+
+
+def imports_of(module: str) -> set[str]:
+    """Rooms and modules of this package that a module imports."""
+    home = Path(hs.__file__).parent
+    found = set()
+    for node in ast.walk(ast.parse((home / module).with_suffix(".py").read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("heelstrike."):
+            place = str(node.module).removeprefix("heelstrike.").replace(".", "/")
+            inside = [f"{place}/{each.name}" for each in node.names]
+            modules = [each for each in inside if (home / each).with_suffix(".py").is_file()]
+            found |= set(modules or [place])
+    return found
+
+
+ROOM, ENGINES = "experiments/engine_comparison", "experiments/engines"
+NO_NUMBERS = {
+    "arguments", "errors", "field_texts", "reader_process", "whole_file", "wording",
+    f"{ROOM}/entries",  # settings, which each row tells
+    f"{ENGINES}/packages",  # where engines are, of which each row tells the version
+}  # fmt: skip
+
+
+def not_covered(module: str, own: set[str]) -> set[str]:
+    """Imports of a module that are in no digest."""
+    covered = own | set(kept_rows.ROOMS) | NO_NUMBERS
+    return {
+        each
+        for each in imports_of(module)
+        if not any(each == room or each.startswith(f"{room}/") for room in covered)
+    }
+
+
+@pytest.mark.parametrize("modules", [kept_rows.MODULES, compass_table.MODULES, scene_table.MODULES])
+def test_what_is_kept_follows_from_all_that_makes_its_numbers(modules: tuple[str, ...]) -> None:
+    own = {f"{ROOM}/{name}" for name in modules}
+    assert {name: found for name in own if (found := not_covered(name, own))} == {}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_adapters_are_told_with_the_adapters_that_they_import(
+    package: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[set[str]] = []
+
+    def digest(rooms: tuple[str, ...], _: str) -> bytes:
+        asked.append(set(rooms))
+        return b""
+
+    monkeypatch.setattr(kept_rows, "program_digest", digest)
+    asked_of_engine(package, {}, {package: "1.0"})
+    (own,) = asked
+    adapter = f"{ENGINES}/{PACKAGES[package].adapter}"
+    assert adapter in own
+    assert not_covered(adapter, own) == set()
 
 
 @pytest.fixture(scope="module")
@@ -224,6 +286,30 @@ def test_an_engine_that_dies_ends_its_rows_alone_and_falls_are_filmed(
     assert bullet.reason == "its process was ended by SIGKILL"
     assert mujoco.figures is not None
     assert filmed == ["mujoco-defaults-0.001.mp4"]
+
+
+def test_an_engine_that_dies_while_a_kept_fall_is_filmed_keeps_its_row(
+    bravo7: hs.Robot, gait: hs.Gait, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def in_engine(*given: object) -> WalkFigures:
+        if given[-1] is not None:  # a film
+            raise InvalidRunError("its process was ended by SIGKILL")
+        return replace(WALK, walks=False)
+
+    monkeypatch.setattr(module, "peers", lambda load: dict.fromkeys(PACKAGES, "1.0"))
+    monkeypatch.setattr(module, "TRUTH", hs.TimeStepping(step=1e-3))
+    monkeypatch.setattr(module.Walk, "in_engine", in_engine)
+    said: list[str] = []
+    for films in (False, True):
+        found = hs.compare_engines(
+            bravo7, hs.ComputedTorque(bravo7, gait), gait, engines=["mujoco", "bullet"], steps=1,
+            step_sizes=[1e-3], settings=["defaults"], folder=tmp_path, films=films,
+            progress=lambda text, _: said.append(text),
+        )  # fmt: skip
+    for row in found.rows[1:]:
+        assert row.figures is not None
+        assert not row.figures.walks
+    assert "no film of MuJoCo, defaults: its process was ended by SIGKILL" in said
 
 
 def test_names_of_engines_are_checked(bravo7: hs.Robot, gait: hs.Gait) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,14 @@ import pytest
 from rich.console import Console
 
 from heelstrike.experiments.engine_comparison import compare_compass, compass_table
+from heelstrike.experiments.engine_comparison import compass as module
 from heelstrike.experiments.engine_comparison.compass import (
+    STRIDES,
     ByOurs,
     CompassWalk,
     InEngine,
+    NotWalkingError,
+    _Middle,
     compass,
     compass_walk,
     on_one_foot,
@@ -98,6 +103,32 @@ def test_one_that_falls_says_so(cycle: tuple[CompassWalk, State]) -> None:
     assert math.isnan(walk.period_s)
 
 
+def test_one_that_falls_only_when_disturbed_keeps_its_cycle(
+    monkeypatch: pytest.MonkeyPatch, cycle: tuple[CompassWalk, State]
+) -> None:
+    """Strides that are made up: 0.7 s and 0.5 m each, until the third that is disturbed."""
+    taken: list[float] = []
+
+    def stride(_: Any, middle: Any) -> Any:
+        taken.append(middle.foot)
+        if len(taken) == STRIDES + 3:
+            raise NotWalkingError("it falls")
+        return replace(middle, foot=middle.foot + 0.5, time=0.7)
+
+    first = _Middle(np.zeros(4), np.zeros(4), 0.0, np.array([0.5, -0.3, -1.3]), 0.0, 0.0)
+    monkeypatch.setattr(module, "_to_the_middle", lambda *_: first)
+    monkeypatch.setattr(module, "_stride", stride)
+    walk = compass_walk(ByOurs(lambda step: TimeStepping(step=step), 1e-3), cycle[1])
+    assert (walk.strides, walk.ending, walk.undetermined) == (STRIDES, "", "it falls")
+    assert (walk.period_s, walk.step_m, walk.spread) == pytest.approx((0.7, 0.5, 0.0))
+    assert np.isnan([*walk.multipliers, walk.error]).all()
+    told = compass_table._told(walk)
+    row = {"engine": "ode", "title": "ODE", "step_s": 1e-3, "walk": told, "reason": ""}
+    assert compass_table.compass_cells(row) == [
+        "ODE", "1", "yes", "0.7000", "0.5000", "0", "none, disturbed: it falls", "–",
+    ]  # fmt: skip
+
+
 def test_the_table_says_who_walks_and_why_others_do_not(
     monkeypatch: pytest.MonkeyPatch, cycle: tuple[CompassWalk, State], tmp_path: Any
 ) -> None:
@@ -115,6 +146,10 @@ def test_the_table_says_who_walks_and_why_others_do_not(
     for _ in range(2):
         table = compare_compass(engines=["mujoco", "bullet", "ode"], steps=[1e-3], folder=tmp_path)
     assert asked == ["MuJoCo", "Bullet", "Bullet"]  # what is there is kept, what failed asked again
+    later = State(cycle[1].q + 1e-9, cycle[1].v)
+    monkeypatch.setattr(compass_table, "our_cycle", lambda: (cycle[0], later))
+    compare_compass(engines=["mujoco"], steps=[1e-3], folder=tmp_path)
+    assert asked[-1] == "MuJoCo"  # it begins elsewhere
     console = Console(file=io.StringIO(), width=160)
     console.print(table)
     told = console.file.getvalue()  # type: ignore[attr-defined]

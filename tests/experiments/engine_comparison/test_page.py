@@ -9,9 +9,10 @@ import pytest
 from experiments.engine_comparison.synthetic import made_up
 
 from heelstrike.errors import SimulationError
+from heelstrike.experiments.engine_comparison.compass_table import STEPS
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
-from heelstrike.experiments.engine_comparison.page import _pushes, engines_page
+from heelstrike.experiments.engine_comparison.page import _compass, _pushes, engines_page
 
 BELOW, BALL = "cube below the angle of friction", "ball bouncing, e = 0.9"
 DULL, OURS = "takes no coefficient of restitution", "heelstrike, event-driven"
@@ -133,6 +134,16 @@ def test_the_compass_gait_has_its_cycle_or_why_it_has_none(page: str) -> None:
     assert row(page, section, "ODE")[2] == "ODE is not installed"
 
 
+def test_it_says_which_rows_of_the_compass_gait_were_not_run(page: str) -> None:
+    said = page[page.index("Missing rows were not run here: ") : page.index("| engine | h ms |")]
+    assert "MuJoCo at 1 ms" in said
+    assert "Bullet at 0.2 ms" in said
+    assert "Siconos at 1 and 0.2 ms" in said
+    absent = {"title": "engine", "walk": None, "reason": "it is not there"}
+    rows = [{"engine": name, "step_s": step} | absent for name in ENTRIES for step in STEPS]
+    assert "Missing" not in _compass({"strides": 25, "settings": "defaults", "rows": rows})
+
+
 def test_it_says_where_licences_were_read(page: str) -> None:
     for name in ("MuJoCo", "PhysX"):
         assert f"- {name}: " in page[page.index("Where licences") : page.index("heelstrike's col")]
@@ -140,6 +151,16 @@ def test_it_says_where_licences_were_read(page: str) -> None:
 
 def test_without_files_there_is_no_page(tmp_path: Path) -> None:
     with pytest.raises(SimulationError, match="heelstrike compare --engines all --scenes"):
+        engines_page(tmp_path, "figure.png")
+
+
+@pytest.mark.parametrize("lacks", ["compass", "guards"])
+def test_scenes_from_before_are_refused(tmp_path: Path, lacks: str) -> None:
+    (tmp_path / "engines-JointPD.json").write_text(json.dumps(made_up().to_dict()))
+    scenes = {part: found for part, found in SCENES.items() if part != lacks}
+    (tmp_path / "scenes.json").write_text(json.dumps(scenes))
+    words = f"scenes.json is from before: it lacks '{lacks}'. heelstrike compare --engines all --s"
+    with pytest.raises(SimulationError, match=words):
         engines_page(tmp_path, "figure.png")
 
 

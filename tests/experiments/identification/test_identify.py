@@ -26,10 +26,12 @@ NOISE = {"encoder_noise": 1e-4, "torque_noise": 0.2, "force_noise": 2.0}
 EXACT = {"encoder_noise": 1e-8, "torque_noise": 1e-5, "force_noise": 1e-4, "knots": 0.02}
 
 
-def pendulum(mass: float = 2.0) -> hs.Robot:
+def pendulum(
+    mass: float = 2.0, center: tuple[float, float] = (0.02, -0.4), inertia: float = 0.05
+) -> hs.Robot:
     build = hs.RobotBuilder("pendulum")
-    build.hinge("pivot", None, at=(0.0, 2.0), link="rod", mass=mass, inertia=0.05,
-                center_of_mass=(0.02, -0.4), torque=np.inf)  # fmt: skip
+    build.hinge("pivot", None, at=(0.0, 2.0), link="rod", mass=mass, inertia=inertia,
+                center_of_mass=center, torque=np.inf)  # fmt: skip
     return build.build()
 
 
@@ -46,7 +48,12 @@ def swinging(count: int = 1500) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
 
 
 def of_pendulum(**noise: float) -> Identified:
-    """What a pendulum tells whose torque is the textbook's, with friction of its pivot.
+    """What a pendulum tells."""
+    return hs.identify(pendulum(), log_of_pendulum(**noise), **noise)
+
+
+def log_of_pendulum(**noise: float) -> RobotLog:
+    """The motion of a pendulum whose torque is the textbook's, with friction of its pivot.
 
     About +y, with the centre of mass at (c_x, c_z) from the pivot as it hangs: J θ̈ = Γ − d θ̇ −
     c sign θ̇ + m g (c_x cos θ + c_z sin θ).
@@ -58,7 +65,7 @@ def of_pendulum(**noise: float) -> Identified:
     rng = np.random.default_rng(1)  # for intervals only
     measured = angle + noise.get("encoder_noise", 0.0) * rng.standard_normal(len(time))
     torque = torque + noise.get("torque_noise", 0.0) * rng.standard_normal(len(time))
-    return hs.identify(pendulum(), RobotLog(time, measured[:, None], torque[:, None]), **noise)
+    return RobotLog(time, measured[:, None], torque[:, None])
 
 
 PENDULUM = {
@@ -96,6 +103,20 @@ def test_intervals_of_a_pendulum_are_those_of_its_noise() -> None:
         assert each.deviation == pytest.approx(expected[name], rel=0.02)
         assert abs(each.value - PENDULUM.get(each.name, 0.41)) < 4.0 * each.deviation
     assert found.misfit == pytest.approx(1.0, abs=0.15)
+
+
+def test_two_files_of_one_robot_give_the_same_values_and_intervals() -> None:
+    """With noise so large that a file that counted as an observation would move them by 3 %."""
+    noise = {"encoder_noise": 1e-4, "torque_noise": 60.0}
+    one, other = (
+        hs.identify(file, log_of_pendulum(**noise), **noise).numbers
+        for file in (pendulum(), pendulum(1.4, center=(0.04, -0.55), inertia=0.08))
+    )
+    for a, b in zip(one, other, strict=True):
+        assert a.name == b.name
+        assert a.value == pytest.approx(b.value, abs=5e-3 * a.deviation), a.name
+        assert a.deviation == pytest.approx(b.deviation, rel=5e-3), a.name
+    assert any(a.assumed != b.assumed for a, b in zip(one, other, strict=True))
 
 
 def test_a_joint_that_rests_tells_nothing() -> None:

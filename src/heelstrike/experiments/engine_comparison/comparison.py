@@ -26,6 +26,7 @@ from heelstrike.experiments.engine_comparison.settings import (
 from heelstrike.experiments.engine_comparison.tables import walk_table
 from heelstrike.experiments.engine_comparison.walk import TRUTH, Walk
 from heelstrike.experiments.engines.packages import peers
+from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot
@@ -91,6 +92,11 @@ class EngineComparison:
         ----------
         scenes : SceneTable, optional
             Of which landing and rest are drawn beside the walk.
+
+        Returns
+        -------
+        Figure
+            Matplotlib's figure.
         """
         from heelstrike.view.engines_figure import draw_engines
 
@@ -100,7 +106,7 @@ class EngineComparison:
                 for row in self.rows
                 if row.figures is not None
             ],
-            [] if scenes is None else [asdict(row) for row in scenes.at_steps],
+            [asdict(row) for row in scenes.at_steps if row.error is not None] if scenes else [],
         )
 
     def __rich__(self) -> Group:
@@ -206,7 +212,10 @@ def compare_engines(
             found = kept.row(row, told, make)
             fell = found.figures is not None and not found.figures.walks
             if fell and film is not None and not film.exists():
-                make()  # it was kept by a comparison without films
+                try:
+                    make()  # it was kept by a comparison without films
+                except (InvalidRunError, SimulationError) as error:
+                    say(f"no film of {title}, {which}: {error}", k / len(asked))
             rows.append(found)
     finally:
         walk.close()

@@ -203,6 +203,8 @@ class CompassWalk:
     error: float
     """Standard error of the modulus of the largest: the phase in which a landing meets the steps of
     an engine is chance."""
+    undetermined: str = ""
+    """Why there are no multipliers, though it took all steps; empty if there are."""
 
 
 def middle_of(q: Floats, v: Floats) -> Floats:
@@ -258,7 +260,8 @@ def compass_walk(mover: Mover, start: State) -> CompassWalk:
     Returns
     -------
     CompassWalk
-        Its numbers are NaN where it does not walk.
+        Its numbers are NaN where it does not walk, and its multipliers where it does not walk on
+        from a disturbance.
     """
     taken: list[_Middle] = []
     ending = ""
@@ -267,27 +270,28 @@ def compass_walk(mover: Mover, start: State) -> CompassWalk:
         taken.append(row)
         while len(taken) <= STRIDES:
             taken.append(_stride(mover, taken[-1]))
-        around = taken[-1]
-        kicks = np.random.default_rng(SEED).uniform(-1.0, 1.0, (DISTURBED, 3)) * DISTURBANCE
-        after = np.array([_stride(mover, _disturbed(around, each)).numbers for each in kicks])
     except NotWalkingError as fell:
         ending = str(fell)
     nan = math.nan
-    if ending or len(taken) <= STRIDES:
-        none = CompassWalk(
-            max(0, len(taken) - 1), ending, nan, nan, (nan, nan, nan), nan, (nan, nan, nan), nan
-        )
-        return none
+    none = nan, nan, nan
+    if ending:
+        return CompassWalk(max(0, len(taken) - 1), ending, nan, nan, none, nan, none, nan)
+    kicks = np.random.default_rng(SEED).uniform(-1.0, 1.0, (DISTURBED, 3)) * DISTURBANCE
+    undetermined = ""
+    try:
+        after = np.array([_stride(mover, _disturbed(taken[-1], each)).numbers for each in kicks])
+    except NotWalkingError as fell:
+        undetermined = str(fell)
     last = taken[-LAST - 1 :]
     lasting = [b.time for b in last[1:]]
     lengths = [b.foot - a.foot for a, b in pairwise(last)]
     numbers = np.array([each.numbers for each in last])
     mean = numbers.mean(axis=0)
-    multipliers, error = _multipliers(kicks, after)
+    multipliers, error = (none, nan) if undetermined else _multipliers(kicks, after)
     return CompassWalk(
         STRIDES, "", float(np.mean(lasting)), float(np.mean(lengths)),
         (float(mean[0]), float(mean[1]), float(mean[2])), float(np.abs(numbers - mean).max()),
-        multipliers, error,
+        multipliers, error, undetermined,
     )  # fmt: skip
 
 

@@ -36,6 +36,9 @@ from heelstrike.sim import TimeStepping
 STEPS = (1e-3, 2e-4)
 """Steps of the engines, in s."""
 
+MODULES = ("compass", "scenes")
+"""Modules of this room that make its rows."""
+
 EXACT, OURS = "event-driven", "time stepping"
 """Our rows."""
 
@@ -112,10 +115,13 @@ def compass_cells(row: Mapping[str, Any]) -> list[str]:
         said = f"no, {walk['strides']}: {walk['ending']}"
         return [row["title"], step, said, "–", "–", "–", "–", "–"]
     digits = 9 if row["engine"] == EXACT else 4
+    if walk.get("undetermined"):  # files from before have none
+        multipliers = f"none, disturbed: {walk['undetermined']}"
+    else:
+        multipliers = _written(walk["multipliers"], 6 if row["engine"] == EXACT else 2)
     return [
         row["title"], step, "yes", f"{walk['period_s']:.{digits}f}",
-        f"{walk['step_m']:.{digits}f}", short(1e3 * walk["spread"]),
-        _written(walk["multipliers"], 6 if row["engine"] == EXACT else 2),
+        f"{walk['step_m']:.{digits}f}", short(1e3 * walk["spread"]), multipliers,
         short(walk["error"]) if walk["error"] else "–",
     ]  # fmt: skip
 
@@ -167,7 +173,7 @@ def compare_compass(
     """
     entries = entries_called(engines)
     versions = peers(load=False)
-    kept = KeptRows(folder, {}, ("compass", "scenes"))
+    kept = KeptRows(folder, {}, MODULES)
     cycle, start = our_cycle()
     rows = [CompassRow(EXACT, f"heelstrike, {EXACT}", math.nan, _told(cycle), "")]
     for step in steps:
@@ -183,7 +189,8 @@ def compare_compass(
             rows.append(replace(row, reason=f"{PACKAGES[entry.package].title} is {state}"))
             continue
         given = settings_of(name, entry, settings)
-        told = [name, step, asked_of_engine(entry.package, given, versions)]
+        begins = [start.q.tolist(), start.v.tolist()]
+        told = [name, step, begins, asked_of_engine(entry.package, given, versions)]
         try:
             found = kept.entries(
                 f"compass-{name}-{settings}-{step:g}",

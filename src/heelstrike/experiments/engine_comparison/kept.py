@@ -26,9 +26,16 @@ from heelstrike.whole_file import write_whole
 
 ROOMS = (
     *(f"experiments/engines/{name}" for name in ("peer", "links", "served", "serving", "scenario")),
-    "analysis", "sim", "control", "contact", "dynamics", "gait", "robot", "compiler",
+    *(f"experiments/{name}" for name in ("comparison", "walk", "passive")),
+    "analysis", "sim", "control", "contact", "dynamics", "gait", "robot", "compiler", "tolerances",
 )  # fmt: skip
 """Rooms and modules of this package whose text is in every digest."""
+
+IMPORTED: Mapping[str, tuple[str, ...]] = {"pinocchio_contact_peer": ("pinocchio_peer",)}
+"""Other adapters that an adapter imports."""
+
+MODULES = ("walk", "walking", "figures")
+"""Modules of this room that make walks."""
 
 ELSEWHERE = "experiments/engines/elsewhere"
 """Room of the scripts of engines that another Python has."""
@@ -49,7 +56,8 @@ def asked_of_engine(
         What :func:`~heelstrike.experiments.engines.peers` says of the engines.
     """
     known = PACKAGES[package]
-    rooms: tuple[str, ...] = (f"experiments/engines/{known.adapter}",)
+    adapters = (str(known.adapter), *IMPORTED.get(str(known.adapter), ()))
+    rooms = tuple(f"experiments/engines/{name}" for name in adapters)
     if known.elsewhere:
         script = str(known.adapter).replace("_peer", "_server")
         rooms += (f"{ELSEWHERE}/exchange", f"{ELSEWHERE}/{script}")
@@ -77,7 +85,7 @@ class KeptRows:
         self,
         folder: Path | str | None,
         walk: Mapping[str, Any],
-        modules: tuple[str, ...] = ("walk", "walking", "figures"),
+        modules: tuple[str, ...] = MODULES,
     ) -> None:
         self._folder = None if folder is None else Path(folder)
         self._begun = json.dumps(walk, sort_keys=True).encode()

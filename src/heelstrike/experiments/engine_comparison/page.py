@@ -12,10 +12,12 @@ from typing import Any
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
 from heelstrike.experiments.engine_comparison.compass_table import HEADINGS as COMPASS
+from heelstrike.experiments.engine_comparison.compass_table import STEPS as COMPASS_STEPS
 from heelstrike.experiments.engine_comparison.compass_table import compass_cells
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
 from heelstrike.experiments.engine_comparison.pushes import DIRECTIONS, UNPUSHED
+from heelstrike.experiments.engine_comparison.scene_table import why_not_at_steps
 from heelstrike.experiments.engine_comparison.settings import (
     BEST,
     best_settings,
@@ -57,12 +59,12 @@ def engines_page(folder: Path, figure: str) -> str:
         for file in _files(folder, "engines")
     }
     scenes_file = folder / "scenes.json"
+    first = "heelstrike compare --engines all --scenes comes first"
     if not walks or not scenes_file.exists():
-        raise SimulationError(
-            f"there is nothing to write a page of in {folder}: heelstrike compare --engines all "
-            "--scenes comes first"
-        )
+        raise SimulationError(f"there is nothing to write a page of in {folder}: {first}")
     scenes = json.loads(scenes_file.read_text(encoding="utf-8"))
+    if lacks := [part for part in ("compass", "guards") if part not in scenes]:
+        raise SimulationError(f"{scenes_file} is from before: it lacks {lacks[0]!r}. {first}")
     parts = [
         _INTRODUCTION,
         _in_short(walks),
@@ -96,7 +98,8 @@ process, takes torques, and returns its state and contact forces. The controller
 compiled one, called with the engine's state and forces every 2 ms, or as often as the table says.
 Times cover the engine's steps and the Python calls that they need; heelstrike's include the
 controller. Other work ran at the same time: ignore differences below a factor of two. The tables
-may come from several runs; each states its steps, controller and step size.
+may come from several runs; each states its steps, controller and step size. What was kept from
+an earlier run has its computing times.
 
 `heelstrike compare bravo7 --engines all` makes the tables; with `--scenes --page docs/engines.md`
 it writes this page. For one engine use `--engines mujoco`, for a quick trial `--quick`. `--films`
@@ -412,6 +415,7 @@ def _scenes(found: Mapping[str, Any]) -> str:
         for row in found["rows"]
         if row["error"] is None and "restitution" not in row["reason"]
     )
+    why |= dict.fromkeys(f"- {each}." for each in why_not_at_steps(found))
     return (
         "## Scenes with closed forms\n\nThe exact result of each scene:\n\n" + "\n".join(listed)
         + f"\n\n{_SYMBOLS}\n\nThe table has the errors (simulated less exact, in the units above) "
@@ -438,9 +442,22 @@ def _compass(found: Mapping[str, Any]) -> str:
         "next step differs. Where that exceeds the disturbances, the standard error is large and "
         "the multipliers are not resolved. Each row is `heelstrike compare bravo7 --engines NAME "
         "--scenes`. Published: "
-        "0.734346391 s, 0.535445415 m, −0.199726 ± 0.544476i and 0.131573.\n\n"
+        "0.734346391 s, 0.535445415 m, −0.199726 ± 0.544476i and 0.131573. If an engine falls in a "
+        "disturbed step, the multipliers' column has the reason. "
+        f"Rows may come from separate runs.{_not_run(found)}\n\n"
         + _table(COMPASS, [compass_cells(row) for row in found["rows"]])
     )
+
+
+def _not_run(found: Mapping[str, Any]) -> str:
+    """Say which rows of the compass gait are missing."""
+    there = {(row["engine"], row["step_s"]) for row in found["rows"]}
+    steps = sorted({*COMPASS_STEPS, *(step for _, step in there if step is not None)}, reverse=True)
+    lacks = {
+        name: [f"{1e3 * step:g}" for step in steps if (name, step) not in there] for name in ENTRIES
+    }
+    told = [f"{_title(name)} at {' and '.join(own)} ms" for name, own in lacks.items() if own]
+    return f" Missing rows were not run here: {', '.join(told)}." if told else ""
 
 
 def _guards(found: Mapping[str, Any]) -> str:

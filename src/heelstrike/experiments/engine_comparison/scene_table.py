@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
@@ -32,6 +33,9 @@ from heelstrike.field_texts import dataclass
 from heelstrike.reader_process import ReaderProcess
 from heelstrike.sim import Compliant, EventDriven, TimeStepping
 from heelstrike.sim.method import Method
+
+MODULES = ("scenes",)
+"""Modules of this room that make errors."""
 
 STEP = 1e-3
 """Step of the engines, in s."""
@@ -79,10 +83,12 @@ class StepRow:
     """What tables call the engine."""
     step_s: float
     """Step, in s; of our event-driven runs their relative tolerance."""
-    error: float
-    """What is measured less what the closed form gives, without its sign."""
-    computing_s: float
+    error: float | None
+    """What is measured less what the closed form gives, without its sign; None if nothing is."""
+    computing_s: float | None
     """Computing time, in s."""
+    reason: str = ""
+    """Why there is nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +104,7 @@ class SceneTable:
     rows: tuple[SceneRow, ...]
     """Errors, scene by scene."""
     at_steps: tuple[StepRow, ...] = ()
-    """Errors and computing times of `AT_STEPS`, engine by engine; what fails has no row."""
+    """Errors and computing times of `AT_STEPS`, engine by engine."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain numbers and texts."""
@@ -128,7 +134,24 @@ class SceneTable:
                     error = row.reason if row.error is None else short(row.error)
                     table.add_row(row.title, error)
             parts.append(table)
+        parts += [f"{each}." for each in why_not_at_steps(self.to_dict())]
         return Group(*parts)
+
+
+def why_not_at_steps(found: Mapping[str, Any]) -> list[str]:
+    """Tell why there is nothing at some of several steps, where the scene's row does not say so.
+
+    Parameters
+    ----------
+    found : mapping
+        Of ``SceneTable.to_dict()``.
+    """
+    said = {(row["scene"], row["title"], row["reason"]) for row in found["rows"]}
+    return [
+        f"{row['title']}, {AT_STEPS[row['shows']]}, {1e3 * row['step_s']:g} ms: {row['reason']}"
+        for row in found.get("at_steps", ())
+        if row.get("reason") and (AT_STEPS[row["shows"]], row["title"], row["reason"]) not in said
+    ]
 
 
 @takes(SimulationError)
@@ -154,7 +177,7 @@ def compare_scenes(
     steps : sequence of float
         Steps at which landing and rest are simulated, too.
     folder : path, optional
-        Where rows are kept as they come, to go on from there.
+        Where errors are kept as they come, to go on from there. What is timed runs again.
     progress : callable, optional
         Called before each scene with a text, and the share of scenes that is done.
 
@@ -182,7 +205,7 @@ def compare_scenes(
             for name, entry in entries.items():
                 say(f"{scene.name}, {entry.title}", k / (len(everything) + len(AT_STEPS)))
                 try:
-                    found, _ = asked.error(scene, name, entry, step)
+                    found = asked.error(scene, name, entry, step)
                 except InvalidRunError as refused:
                     rows.append(SceneRow(scene.name, name, entry.title, None, str(refused)))
                 else:
@@ -197,10 +220,12 @@ def compare_scenes(
                 say(f"{scene.name}, {entry.title}, at several steps", 1.0)
                 for each in steps:
                     try:
-                        found, seconds = asked.error(scene, name, entry, each)
-                    except InvalidRunError:
-                        continue  # its row above says why
-                    at_steps.append(StepRow(shows, entry.title, each, abs(found), seconds))
+                        found, seconds = asked.timed(scene, name, entry, each)
+                    except InvalidRunError as refused:
+                        row = StepRow(shows, entry.title, each, None, None, str(refused))
+                    else:
+                        row = StepRow(shows, entry.title, each, abs(found), seconds)
+                    at_steps.append(row)
     finally:
         asked.close()
     told = tuple((s.name, s.exact, s.unit, s.source) for s in everything)
@@ -224,12 +249,15 @@ def _by_ours(shows: str, scene: Scene, steps: Sequence[float]) -> list[StepRow]:
 
 
 class _Engines:
-    """Engines that are asked for scenes, each in its process; what they answer is kept."""
+    """Engines that are asked for scenes, each in its process.
+
+    Their errors are kept, but not how long they took: that is of this machine and day, as is ours.
+    """
 
     def __init__(
         self, folder: Path | str | None, settings: str, versions: Mapping[str, str]
     ) -> None:
-        self._kept = KeptRows(folder, {}, ("scenes",))
+        self._kept = KeptRows(folder, {}, MODULES)
         self._settings, self._versions = settings, versions
         self._processes: dict[str, ReaderProcess] = {}
 
@@ -238,23 +266,33 @@ class _Engines:
         for process in self._processes.values():
             process.end()
 
-    def error(self, scene: Scene, name: str, entry: Entry, step: float) -> tuple[float, float]:
-        """Simulate a scene; return its error and the seconds that it took."""
-        state = self._versions[entry.package]
-        if not compared({entry.package: state}):
-            raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
-        given = settings_of(name, entry, self._settings)
-        if entry.package not in self._processes:
-            self._processes[entry.package] = engine_process(entry.package)
+    def error(self, scene: Scene, name: str, entry: Entry, step: float) -> float:
+        """Return the error of a scene, which may be kept."""
+        given = self._given(name, entry)
 
         def make() -> dict[str, Any]:
-            process = self._processes[entry.package]
-            error, seconds = scene_error(scene, entry, step, given, process)
-            return {"error": error, "seconds": seconds}
+            error, _ = self.timed(scene, name, entry, step)
+            return {"error": error}
 
         words = "-".join(re.findall(r"[\w.]+", scene.name))
         told = [name, scene.exact, step, asked_of_engine(entry.package, given, self._versions)]
-        found = self._kept.entries(f"scene-{words}-{name}-{step:g}", told, make)
-        if found["error"] is None:
+        error: float = self._kept.entries(f"scene-{words}-{name}-{step:g}", told, make)["error"]
+        return error
+
+    def timed(self, scene: Scene, name: str, entry: Entry, step: float) -> tuple[float, float]:
+        """Simulate a scene now; return its error and the seconds that it took."""
+        given = self._given(name, entry)
+        if entry.package not in self._processes:
+            self._processes[entry.package] = engine_process(entry.package)
+        process = self._processes[entry.package]
+        error, seconds = scene_error(scene, entry, step, given, process)
+        if not math.isfinite(error):
             raise InvalidRunError("what it ends with is not finite")
-        return found["error"], found["seconds"]
+        return error, seconds
+
+    def _given(self, name: str, entry: Entry) -> dict[str, Any]:
+        """Return the settings of an engine that is there."""
+        state = self._versions[entry.package]
+        if not compared({entry.package: state}):
+            raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
+        return settings_of(name, entry, self._settings)
