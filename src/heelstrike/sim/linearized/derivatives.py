@@ -25,7 +25,7 @@ from heelstrike.sim.linearized.mode_changes import ModeChange, other_modes
 from heelstrike.sim.linearized.refusals import refuse_inputs, refuse_step
 from heelstrike.sim.linearized.step import linearized
 from heelstrike.sim.linearized.time_step import allocate_slopes, differentiate_step
-from heelstrike.sim.linearized.yielding import Yielding
+from heelstrike.sim.linearized.yielding import AT_LIMITS, Yielding
 from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.time_stepping.method import TimeStepping
@@ -451,28 +451,34 @@ class _Yields:
         yielding.begin()
         while simulation.time < end - AT_ONCE * step:
             self._beside.restore(simulation.snapshot())
-            held = self._held(change, held)
+            held, asked = self._held(change, held)
             _one_step(simulation)
+            if asked is not None and np.any(_at_limits(simulation, asked)):
+                raise SimulationError(AT_LIMITS)
             self._beside._memory.command[:] = simulation._memory.command
             yielding.flow(change, held)
         if self._answers and yielding.law is not None and simulation._control.continuous:
             yielding.law.check_beginning()
         return _told(simulation, begin, change[:size], inputs, ())
 
-    def _held(self, change: Floats, held: Floats) -> Floats:
-        """Return what errors do to torques that are held from this sample on."""
-        simulation, law = self._simulation, self._yielding.law
+    def _held(self, change: Floats, held: Floats) -> tuple[Floats, Floats | None]:
+        """Return what errors do to torques that are held from this sample on.
+
+        Also the torques that a sampled law asks for, if it is asked now.
+        """
+        simulation, law, asked = self._simulation, self._yielding.law, None
         if law is None or not self._answers:
-            return held
+            return held, asked
         if simulation._control.continuous:
             law.check_memory()
         elif is_due(simulation._clock):
             instant = law.now()
             law.check_call(instant)
+            asked = instant.torque()
             held = instant.gains() @ change[: len(instant.state.vector)]
             own = [self._yielding.size + column for column in self._inputs.of_parameters()]
             held += instant.by_parameters(self._inputs.parameters) @ change[own]
-        return held
+        return held, asked
 
 
 def _again(simulation: Simulation, now: Snapshot) -> Simulation:
