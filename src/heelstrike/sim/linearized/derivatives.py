@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import ceil
 from types import MappingProxyType
 
 import numpy as np
@@ -216,7 +217,7 @@ def step_derivatives(
     simulation : Simulation
         It goes on to the end.
     until : float, optional
-        End in s; one step of the method by default.
+        End in s, rounded as by :meth:`~heelstrike.Simulation.advance`; one step of the method by default.
     numbers : sequence of str
         ``"friction"`` of the ground; ``"mass"``, ``"inertia"``, ``"center_of_mass"``,
         ``"armature"``, ``"damping"``, ``"stiffness"``, ``"rest"`` or ``"gravity"`` of the robot,
@@ -251,7 +252,7 @@ def step_derivatives(
     stepper = _stepper(simulation, numbers, gains, answers)
     if modes is not None and not (until is None and isinstance(stepper, _TimeSteps)):
         raise SimulationError("modes is for one step of time stepping only: leave it out")
-    return stepper.until(until, modes)
+    return stepper.until(None if until is None else simulation._instant(until), modes)
 
 
 @takes(SimulationError)
@@ -271,7 +272,7 @@ def run_derivatives(
     simulation, numbers, gains, answers
         As of :func:`step_derivatives`.
     until : float
-        End in s.
+        End in s, rounded as by :meth:`~heelstrike.Simulation.advance`.
     every : float, optional
         Seconds from one state to the next; by default one step of time stepping, or the period of a
         sampled controller, of which it must be a multiple; and the whole time of an event-driven
@@ -295,12 +296,19 @@ def run_derivatives(
     >>> run.adjoint([1.0] + [0.0] * 7).state.shape
     (8,)
     """
+    begin, end = simulation.time, simulation._instant(until)
     own = max(simulation.method.step_length or 0.0, simulation.control_period)
+    if every is not None:
+        part = every / own % 1.0 if own > 0.0 else 0.0
+        if not every > 0.0 or min(part, 1.0 - part) > AT_ONCE:
+            of = f", and a multiple of {own:.6g} s" if own > 0.0 else ""
+            raise SimulationError(f"every must be positive{of}; got {every}")
     own = 0.0 if isinstance(simulation.method, Compliant) else own
-    span = every or own or until - simulation.time
-    begin, stepper = simulation.time, _stepper(simulation, numbers, gains, answers)
-    ends = begin + span * np.arange(1, max(1, round((until - begin) / span)) + 1)
-    return RunDerivatives(tuple(stepper.until(min(end, until)) for end in ends.tolist()))
+    span = every or own or end - begin
+    stepper = _stepper(simulation, numbers, gains, answers)
+    count = max(1, ceil((end - begin) / span - AT_ONCE)) if span > 0.0 else 1
+    ends = begin + span * np.arange(1, count + 1)
+    return RunDerivatives(tuple(stepper.until(min(each, end)) for each in ends.tolist()))
 
 
 def _stepper(
