@@ -226,9 +226,7 @@ def test_what_cannot_be_differentiated_is_told() -> None:
 def test_torques_at_their_limits_are_refused(how: dict[str, float]) -> None:
     """Of a law that acts all the time, and of a sampled one, whose limited torque is held."""
     build = hs.RobotBuilder("slide")
-    build.slide(
-        "slide", None, mass=2.0, inertia=0.1, direction=(1.0, 0.0), torque=9.0
-    )
+    build.slide("slide", None, mass=2.0, inertia=0.1, direction=(1.0, 0.0), torque=9.0)
     robot = build.build()
     law = spring(Gains(stiffness=np.array([3000.0])))
     for place, limited in ((0.002, False), (0.004, True)):  # 6 N and 12 N

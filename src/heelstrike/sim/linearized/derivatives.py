@@ -217,7 +217,8 @@ def step_derivatives(
     simulation : Simulation
         It goes on to the end.
     until : float, optional
-        End in s, rounded as by :meth:`~heelstrike.Simulation.advance`; one step of the method by default.
+        End in s, rounded as by :meth:`~heelstrike.Simulation.advance`; one step of the method by
+        default.
     numbers : sequence of str
         ``"friction"`` of the ground; ``"mass"``, ``"inertia"``, ``"center_of_mass"``,
         ``"armature"``, ``"damping"``, ``"stiffness"``, ``"rest"`` or ``"gravity"`` of the robot,
