@@ -54,7 +54,8 @@ def test_the_log_tells_of_programmes_that_are_not_solved() -> None:
     state, unsolved = motion().initial_state, []
     for weight in (robot.weight, np.nan):
         law.parameters = law.parameters.replaced(weight=weight)
-        unsolved.append(hs.simulate(robot, law, state=state, duration=0.01).log.unsolved[-1])
+        run = hs.simulate(robot, law, state=state, duration=0.01)
+        unsolved.append(run.log["unsolved"].values[-1])
     assert unsolved[0] == 0
     assert unsolved[1] >= 10
 
