@@ -477,6 +477,10 @@ class Simulation:
         Exception
             With ``on_error="raise"``, what the controller raised.
         """
+        return self._advance(self._instant(until), NEVER, progress)
+
+    def _instant(self, until: float) -> float:
+        """Return the instant of the method at which what is to be simulated until a time ends."""
         instant = -np.inf
         given: object = until
         if not isinstance(given, Real):  # cheaper than a look at all arguments: calls are many
@@ -488,7 +492,7 @@ class Simulation:
             raise SimulationError(
                 f"until must not be before the present time, {self._now}; got {until}"
             )
-        return self._advance(instant, NEVER, progress)
+        return instant
 
     def _advance(
         self, until: float, pause: int, progress: Callable[[float], None] | None = None,

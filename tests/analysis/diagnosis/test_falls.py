@@ -171,6 +171,11 @@ def test_a_push_that_no_motor_withstands_tips_however_weak_motors_are() -> None:
     assert (fall.cause, fall.where) == (Cause.TIPPED_FORWARD, "left_foot")
     assert fall.evidence["beyond_m"] > 0.1
     assert Cause.TORQUE_LIMIT in {each.cause for each in fall.chain}
+    for start in (0.0, 1e-3):  # as the run begins, and just after
+        push = hs.Push("trunk", force=(300.0, 0.0), start=start, duration=0.1)
+        fall = first_cause(falls.walk(robot=robot, pushes=[push]).run(), walking.gait())
+        assert fall is not None
+        assert (fall.cause, fall.where, fall.time) == (Cause.TIPPED_FORWARD, "right_foot", start)
 
 
 def test_a_motor_at_its_limit_that_drives_its_joint_away_is_the_controllers() -> None:

@@ -53,7 +53,7 @@ def test_the_plane_is_as_far_as_its_normal_tells() -> None:
         point = draw.normal(size=3)
         ground = SpatialGround(normal=(x, y, 1.0), height=height)
         n = np.array([x, y, 1.0]) / math.sqrt(x * x + y * y + 1.0)
-        there = n * ground.model().height  # a point of the plane
+        there = np.array([0.0, 0.0, height])  # a point of the plane
         gap, normal = distance_to_face(ground.model(), 0, tuple(point.tolist()))
         assert gap == pytest.approx(n @ (point - there), abs=1e-14)
         assert normal == pytest.approx(n)

@@ -348,3 +348,32 @@ def test_springs_that_a_scheme_takes_ahead_are_so_in_its_derivative(
     heavy = m + ahead * h * d + (ahead * h) ** 2 * k
     by_q, by_v = -h * k / heavy, 1.0 - h * (d + ahead * h * k) / heavy
     np.testing.assert_allclose(found.state[1], [by_q, by_v], rtol=1e-12)
+
+
+@pytest.mark.parametrize("method", [hs.TimeStepping(step=1e-3), hs.Compliant(step=1e-3)])
+def test_an_end_within_a_step_is_rounded_as_a_simulation_rounds_it(
+    method: hs.TimeStepping | hs.Compliant,
+) -> None:
+    """And a run goes on until its end, whatever part of it the last state comes after."""
+    robot = mechanisms.point()
+    high = robot.reference_state().q + np.array([0.0, 1.0])
+
+    def begun() -> hs.Simulation:
+        return hs.Simulation(robot, state=hs.State(high, np.zeros(2)), method=method)
+
+    for until in (0.0024, 0.0025, 0.0026):
+        simulation = begun()
+        simulation.advance(until)
+        found = hs.step_derivatives(begun(), until=until)
+        assert found.end == pytest.approx(simulation.time, abs=1e-12)
+        assert found.state[1, 3] == pytest.approx(simulation.time)
+        assert hs.run_derivatives(begun(), until).steps[-1].end == found.end
+    run = hs.run_derivatives(begun(), 0.0054, every=0.004)
+    assert [each.end for each in run.steps] == pytest.approx([0.004, 0.005])
+    for every in (0.0025, 0.0, -0.001, np.nan):
+        with pytest.raises(hs.SimulationError, match="every must be positive, and a multiple of"):
+            hs.run_derivatives(begun(), 0.01, every=every)
+    late = begun()
+    late.advance(0.01)
+    with pytest.raises(hs.SimulationError, match="until must not be before"):
+        hs.step_derivatives(late, until=0.005)

@@ -222,6 +222,22 @@ def test_what_cannot_be_differentiated_is_told() -> None:
         hs.run_derivatives(simulated(robot, x, hs.Compliant(law=SOFT)), 0.004, every=0.002)
 
 
+@pytest.mark.parametrize("how", [{}, {"control_period": 2e-3}])
+def test_torques_at_their_limits_are_refused(how: dict[str, float]) -> None:
+    """Of a law that acts all the time, and of a sampled one, whose limited torque is held."""
+    build = hs.RobotBuilder("slide")
+    build.slide("slide", None, mass=2.0, inertia=0.1, direction=(1.0, 0.0), torque=9.0)
+    robot = build.build()
+    law = spring(Gains(stiffness=np.array([3000.0])))
+    for place, limited in ((0.002, False), (0.004, True)):  # 6 N and 12 N
+        simulation = simulated(robot, np.array([place, 0.0]), hs.Compliant(), controller=law, **how)
+        if not limited:
+            hs.step_derivatives(simulation, until=0.004)
+            continue
+        with pytest.raises(hs.SimulationError, match="torques reached the limits of the motors"):
+            hs.step_derivatives(simulation, until=0.004)
+
+
 def test_torques_that_are_held_are_those_that_a_law_asks_for() -> None:
     """By what is added to the torques, and by the parameter that is the torque."""
     robot, x = in_the_air()

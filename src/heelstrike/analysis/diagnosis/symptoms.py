@@ -360,8 +360,8 @@ def _pushed_over(walk: Walk) -> Iterator[Symptom]:
     if not walk.has_soles:
         return
     for push in run.pushes:
-        row = int(np.searchsorted(run.time, push.start - 1e-9)) - 1
-        if row < 0 or not walk.carrying[row].any():
+        row = max(int(np.searchsorted(run.time, push.start - 1e-9)) - 1, 0)
+        if not walk.carrying[row].any():
             continue
         acts = (run.time >= push.start) & (run.time <= push.end)
         link, local = push.place(run.robot)

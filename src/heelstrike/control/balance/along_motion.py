@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.compiler.bundle import array, cell, number, part
+from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance import shifted_feet
 from heelstrike.control.balance.shifted_feet import moved_footholds, shift_feet
@@ -45,8 +45,8 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 REST_LEVEL, PUSH_LEVEL, SLIDE_LEVEL = 1, 2, 3
 """In which order rows are given up, the greatest first."""
 LEAST_WEIGHT = 1e-6
-"""Weight of the trunk's translation: what stands says where the trunk is, and this only makes the
-least one point."""
+"""Weight of the trunk's translation, and least of its rotation: what stands says where the trunk
+is, and this only makes the least one point."""
 
 
 class Parameters(shifted_feet.Parameters):
@@ -73,6 +73,15 @@ class Memory(shifted_feet.Memory):
     """relaxed, unsolved: Programmes that gave up rows, and those that were not solved."""
 
 
+class Log(Bundle):
+    """What the law tells of itself."""
+
+    relaxed: int = cell(int, label="Levels of rows given up")
+    unsolved: int = cell(int, label="Programmes that were not solved so far")
+    """relaxed, unsolved: By the quadratic programme; no torque is asked for where it is not
+    solved."""
+
+
 @kernel
 def add_row(program: Program, bound: float, level: int) -> int:
     """Add a row of zeros; return which it is."""
@@ -94,7 +103,7 @@ def add_wishes(count: int, robot: ControlledRobot, parameters: Parameters, memor
         if robot.motor[j] >= 0:
             weight = 1.0
         elif robot.model.axis[j, 0] != 0.0:
-            weight = parameters.pitch
+            weight = max(parameters.pitch, LEAST_WEIGHT)
         program.hessian[j, j] = weight
         program.gradient[j] = -weight * memory.wanted[j]
     for k in range(program.x.shape[0] - n):
@@ -184,7 +193,7 @@ def want_trunk(
 @controller
 def keep_to_motion(
     t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
-    parameters: Parameters, memory: Memory, torque: Floats,
+    parameters: Parameters, memory: Memory, log: Log, torque: Floats,
 ) -> None:  # fmt: skip
     """Torques that keep to the motion within what ground and motors can do."""
     count = look_at_phase(t, state, contacts, robot, parameters, memory)
@@ -202,6 +211,8 @@ def keep_to_motion(
         memory.relaxed += 1
     if program.status != SOLVED:
         memory.unsolved += 1
+    log.relaxed, log.unsolved = program.relaxed, memory.unsolved
+    if program.status != SOLVED:
         return
     for i in range(robot.nv + count):
         memory.unknown[i] = program.x[i]

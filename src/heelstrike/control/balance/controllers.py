@@ -291,6 +291,8 @@ def _choose(groups: Sequence[dict[str, float]], given: Mapping[str, float]) -> N
             raise ControllerError(f"{name} must be a finite number, got {value}")
         if name == "friction" and value <= 0.0:
             raise ControllerError(f"friction must be positive, got {value}")
+        if name == "pitch" and value < 0.0:
+            raise ControllerError(f"pitch must not be negative, got {value}")
         group[name] = float(value)
 
 

@@ -50,6 +50,10 @@ class Parameters(motion_tracking.Parameters):
     spell: Floats = array("phases", "feet")
     """before, spell: For how long a foot has been in the air before a phase, and will have been as
     it lands (s); zero of one that stands, and that never lands."""
+    stance: Floats = array("phases")
+    after: Floats = array("phases", "feet")
+    """stance, after: For how long something stands in a phase, and in those after it until a foot
+    in the air lands (s)."""
     ahead: Floats = array(2)
     """Direction along the ground."""
     rate: float = number(float)
@@ -115,11 +119,13 @@ def shift_feet(
     error = capture_error(t, state, contacts, robot, parameters, memory)
     memory.error = error
     gone, rate, most = t - memory.start, parameters.rate, parameters.farthest
+    stands = max(parameters.stance[memory.phase] - gone, 0.0)
     for foot in range(robot.nf):
         spell = parameters.spell[memory.phase, foot]
         if spell > 0.0:
             passed = min(parameters.before[memory.phase, foot] + gone, spell)
-            wanted = parameters.adapts * error * exp(rate * (spell - passed))
+            grows = exp(rate * (stands + parameters.after[memory.phase, foot]))
+            wanted = parameters.adapts * error * grows
             wanted = min(max(wanted, -most), most)
             share = passed / spell
             place = wanted * share**2 * (3.0 - 2.0 * share)
@@ -150,7 +156,7 @@ def shift_leg(
     for i in range(size):
         for j in range(size):
             memory.normal[i, j] = LEG_DAMPING if i == j else 0.0
-            for k in range(min(size, 3)):
+            for k in range(max(2, min(size, 3))):
                 memory.normal[i, j] += rows[k, joints[i]] * rows[k, joints[j]]
         memory.normal[i, size] = 0.0
         for k in range(2):
@@ -180,13 +186,17 @@ def moved_footholds(robot: Robot, motion: Motion, *, adapts: float) -> dict[str,
     in_air = np.array(
         [[not (foot & points_of_phase(robot, each)) for foot in feet] for each in cycle]
     )
-    durations = [each.duration for each in cycle]
-    before, spell = _spells(durations, in_air, repeats=motion.repeat is not Repeat.NEVER)
+    durations = np.array([each.duration for each in cycle])
+    stance = durations * [len(each.contacts) > 0 for each in cycle]
+    repeats = motion.repeat is not Repeat.NEVER
+    before, spell, after = _spells(durations, stance, in_air, repeats=repeats)
     return {
         "mass": mass[..., None],
         "support": support,
         "before": before,
         "spell": spell,
+        "stance": stance,
+        "after": after,
         "ahead": ahead,
         "rate": float(np.sqrt(np.hypot(*robot.model.gravity) / height)),
         "farthest": MOST_MOVED * height,
@@ -210,10 +220,15 @@ def _mass_along(robot: Robot, phase: MotionPhase, ahead: Floats) -> Floats:
     return np.array(found)
 
 
-def _spells(durations: list[float], in_air: Any, *, repeats: bool) -> tuple[Floats, Floats]:
-    """For how long feet have been in the air before phases, and will have been as they land."""
+def _spells(
+    durations: Floats, stance: Floats, in_air: Any, *, repeats: bool
+) -> tuple[Floats, Floats, Floats]:
+    """For how long feet have been in the air before phases, and will have been as they land.
+
+    And for how long of what follows a phase until then something stands.
+    """
     count, _ = in_air.shape
-    before, spell = np.zeros(in_air.shape), np.zeros(in_air.shape)
+    before, spell, after = np.zeros((3, *in_air.shape))
     for p, foot in np.argwhere(in_air).tolist():
         first = last = p
         while in_air[(first - 1) % count, foot] and (repeats or first > 0) and p - first < count:
@@ -224,4 +239,5 @@ def _spells(durations: list[float], in_air: Any, *, repeats: bool) -> tuple[Floa
             continue  # it never lands
         before[p, foot] = sum(durations[k % count] for k in range(first, p))
         spell[p, foot] = sum(durations[k % count] for k in range(first, last + 1))
-    return before, spell
+        after[p, foot] = sum(stance[k % count] for k in range(p + 1, last + 1))
+    return before, spell, after

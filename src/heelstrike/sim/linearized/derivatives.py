@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import ceil
 from types import MappingProxyType
 
 import numpy as np
@@ -25,7 +26,7 @@ from heelstrike.sim.linearized.mode_changes import ModeChange, other_modes
 from heelstrike.sim.linearized.refusals import refuse_inputs, refuse_step
 from heelstrike.sim.linearized.step import linearized
 from heelstrike.sim.linearized.time_step import allocate_slopes, differentiate_step
-from heelstrike.sim.linearized.yielding import Yielding
+from heelstrike.sim.linearized.yielding import AT_LIMITS, Yielding
 from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.time_stepping.method import TimeStepping
@@ -216,7 +217,8 @@ def step_derivatives(
     simulation : Simulation
         It goes on to the end.
     until : float, optional
-        End in s; one step of the method by default.
+        End in s, rounded as by :meth:`~heelstrike.Simulation.advance`; one step of the method by
+        default.
     numbers : sequence of str
         ``"friction"`` of the ground; ``"mass"``, ``"inertia"``, ``"center_of_mass"``,
         ``"armature"``, ``"damping"``, ``"stiffness"``, ``"rest"`` or ``"gravity"`` of the robot,
@@ -251,7 +253,7 @@ def step_derivatives(
     stepper = _stepper(simulation, numbers, gains, answers)
     if modes is not None and not (until is None and isinstance(stepper, _TimeSteps)):
         raise SimulationError("modes is for one step of time stepping only: leave it out")
-    return stepper.until(until, modes)
+    return stepper.until(None if until is None else simulation._instant(until), modes)
 
 
 @takes(SimulationError)
@@ -271,7 +273,7 @@ def run_derivatives(
     simulation, numbers, gains, answers
         As of :func:`step_derivatives`.
     until : float
-        End in s.
+        End in s, rounded as by :meth:`~heelstrike.Simulation.advance`.
     every : float, optional
         Seconds from one state to the next; by default one step of time stepping, or the period of a
         sampled controller, of which it must be a multiple; and the whole time of an event-driven
@@ -295,12 +297,19 @@ def run_derivatives(
     >>> run.adjoint([1.0] + [0.0] * 7).state.shape
     (8,)
     """
+    begin, end = simulation.time, simulation._instant(until)
     own = max(simulation.method.step_length or 0.0, simulation.control_period)
+    if every is not None:
+        part = every / own % 1.0 if own > 0.0 else 0.0
+        if not every > 0.0 or min(part, 1.0 - part) > AT_ONCE:
+            of = f", and a multiple of {own:.6g} s" if own > 0.0 else ""
+            raise SimulationError(f"every must be positive{of}; got {every}")
     own = 0.0 if isinstance(simulation.method, Compliant) else own
-    span = every or own or until - simulation.time
-    begin, stepper = simulation.time, _stepper(simulation, numbers, gains, answers)
-    ends = begin + span * np.arange(1, max(1, round((until - begin) / span)) + 1)
-    return RunDerivatives(tuple(stepper.until(min(end, until)) for end in ends.tolist()))
+    span = every or own or end - begin
+    stepper = _stepper(simulation, numbers, gains, answers)
+    count = max(1, ceil((end - begin) / span - AT_ONCE)) if span > 0.0 else 1
+    ends = begin + span * np.arange(1, count + 1)
+    return RunDerivatives(tuple(stepper.until(min(each, end)) for each in ends.tolist()))
 
 
 def _stepper(
@@ -451,28 +460,34 @@ class _Yields:
         yielding.begin()
         while simulation.time < end - AT_ONCE * step:
             self._beside.restore(simulation.snapshot())
-            held = self._held(change, held)
+            held, asked = self._held(change, held)
             _one_step(simulation)
+            if asked is not None and np.any(_at_limits(simulation, asked)):
+                raise SimulationError(AT_LIMITS)
             self._beside._memory.command[:] = simulation._memory.command
             yielding.flow(change, held)
         if self._answers and yielding.law is not None and simulation._control.continuous:
             yielding.law.check_beginning()
         return _told(simulation, begin, change[:size], inputs, ())
 
-    def _held(self, change: Floats, held: Floats) -> Floats:
-        """Return what errors do to torques that are held from this sample on."""
-        simulation, law = self._simulation, self._yielding.law
+    def _held(self, change: Floats, held: Floats) -> tuple[Floats, Floats | None]:
+        """Return what errors do to torques that are held from this sample on.
+
+        Also the torques that a sampled law asks for, if it is asked now.
+        """
+        simulation, law, asked = self._simulation, self._yielding.law, None
         if law is None or not self._answers:
-            return held
+            return held, asked
         if simulation._control.continuous:
             law.check_memory()
         elif is_due(simulation._clock):
             instant = law.now()
             law.check_call(instant)
+            asked = instant.torque()
             held = instant.gains() @ change[: len(instant.state.vector)]
             own = [self._yielding.size + column for column in self._inputs.of_parameters()]
             held += instant.by_parameters(self._inputs.parameters) @ change[own]
-        return held
+        return held, asked
 
 
 def _again(simulation: Simulation, now: Snapshot) -> Simulation:

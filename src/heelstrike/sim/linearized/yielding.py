@@ -75,6 +75,7 @@ wrong one for a part of 1e-9 at most."""
 
 SHRINK, GROW, SAFETY = 0.2, 4.0, 0.9
 
+AT_LIMITS = "torques reached the limits of the motors, where they cannot be differentiated"
 NOT_FOLLOWED = "changes faster than its errors can be followed; use EventDriven()"
 
 RUBBED = 1e-3
@@ -263,9 +264,7 @@ class Yielding:
             work.now_rows, work.force,
         )  # fmt: skip
         if not np.array_equal(memory.torque, wanted):
-            raise SimulationError(
-                "torques reached the limits of the motors, where they cannot be differentiated"
-            )
+            raise SimulationError(AT_LIMITS)
         normal, force = now.normal, work.force[:nc]
         gap, pressed, slides = normal.gap[:nc] < 0.0, normal.force[:nc] > 0.0, friction.slides[:nc]
         off = (q < model.lower, q > model.upper)
