@@ -126,6 +126,26 @@ def test_torques_are_those_of_accelerations_and_wrenches(
     assert seen >= 20
 
 
+@pytest.mark.parametrize("raised", ["both", "left"])
+def test_nothing_pushes_a_foot_in_the_air(
+    raised: str, robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    """It has no wrench, so that torques are not reckoned with one."""
+    law = hs.HoldBalance(robot, posture=crouched)
+    q = crouched.copy()
+    if raised == "both":
+        q[2] += 0.3
+        q[3:7] = np.cos(0.1), 0.0, np.sin(0.1), 0.0
+    else:
+        q[robot.model.first_position[robot.joint_index("left_knee")]] += 0.4
+    simulation = hs.Simulation(robot, law, state=hs.State(q, np.zeros(robot.nv)))
+    simulation.step()
+    program = simulation._numbers.memory.program
+    left, right = program.x[robot.nv :].reshape(-1, 6)
+    assert np.all(left == 0.0)
+    assert np.all(right == 0.0) if raised == "both" else right[2] > 0.1 * robot.weight
+
+
 def test_it_stands_over_the_middle_of_its_soles(
     robot: hs.SpatialRobot, crouched: np.ndarray
 ) -> None:

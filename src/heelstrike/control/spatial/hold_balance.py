@@ -57,9 +57,6 @@ moment about its normal."""
 TOUCHES = 2e-3
 """Gap (m) up to which a foot is taken to stand."""
 
-IN_THE_AIR = 1e2
-"""Cost of the wrench of a foot in the air, which makes it vanish."""
-
 DYNAMICS_LEVEL, MOTOR_LEVEL, CONE_LEVEL, PRESSURE_LEVEL = 0, 0, 1, 2
 """In which order rows are given up if not all can be kept; those at 0 never are."""
 
@@ -123,7 +120,9 @@ class BalanceMemory(Bundle):
     passive: Floats = array("nv")
     """mass, bias, passive: Mass matrix, H, and the force of springs and dampers of joints."""
     jacobian: Floats = array("wrenches", "nv")
-    """Of the middle of each sole, and of the rotation of its link."""
+    """Of the middle of each sole, and of the rotation of its link; zero of a foot in the air."""
+    stands: Integers = array("feet", of=int)
+    """Whether each foot is on the ground: only there do wrenches act."""
     center: Floats = array(3)
     momentum: Floats = array(6)
     """center, momentum: Centre of mass (m), momentum (N s), and moment of it (N m s)."""
@@ -145,11 +144,23 @@ class BalanceLog(Bundle):
 
 
 @kernel
+def stands(
+    foot: int, contacts: Contacts, robot: SpatialControlledRobot, numbers: BalanceNumbers
+) -> bool:
+    """Whether a foot is on the ground."""
+    for contact in range(robot.nc):
+        link = int(robot.model.contact_link[contact])
+        if link == numbers.foot[foot] and contacts.gap[contact] < TOUCHES:
+            return True
+    return False
+
+
+@kernel
 def place_soles(
-    state: SpatialControlState, robot: SpatialControlledRobot, numbers: BalanceNumbers,
-    memory: BalanceMemory,
+    state: SpatialControlState, contacts: Contacts, robot: SpatialControlledRobot,
+    numbers: BalanceNumbers, memory: BalanceMemory,
 ) -> None:  # fmt: skip
-    """Find where the soles are, and their Jacobians."""
+    """Find where the soles are, which of them stand, and the Jacobians of these."""
     model, work = robot.model, state.kinematics
     for foot in range(numbers.foot.shape[0]):
         link, first = int(numbers.foot[foot]), WRENCH * foot
@@ -164,6 +175,9 @@ def place_soles(
         for row in range(first, first + WRENCH):
             for k in range(model.nv):
                 memory.jacobian[row, k] = 0.0
+        memory.stands[foot] = stands(foot, contacts, robot, numbers)
+        if memory.stands[foot] == 0:
+            continue
         place = place_of(work, at)
         last = model.last_velocity[link]
         for a in range(model.depth[last] + 1):
@@ -260,18 +274,6 @@ def add_ground(first: int, foot: int, numbers: BalanceNumbers, memory: BalanceMe
 
 
 @kernel
-def stands(
-    foot: int, contacts: Contacts, robot: SpatialControlledRobot, numbers: BalanceNumbers
-) -> bool:
-    """Whether a foot is on the ground."""
-    for contact in range(robot.nc):
-        link = int(robot.model.contact_link[contact])
-        if link == numbers.foot[foot] and contacts.gap[contact] < TOUCHES:
-            return True
-    return False
-
-
-@kernel
 def want_rest(
     first: int, foot: int, state: SpatialControlState, robot: SpatialControlledRobot,
     numbers: BalanceNumbers, memory: BalanceMemory,
@@ -294,14 +296,14 @@ def want_rest(
 
 @kernel
 def want_momentum(
-    standing: int, robot: SpatialControlledRobot, numbers: BalanceNumbers,
-    memory: BalanceMemory, log: BalanceLog,
-) -> None:  # fmt: skip
+    robot: SpatialControlledRobot, numbers: BalanceNumbers, memory: BalanceMemory, log: BalanceLog
+) -> None:
     """Add the tasks of centre of mass and moment of momentum, of which only wrenches are part."""
     program, center, mass = memory.program, memory.center, robot.mass
     goal_x = goal_y = goal_z = 0.0
-    feet = numbers.foot.shape[0]
+    feet, standing = numbers.foot.shape[0], 0
     for foot in range(feet):
+        standing += memory.stands[foot]
         goal_x += memory.sole[foot, 0] / feet
         goal_y += memory.sole[foot, 1] / feet
         goal_z += memory.sole[foot, 2] / feet
@@ -313,13 +315,15 @@ def want_momentum(
     for axis in range(3):
         row = scratch_row(program)
         for foot in range(feet):
-            program.rows[row, robot.nv + WRENCH * foot + axis] = 1.0 / mass
+            program.rows[row, robot.nv + WRENCH * foot + axis] = memory.stands[foot] / mass
         wanted = numbers.kp * off[axis] - numbers.kd * memory.momentum[axis] / mass
         missing = wanted - robot.model.gravity[axis]
         add_task(program.rows, row, missing, numbers.momentum, program)
         row = scratch_row(program)
         for foot in range(feet):
             first = robot.nv + WRENCH * foot
+            if memory.stands[foot] == 0:
+                continue
             arm = less(
                 (memory.sole[foot, 0], memory.sole[foot, 1], memory.sole[foot, 2]),
                 (center[0], center[1], center[2]),
@@ -355,11 +359,11 @@ def want_posture(
 
 
 @kernel
-def want_little_force(first: int, price: float, numbers: BalanceNumbers, program: Program) -> None:
+def want_little_force(first: int, numbers: BalanceNumbers, program: Program) -> None:
     """Add a price on the wrench of a foot."""
     for i in range(WRENCH):
         unit = numbers.weight if i < 3 else numbers.weight * numbers.height
-        program.hessian[first + i, first + i] += price / (unit * unit)
+        program.hessian[first + i, first + i] += numbers.force / (unit * unit)
 
 
 @controller
@@ -374,20 +378,16 @@ def hold_balance(
     passive_force(model, state.q, state.v, memory.passive)
     center_of_mass(model, work, memory.center)
     momentum(model, work, memory.momentum)
-    place_soles(state, robot, parameters, memory)
+    place_soles(state, contacts, robot, parameters, memory)
     clear(program)
     add_dynamics(robot, parameters, memory)
-    standing = 0
     for foot in range(parameters.foot.shape[0]):
         first = robot.nv + WRENCH * foot
-        if stands(foot, contacts, robot, parameters):
-            standing += 1
+        want_little_force(first, parameters, program)
+        if memory.stands[foot] == 1:
             want_rest(WRENCH * foot, foot, state, robot, parameters, memory)
             add_ground(first, foot, parameters, memory)
-            want_little_force(first, parameters.force, parameters, program)
-        else:
-            want_little_force(first, IN_THE_AIR, parameters, program)
-    want_momentum(standing, robot, parameters, memory, log)
+    want_momentum(robot, parameters, memory, log)
     want_posture(state, robot, parameters, memory)
     solve_or_relax(program)
     log.relaxed = program.relaxed
