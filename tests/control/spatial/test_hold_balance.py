@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
-from heelstrike.control.spatial.hold_balance import WITHIN
+from heelstrike.control.spatial.hold_balance import PRESSURE_LEVEL, WITHIN
 from heelstrike.control.spatial.soles import soles_in_space
 from heelstrike.dynamics import spatial
 
@@ -144,6 +144,52 @@ def test_nothing_pushes_a_foot_in_the_air(
     left, right = program.x[robot.nv :].reshape(-1, 6)
     assert np.all(left == 0.0)
     assert np.all(right == 0.0) if raised == "both" else right[2] > 0.1 * robot.weight
+
+
+def yawed(q: np.ndarray, angle: float) -> np.ndarray:
+    """The robot in another place of the compass."""
+    q, turn = q.copy(), (np.cos(0.5 * angle), np.sin(0.5 * angle))
+    w, x, y, z = q[3:7]
+    q[3:7] = np.array([
+        turn[0] * w - turn[1] * z, turn[0] * x - turn[1] * y,
+        turn[0] * y + turn[1] * x, turn[0] * z + turn[1] * w,
+    ])  # fmt: skip
+    q[:2] = q[0] * np.cos(angle) - q[1] * np.sin(angle), q[0] * np.sin(angle) + q[1] * np.cos(angle)
+    return q
+
+
+@pytest.mark.parametrize("angle", [0.3, np.pi / 4, 2.0])
+def test_it_does_the_same_wherever_it_looks(
+    angle: float, robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    """Moving so fast that its soles' sizes count."""
+    torques = []
+    for turn in (0.0, angle):
+        q, v = yawed(crouched, turn), np.zeros(robot.nv)
+        v[:2] = 0.4 * np.cos(turn + 0.3), 0.4 * np.sin(turn + 0.3)
+        law = hs.HoldBalance(robot, posture=q)
+        simulation = hs.Simulation(robot, law, state=hs.State(q, v))
+        simulation.step()
+        program = simulation._numbers.memory.program
+        held = program.multiplier[: program.count] > 1e-6
+        assert np.any(held[program.level[: program.count] == PRESSURE_LEVEL])
+        torques.append(simulation.record.torque[0])
+    np.testing.assert_allclose(torques[1], torques[0], atol=1e-6 * STRONGEST)
+
+
+@pytest.mark.parametrize("out", [0.0, 0.3, np.pi / 4])
+def test_feet_that_are_toed_out_keep_their_soles(
+    out: float, robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    """22 cm by 10 cm along the foot, about the middle of its box."""
+    q = crouched.copy()
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        joint = robot.joint_index(f"{side}_yaw")
+        q[robot.model.first_position[joint]] = sign * out
+    soles = soles_in_space(robot, q)
+    np.testing.assert_allclose(soles.half, [[0.11, 0.05]] * 2, atol=1e-9)
+    np.testing.assert_allclose(soles.middle, [[0.03, 0.0, -0.07]] * 2, atol=1e-9)
+    np.testing.assert_allclose(np.abs(soles.axes), [np.eye(3)] * 2, atol=1e-9)
 
 
 def test_it_stands_over_the_middle_of_its_soles(

@@ -128,7 +128,7 @@ class BalanceMemory(Bundle):
     """center, momentum: Centre of mass (m), momentum (N s), and moment of it (N m s)."""
     sole: Floats = array("feet", 3)
     up: Floats = array("feet", 9)
-    """sole, up: Middle of each sole (m), and its axes forwards, to the left and up."""
+    """sole, up: Middle of each sole (m), and its axes along, across and up."""
     relaxed: int = cell(int)
     unsolved: int = cell(int)
     """relaxed, unsolved: Programmes that gave up rows, and those that were not solved."""
