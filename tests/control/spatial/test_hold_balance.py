@@ -146,6 +146,38 @@ def test_nothing_pushes_a_foot_in_the_air(
     assert np.all(right == 0.0) if raised == "both" else right[2] > 0.1 * robot.weight
 
 
+def test_motors_follow_their_lines(
+    robot: hs.SpatialRobot, crouched: np.ndarray, tmp_path: Path
+) -> None:
+    """Of 10 N m at rest a knee that turns faster than its motor has 2 to 22 N m, and brakes."""
+    path = tmp_path / "line.xml"
+    names = "".join(
+        f'<numeric name="{what}:left_knee" data="{value}"/>'
+        for what, value in (("stall_torque", 10.0), ("no_load_speed", 2.5))
+    )
+    path.write_text(biped().replace("<actuator>", f"<custom>{names}</custom><actuator>"))
+    with pytest.warns(hs.RobotWarning, match="contact is with the ground alone"):
+        weak = hs.load_robot(path, dimension=3)
+    knee = weak.actuator_names.index("left_knee")
+    place = weak.model.actuator_velocity[knee]
+    assert weak.model.stall_torque[place] == 10.0
+    for speed, least, most in ((3.0, -22.0, -2.0), (-3.0, 2.0, 22.0)):
+        v = np.zeros(weak.nv)
+        v[place] = speed
+        torques = []
+        for each in (robot, weak):
+            law = hs.HoldBalance(each, posture=crouched)
+            simulation = hs.Simulation(each, law, state=hs.State(crouched, v))
+            simulation.step()
+            torques.append(simulation.record.torque[0, knee])
+            program, memory = simulation._numbers.memory.program, simulation._numbers.memory
+        planned = memory.mass[place] @ program.x[: weak.nv] + memory.bias[place]
+        planned -= memory.passive[place] + memory.jacobian[:, place] @ program.x[weak.nv :]
+        assert not least <= torques[0] <= most
+        assert least - 1e-6 <= planned <= most + 1e-6
+        assert torques[1] == pytest.approx(planned, abs=1e-6)
+
+
 def yawed(q: np.ndarray, angle: float) -> np.ndarray:
     """The robot in another place of the compass."""
     q, turn = q.copy(), (np.cos(0.5 * angle), np.sin(0.5 * angle))

@@ -45,6 +45,7 @@ from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
+from heelstrike.sim.controller.motors import torque_at
 from heelstrike.sim.spatial.controlled import SpatialControlledRobot, SpatialControlState
 
 WRENCH = 6
@@ -220,9 +221,19 @@ def torque_row(
 
 
 @kernel
+def motor_limit(
+    actuator: int, limit: float, state: SpatialControlState, robot: SpatialControlledRobot
+) -> float:
+    """Return what a limit of a motor's torque comes to on its speed-torque line."""
+    joint = int(robot.model.actuator_velocity[actuator])
+    return torque_at(robot.model, actuator, joint, 0, limit, state.v)
+
+
+@kernel
 def add_dynamics(
-    robot: SpatialControlledRobot, numbers: BalanceNumbers, memory: BalanceMemory
-) -> None:
+    state: SpatialControlState, robot: SpatialControlledRobot, numbers: BalanceNumbers,
+    memory: BalanceMemory,
+) -> None:  # fmt: skip
     """Add the equations of what no motor drives; then what the motors can do."""
     program, model = memory.program, robot.model
     for i in range(numbers.free.shape[0]):
@@ -233,12 +244,14 @@ def add_dynamics(
     program.equalities = program.count
     for actuator in range(robot.nu):
         k = int(model.actuator_velocity[actuator])
-        if model.torque_lower[actuator] > -inf:
+        lower = motor_limit(actuator, model.torque_lower[actuator], state, robot)
+        upper = motor_limit(actuator, model.torque_upper[actuator], state, robot)
+        if lower > -inf:
             rest = torque_row(k, 1.0, robot.nv, memory, program)
-            keep_row(model.torque_lower[actuator] - rest, MOTOR_LEVEL, program)
-        if model.torque_upper[actuator] < inf:
+            keep_row(lower - rest, MOTOR_LEVEL, program)
+        if upper < inf:
             rest = torque_row(k, -1.0, robot.nv, memory, program)
-            keep_row(-model.torque_upper[actuator] - rest, MOTOR_LEVEL, program)
+            keep_row(-upper - rest, MOTOR_LEVEL, program)
 
 
 @kernel
@@ -380,7 +393,7 @@ def hold_balance(
     momentum(model, work, memory.momentum)
     place_soles(state, contacts, robot, parameters, memory)
     clear(program)
-    add_dynamics(robot, parameters, memory)
+    add_dynamics(state, robot, parameters, memory)
     for foot in range(parameters.foot.shape[0]):
         first = robot.nv + WRENCH * foot
         want_little_force(first, parameters, program)
@@ -400,7 +413,8 @@ def hold_balance(
         total = torque_row(k, 1.0, robot.nv, memory, program)
         for j in range(program.x.shape[0]):
             total += program.rows[program.count, j] * program.x[j]
-        torque[i] = min(max(total, model.torque_lower[i]), model.torque_upper[i])
+        possible = min(max(total, model.torque_lower[i]), model.torque_upper[i])
+        torque[i] = motor_limit(i, possible, state, robot)
 
 
 class HoldBalance(Law):
