@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
+from heelstrike.control.quadratic.program import INFEASIBLE
 from heelstrike.control.spatial.hold_balance import PRESSURE_LEVEL, WITHIN
 from heelstrike.control.spatial.soles import soles_in_space
 from heelstrike.dynamics import spatial
@@ -176,6 +177,30 @@ def test_motors_follow_their_lines(
         assert not least <= torques[0] <= most
         assert least - 1e-6 <= planned <= most + 1e-6
         assert torques[1] == pytest.approx(planned, abs=1e-6)
+
+
+def test_it_tells_of_programmes_that_are_not_solved(
+    robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    """No torque is at least 300 and at most 200 N m: those of the call before go on."""
+    law = hs.HoldBalance(robot, posture=crouched)
+    state = hs.State(crouched, np.zeros(robot.nv))
+    simulation = hs.Simulation(robot, law, state=state)
+    simulation.advance(0.01)
+    assert simulation.log.unsolved == 0
+    limits, actuator = simulation._numbers.control.robot.model.torque_lower, 3
+    kept = limits[actuator]
+    limits[actuator] = 1.5 * STRONGEST
+    try:
+        simulation.advance(0.02)
+        assert simulation._numbers.memory.program.status == INFEASIBLE
+        assert simulation.log.unsolved == 1
+    finally:
+        limits[actuator] = kept
+    others = np.delete(simulation.record.torque, actuator, axis=1)
+    assert np.all(others[10:20] == others[9])
+    simulation.advance(0.03)
+    assert simulation.log.unsolved == 0
 
 
 def yawed(q: np.ndarray, angle: float) -> np.ndarray:

@@ -130,9 +130,6 @@ class BalanceMemory(Bundle):
     sole: Floats = array("feet", 3)
     up: Floats = array("feet", 9)
     """sole, up: Middle of each sole (m), and its axes along, across and up."""
-    relaxed: int = cell(int)
-    unsolved: int = cell(int)
-    """relaxed, unsolved: Programmes that gave up rows, and those that were not solved."""
 
 
 class BalanceLog(Bundle):
@@ -140,6 +137,8 @@ class BalanceLog(Bundle):
 
     relaxed: int = cell(int, label="Levels of rows given up")
     """By the quadratic programme."""
+    unsolved: int = cell(int, label="Programmes not solved")
+    """One where it was not solved, so that the torques of the call before go on."""
     away: float = cell(float, unit="m", label="Centre of mass from the middle of the soles")
     """Along the ground."""
 
@@ -404,9 +403,8 @@ def hold_balance(
     want_posture(state, robot, parameters, memory)
     solve_or_relax(program)
     log.relaxed = program.relaxed
-    memory.relaxed += program.relaxed > 0
-    if program.status != SOLVED:
-        memory.unsolved += 1
+    log.unsolved = int(program.status != SOLVED)
+    if log.unsolved == 1:
         return  # with the torques of before
     for i in range(robot.nu):
         k = int(model.actuator_velocity[i])
