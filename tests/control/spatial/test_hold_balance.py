@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 import heelstrike as hs
 from heelstrike.control.quadratic.program import INFEASIBLE
+from heelstrike.control.spatial.gains import bearable_gains
 from heelstrike.control.spatial.hold_balance import PRESSURE_LEVEL, WITHIN
 from heelstrike.control.spatial.soles import soles_in_space
 from heelstrike.dynamics import spatial
@@ -76,10 +78,12 @@ def pushed(force: tuple[float, float], law: Any, q: np.ndarray, robot: hs.Spatia
     """Push the trunk for 0.1 s, when it has come to rest."""
     push = hs.Push("trunk", force=(*force, 0.0), start=1.0, duration=0.1)
     period = 2e-3 if isinstance(law, hs.HoldBalance) else None
-    return hs.simulate(
-        robot, law, state=hs.State(q, np.zeros(robot.nv)), duration=4.0, pushes=push,
-        control_period=period,
-    )  # fmt: skip
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", hs.SimulationWarning)
+        return hs.simulate(
+            robot, law, state=hs.State(q, np.zeros(robot.nv)), duration=4.0, pushes=push,
+            control_period=period,
+        )  # fmt: skip
 
 
 def test_torques_are_those_of_accelerations_and_wrenches(
@@ -118,7 +122,7 @@ def test_torques_are_those_of_accelerations_and_wrenches(
             assert np.hypot(fx, fy) <= FRICTION * fz * 1.02 + 1e-6  # soles tilt by a degree
             assert abs(my) <= WITHIN * half[0] * fz * 1.05 + 1e-3
             assert abs(mx) <= WITHIN * half[1] * fz * 1.05 + 1e-3
-            assert abs(mz) <= FRICTION * half[1] * fz + 1e-6
+            assert abs(mz) <= 0.5 * FRICTION * WITHIN * min(half) * fz * 1.05 + 1e-3
         size = robot.weight
         driven = robot.model.actuator_velocity
         assert np.abs(np.delete(force, driven)).max() <= 1e-9 * size
@@ -262,13 +266,18 @@ def test_it_stands_over_the_middle_of_its_soles(
     assert run.certificates.uncertified == 0
 
 
-@pytest.mark.parametrize("force", [(150.0, 0.0), (-140.0, 0.0), (0.0, 200.0), (0.0, -200.0)])
+@pytest.mark.parametrize("force", [(120.0, 0.0), (-135.0, 0.0), (0.0, 210.0), (0.0, -210.0)])
 def test_it_withstands_pushes_that_a_posture_does_not(
     force: tuple[float, float], robot: hs.SpatialRobot, crouched: np.ndarray
 ) -> None:
-    """15, 14 and 20 N s; a pendulum of its height falls over its soles at 20, 20 and 27."""
+    """12, 13.5 and 21 N s; a pendulum of its height falls over its soles at 20, 20 and 27.
+
+    The posture is held with gains that the step bears, and falls at 1.5 N s (2 to the sides) less
+    and more, too.
+    """
     assert pushed(force, hs.HoldBalance(robot, posture=crouched), crouched, robot).completed
-    posture = hs.HoldPosture(robot, posture=crouched, kp=600.0, kd=15.0)
+    kp, kd = bearable_gains(robot, 1e-3, kp=600.0, kd=15.0)
+    posture = hs.HoldPosture(robot, posture=crouched, kp=kp, kd=kd)
     assert pushed(force, posture, crouched, robot).status is hs.RunStatus.FELL
 
 
