@@ -191,20 +191,23 @@ def test_it_tells_of_programmes_that_are_not_solved(
     state = hs.State(crouched, np.zeros(robot.nv))
     simulation = hs.Simulation(robot, law, state=state)
     simulation.advance(0.01)
-    assert simulation.log.unsolved == 0
+    log: Any = simulation.log
+    assert log.unsolved == 0
     limits, actuator = simulation._numbers.control.robot.model.torque_lower, 3
     kept = limits[actuator]
     limits[actuator] = 1.5 * STRONGEST
     try:
         simulation.advance(0.02)
         assert simulation._numbers.memory.program.status == INFEASIBLE
-        assert simulation.log.unsolved == 1
+        log = simulation.log
+        assert log.unsolved == 1
     finally:
         limits[actuator] = kept
     others = np.delete(simulation.record.torque, actuator, axis=1)
     assert np.all(others[10:20] == others[9])
     simulation.advance(0.03)
-    assert simulation.log.unsolved == 0
+    log = simulation.log
+    assert log.unsolved == 0
 
 
 def yawed(q: np.ndarray, angle: float) -> np.ndarray:

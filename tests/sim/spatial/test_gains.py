@@ -97,11 +97,9 @@ def test_springs_without_dampers_grow_when_they_are_held(made: Maker) -> None:
 def test_the_warning_points_at_the_line_of_the_user(made: Maker) -> None:
     robot = made(WHEEL, MOTOR)
     law = hs.HoldPosture(robot, kp=1.0, kd=3.0 * INERTIA / STEP)
-    for begin in (hs.simulate, hs.Simulation):
-        extent = {"duration": STEP} if begin is hs.simulate else {}
-        with pytest.warns(hs.SimulationWarning) as told:
-            begin(
-                robot, law, state=robot.reference_state(), method=hs.TimeStepping(step=STEP),
-                **extent,
-            )  # fmt: skip
-        assert [each.filename for each in told] == [__file__]
+    state, method = robot.reference_state(), hs.TimeStepping(step=STEP)
+    with pytest.warns(hs.SimulationWarning) as run:
+        hs.simulate(robot, law, state=state, method=method, duration=STEP)
+    with pytest.warns(hs.SimulationWarning) as begun:
+        hs.Simulation(robot, law, state=state, method=method)
+    assert [each.filename for each in (*run, *begun)] == [__file__] * 2
