@@ -64,15 +64,17 @@ def reach(robot: hs.SpatialRobot, q: np.ndarray, side: tuple[float, float]) -> f
     """Impulse (N s) that brings the capture point to the edge of the soles."""
     soles = soles_in_space(robot, q)
     poses = spatial.link_poses(robot, q)
+    turned = [poses.rotation[link] for link in soles.link]
     middle = [
-        poses.origin[link] + poses.rotation[link] @ local
-        for link, local in zip(soles.link, soles.middle, strict=True)
+        poses.origin[link] + turn @ local
+        for link, turn, local in zip(soles.link, turned, soles.middle, strict=True)
     ]
-    along = np.array(side)
+    along = np.array([*side, 0.0])
     edges = [
-        at[:2] @ along + half @ np.abs(along) for at, half in zip(middle, soles.half, strict=True)
+        at @ along + half @ np.abs(axes @ turn.T @ along)[:2]
+        for at, turn, axes, half in zip(middle, turned, soles.axes, soles.half, strict=True)
     ]
-    start = np.mean(middle, axis=0)[:2] @ along
+    start = np.mean(middle, axis=0) @ along
     rate = np.sqrt(np.linalg.norm(robot.model.gravity) / soles.height)
     return float(robot.total_mass * rate * (max(edges) - start))
 

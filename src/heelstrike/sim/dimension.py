@@ -170,9 +170,9 @@ class Dimension(ABC):
         """Note which joint forces an implicit scheme takes at the end of a step."""
 
     def doubt_gains(  # noqa: B027 - in the plane they are not judged
-        self, robot: Any, law: Law | None, memory: Any, period: float
+        self, robot: Any, law: Law | None, memory: Any, step: float, steps: int
     ) -> None:
-        """Warn of gains that are too high for torques held so long (s), where that is judged."""
+        """Warn of gains that are too high for torques held over so many steps, where judged."""
 
     @abstractmethod
     def look(self, robot: Any) -> Look:

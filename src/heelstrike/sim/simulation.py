@@ -783,7 +783,9 @@ class Simulation:
             if setting.control_period is None and self._way.python_period is not None:
                 clock.control_period = self._way.python_period
         self._numbers.control.robot.period = self.control_period
-        self._dimension.doubt_gains(robot, law, memory, self.control_period)
+        if self._way.step_length is not None:
+            step, steps = self._way.step_length, clock.control_every
+            self._dimension.doubt_gains(robot, law, memory, step, steps)
         # It is due at once, and then at the whole periods, as if it had been called all the time.
         period = clock.control_period
         clock.calls = int(clock.time / period + 1e-9) if period > 0.0 else 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
-from heelstrike.control.spatial.hold_balance import WITHIN
+from heelstrike.control.quadratic.program import INFEASIBLE
+from heelstrike.control.spatial.gains import bearable_gains
+from heelstrike.control.spatial.hold_balance import PRESSURE_LEVEL, WITHIN
 from heelstrike.control.spatial.soles import soles_in_space
 from heelstrike.dynamics import spatial
 
@@ -75,10 +78,12 @@ def pushed(force: tuple[float, float], law: Any, q: np.ndarray, robot: hs.Spatia
     """Push the trunk for 0.1 s, when it has come to rest."""
     push = hs.Push("trunk", force=(*force, 0.0), start=1.0, duration=0.1)
     period = 2e-3 if isinstance(law, hs.HoldBalance) else None
-    return hs.simulate(
-        robot, law, state=hs.State(q, np.zeros(robot.nv)), duration=4.0, pushes=push,
-        control_period=period,
-    )  # fmt: skip
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", hs.SimulationWarning)
+        return hs.simulate(
+            robot, law, state=hs.State(q, np.zeros(robot.nv)), duration=4.0, pushes=push,
+            control_period=period,
+        )  # fmt: skip
 
 
 def test_torques_are_those_of_accelerations_and_wrenches(
@@ -117,13 +122,138 @@ def test_torques_are_those_of_accelerations_and_wrenches(
             assert np.hypot(fx, fy) <= FRICTION * fz * 1.02 + 1e-6  # soles tilt by a degree
             assert abs(my) <= WITHIN * half[0] * fz * 1.05 + 1e-3
             assert abs(mx) <= WITHIN * half[1] * fz * 1.05 + 1e-3
-            assert abs(mz) <= FRICTION * half[1] * fz + 1e-6
+            assert abs(mz) <= 0.5 * FRICTION * WITHIN * min(half) * fz * 1.05 + 1e-3
         size = robot.weight
         driven = robot.model.actuator_velocity
         assert np.abs(np.delete(force, driven)).max() <= 1e-9 * size
         assert np.abs(force[driven] - torque).max() <= 1e-9 * size
         assert np.abs(torque).max() <= STRONGEST
     assert seen >= 20
+
+
+@pytest.mark.parametrize("raised", ["both", "left"])
+def test_nothing_pushes_a_foot_in_the_air(
+    raised: str, robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    """It has no wrench, so that torques are not reckoned with one."""
+    law = hs.HoldBalance(robot, posture=crouched)
+    q = crouched.copy()
+    if raised == "both":
+        q[2] += 0.3
+        q[3:7] = np.cos(0.1), 0.0, np.sin(0.1), 0.0
+    else:
+        q[robot.model.first_position[robot.joint_index("left_knee")]] += 0.4
+    simulation = hs.Simulation(robot, law, state=hs.State(q, np.zeros(robot.nv)))
+    simulation.step()
+    program = simulation._numbers.memory.program
+    left, right = program.x[robot.nv :].reshape(-1, 6)
+    assert np.all(left == 0.0)
+    assert np.all(right == 0.0) if raised == "both" else right[2] > 0.1 * robot.weight
+
+
+def test_motors_follow_their_lines(
+    robot: hs.SpatialRobot, crouched: np.ndarray, tmp_path: Path
+) -> None:
+    """Of 10 N m at rest a knee that turns faster than its motor has 2 to 22 N m, and brakes."""
+    path = tmp_path / "line.xml"
+    names = "".join(
+        f'<numeric name="{what}:left_knee" data="{value}"/>'
+        for what, value in (("stall_torque", 10.0), ("no_load_speed", 2.5))
+    )
+    path.write_text(biped().replace("<actuator>", f"<custom>{names}</custom><actuator>"))
+    with pytest.warns(hs.RobotWarning, match="contact is with the ground alone"):
+        weak = hs.load_robot(path, dimension=3)
+    knee = weak.actuator_names.index("left_knee")
+    place = weak.model.actuator_velocity[knee]
+    assert weak.model.stall_torque[place] == 10.0
+    for speed, least, most in ((3.0, -22.0, -2.0), (-3.0, 2.0, 22.0)):
+        v = np.zeros(weak.nv)
+        v[place] = speed
+        torques = []
+        for each in (robot, weak):
+            law = hs.HoldBalance(each, posture=crouched)
+            simulation = hs.Simulation(each, law, state=hs.State(crouched, v))
+            simulation.step()
+            torques.append(simulation.record.torque[0, knee])
+            program, memory = simulation._numbers.memory.program, simulation._numbers.memory
+        planned = memory.mass[place] @ program.x[: weak.nv] + memory.bias[place]
+        planned -= memory.passive[place] + memory.jacobian[:, place] @ program.x[weak.nv :]
+        assert not least <= torques[0] <= most
+        assert least - 1e-6 <= planned <= most + 1e-6
+        assert torques[1] == pytest.approx(planned, abs=1e-6)
+
+
+def test_it_tells_of_programmes_that_are_not_solved(
+    robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    """No torque is at least 300 and at most 200 N m: those of the call before go on."""
+    law = hs.HoldBalance(robot, posture=crouched)
+    state = hs.State(crouched, np.zeros(robot.nv))
+    simulation = hs.Simulation(robot, law, state=state)
+    simulation.advance(0.01)
+    log: Any = simulation.log
+    assert log.unsolved == 0
+    limits, actuator = simulation._numbers.control.robot.model.torque_lower, 3
+    kept = limits[actuator]
+    limits[actuator] = 1.5 * STRONGEST
+    try:
+        simulation.advance(0.02)
+        assert simulation._numbers.memory.program.status == INFEASIBLE
+        log = simulation.log
+        assert log.unsolved == 1
+    finally:
+        limits[actuator] = kept
+    others = np.delete(simulation.record.torque, actuator, axis=1)
+    assert np.all(others[10:20] == others[9])
+    simulation.advance(0.03)
+    log = simulation.log
+    assert log.unsolved == 0
+
+
+def yawed(q: np.ndarray, angle: float) -> np.ndarray:
+    """The robot in another place of the compass."""
+    q, turn = q.copy(), (np.cos(0.5 * angle), np.sin(0.5 * angle))
+    w, x, y, z = q[3:7]
+    q[3:7] = np.array([
+        turn[0] * w - turn[1] * z, turn[0] * x - turn[1] * y,
+        turn[0] * y + turn[1] * x, turn[0] * z + turn[1] * w,
+    ])  # fmt: skip
+    q[:2] = q[0] * np.cos(angle) - q[1] * np.sin(angle), q[0] * np.sin(angle) + q[1] * np.cos(angle)
+    return q
+
+
+@pytest.mark.parametrize("angle", [0.3, np.pi / 4, 2.0])
+def test_it_does_the_same_wherever_it_looks(
+    angle: float, robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    """Moving so fast that its soles' sizes count."""
+    torques = []
+    for turn in (0.0, angle):
+        q, v = yawed(crouched, turn), np.zeros(robot.nv)
+        v[:2] = 0.4 * np.cos(turn + 0.3), 0.4 * np.sin(turn + 0.3)
+        law = hs.HoldBalance(robot, posture=q)
+        simulation = hs.Simulation(robot, law, state=hs.State(q, v))
+        simulation.step()
+        program = simulation._numbers.memory.program
+        held = program.multiplier[: program.count] > 1e-6
+        assert np.any(held[program.level[: program.count] == PRESSURE_LEVEL])
+        torques.append(simulation.record.torque[0])
+    np.testing.assert_allclose(torques[1], torques[0], atol=1e-6 * STRONGEST)
+
+
+@pytest.mark.parametrize("out", [0.0, 0.3, np.pi / 4])
+def test_feet_that_are_toed_out_keep_their_soles(
+    out: float, robot: hs.SpatialRobot, crouched: np.ndarray
+) -> None:
+    """22 cm by 10 cm along the foot, about the middle of its box."""
+    q = crouched.copy()
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        joint = robot.joint_index(f"{side}_yaw")
+        q[robot.model.first_position[joint]] = sign * out
+    soles = soles_in_space(robot, q)
+    np.testing.assert_allclose(soles.half, [[0.11, 0.05]] * 2, atol=1e-9)
+    np.testing.assert_allclose(soles.middle, [[0.03, 0.0, -0.07]] * 2, atol=1e-9)
+    np.testing.assert_allclose(np.abs(soles.axes), [np.eye(3)] * 2, atol=1e-9)
 
 
 def test_it_stands_over_the_middle_of_its_soles(
@@ -139,13 +269,18 @@ def test_it_stands_over_the_middle_of_its_soles(
     assert run.certificates.uncertified == 0
 
 
-@pytest.mark.parametrize("force", [(150.0, 0.0), (-140.0, 0.0), (0.0, 200.0), (0.0, -200.0)])
+@pytest.mark.parametrize("force", [(120.0, 0.0), (-135.0, 0.0), (0.0, 210.0), (0.0, -210.0)])
 def test_it_withstands_pushes_that_a_posture_does_not(
     force: tuple[float, float], robot: hs.SpatialRobot, crouched: np.ndarray
 ) -> None:
-    """15, 14 and 20 N s; a pendulum of its height falls over its soles at 20, 20 and 27."""
+    """12, 13.5 and 21 N s; a pendulum of its height falls over its soles at 20, 20 and 27.
+
+    The posture is held with gains that the step bears, and falls at 1.5 N s (2 to the sides) less
+    and more, too.
+    """
     assert pushed(force, hs.HoldBalance(robot, posture=crouched), crouched, robot).completed
-    posture = hs.HoldPosture(robot, posture=crouched, kp=600.0, kd=15.0)
+    kp, kd = bearable_gains(robot, 1e-3, kp=600.0, kd=15.0)
+    posture = hs.HoldPosture(robot, posture=crouched, kp=kp, kd=kd)
     assert pushed(force, posture, crouched, robot).status is hs.RunStatus.FELL
 
 

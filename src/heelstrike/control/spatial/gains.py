@@ -2,7 +2,8 @@
 
 Torques are held over a step h. With an inertia I that a joint moves when nothing else is held, the
 motion of a spring and damper on it is stable while h² kp + 2 h kd < 4 I (the eigenvalues of
-v⁺ = v − h (kp q + kd v) / I, q⁺ = q + h v⁺ have modulus one on that line).
+v⁺ = v − h (kp q + kd v) / I, q⁺ = q + h v⁺ have modulus one on that line). Where torques are held
+over several steps, a time h in all, h kp must stay below 2 kd besides.
 """
 
 from __future__ import annotations

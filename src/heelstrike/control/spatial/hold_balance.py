@@ -45,6 +45,7 @@ from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
+from heelstrike.sim.controller.motors import torque_at
 from heelstrike.sim.spatial.controlled import SpatialControlledRobot, SpatialControlState
 
 WRENCH = 6
@@ -56,9 +57,6 @@ moment about its normal."""
 
 TOUCHES = 2e-3
 """Gap (m) up to which a foot is taken to stand."""
-
-IN_THE_AIR = 1e2
-"""Cost of the wrench of a foot in the air, which makes it vanish."""
 
 DYNAMICS_LEVEL, MOTOR_LEVEL, CONE_LEVEL, PRESSURE_LEVEL = 0, 0, 1, 2
 """In which order rows are given up if not all can be kept; those at 0 never are."""
@@ -123,16 +121,15 @@ class BalanceMemory(Bundle):
     passive: Floats = array("nv")
     """mass, bias, passive: Mass matrix, H, and the force of springs and dampers of joints."""
     jacobian: Floats = array("wrenches", "nv")
-    """Of the middle of each sole, and of the rotation of its link."""
+    """Of the middle of each sole, and of the rotation of its link; zero of a foot in the air."""
+    stands: Integers = array("feet", of=int)
+    """Whether each foot is on the ground: only there do wrenches act."""
     center: Floats = array(3)
     momentum: Floats = array(6)
     """center, momentum: Centre of mass (m), momentum (N s), and moment of it (N m s)."""
     sole: Floats = array("feet", 3)
     up: Floats = array("feet", 9)
-    """sole, up: Middle of each sole (m), and its axes forwards, to the left and up."""
-    relaxed: int = cell(int)
-    unsolved: int = cell(int)
-    """relaxed, unsolved: Programmes that gave up rows, and those that were not solved."""
+    """sole, up: Middle of each sole (m), and its axes along, across and up."""
 
 
 class BalanceLog(Bundle):
@@ -140,16 +137,30 @@ class BalanceLog(Bundle):
 
     relaxed: int = cell(int, label="Levels of rows given up")
     """By the quadratic programme."""
+    unsolved: int = cell(int, label="Programmes not solved")
+    """One where it was not solved, so that the torques of the call before go on."""
     away: float = cell(float, unit="m", label="Centre of mass from the middle of the soles")
     """Along the ground."""
 
 
 @kernel
+def stands(
+    foot: int, contacts: Contacts, robot: SpatialControlledRobot, numbers: BalanceNumbers
+) -> bool:
+    """Whether a foot is on the ground."""
+    for contact in range(robot.nc):
+        link = int(robot.model.contact_link[contact])
+        if link == numbers.foot[foot] and contacts.gap[contact] < TOUCHES:
+            return True
+    return False
+
+
+@kernel
 def place_soles(
-    state: SpatialControlState, robot: SpatialControlledRobot, numbers: BalanceNumbers,
-    memory: BalanceMemory,
+    state: SpatialControlState, contacts: Contacts, robot: SpatialControlledRobot,
+    numbers: BalanceNumbers, memory: BalanceMemory,
 ) -> None:  # fmt: skip
-    """Find where the soles are, and their Jacobians."""
+    """Find where the soles are, which of them stand, and the Jacobians of these."""
     model, work = robot.model, state.kinematics
     for foot in range(numbers.foot.shape[0]):
         link, first = int(numbers.foot[foot]), WRENCH * foot
@@ -164,6 +175,9 @@ def place_soles(
         for row in range(first, first + WRENCH):
             for k in range(model.nv):
                 memory.jacobian[row, k] = 0.0
+        memory.stands[foot] = stands(foot, contacts, robot, numbers)
+        if memory.stands[foot] == 0:
+            continue
         place = place_of(work, at)
         last = model.last_velocity[link]
         for a in range(model.depth[last] + 1):
@@ -206,9 +220,19 @@ def torque_row(
 
 
 @kernel
+def motor_limit(
+    actuator: int, limit: float, state: SpatialControlState, robot: SpatialControlledRobot
+) -> float:
+    """Return what a limit of a motor's torque comes to on its speed-torque line."""
+    joint = int(robot.model.actuator_velocity[actuator])
+    return torque_at(robot.model, actuator, joint, 0, limit, state.v)
+
+
+@kernel
 def add_dynamics(
-    robot: SpatialControlledRobot, numbers: BalanceNumbers, memory: BalanceMemory
-) -> None:
+    state: SpatialControlState, robot: SpatialControlledRobot, numbers: BalanceNumbers,
+    memory: BalanceMemory,
+) -> None:  # fmt: skip
     """Add the equations of what no motor drives; then what the motors can do."""
     program, model = memory.program, robot.model
     for i in range(numbers.free.shape[0]):
@@ -219,12 +243,14 @@ def add_dynamics(
     program.equalities = program.count
     for actuator in range(robot.nu):
         k = int(model.actuator_velocity[actuator])
-        if model.torque_lower[actuator] > -inf:
+        lower = motor_limit(actuator, model.torque_lower[actuator], state, robot)
+        upper = motor_limit(actuator, model.torque_upper[actuator], state, robot)
+        if lower > -inf:
             rest = torque_row(k, 1.0, robot.nv, memory, program)
-            keep_row(model.torque_lower[actuator] - rest, MOTOR_LEVEL, program)
-        if model.torque_upper[actuator] < inf:
+            keep_row(lower - rest, MOTOR_LEVEL, program)
+        if upper < inf:
             rest = torque_row(k, -1.0, robot.nv, memory, program)
-            keep_row(-model.torque_upper[actuator] - rest, MOTOR_LEVEL, program)
+            keep_row(-upper - rest, MOTOR_LEVEL, program)
 
 
 @kernel
@@ -260,18 +286,6 @@ def add_ground(first: int, foot: int, numbers: BalanceNumbers, memory: BalanceMe
 
 
 @kernel
-def stands(
-    foot: int, contacts: Contacts, robot: SpatialControlledRobot, numbers: BalanceNumbers
-) -> bool:
-    """Whether a foot is on the ground."""
-    for contact in range(robot.nc):
-        link = int(robot.model.contact_link[contact])
-        if link == numbers.foot[foot] and contacts.gap[contact] < TOUCHES:
-            return True
-    return False
-
-
-@kernel
 def want_rest(
     first: int, foot: int, state: SpatialControlState, robot: SpatialControlledRobot,
     numbers: BalanceNumbers, memory: BalanceMemory,
@@ -294,14 +308,14 @@ def want_rest(
 
 @kernel
 def want_momentum(
-    standing: int, robot: SpatialControlledRobot, numbers: BalanceNumbers,
-    memory: BalanceMemory, log: BalanceLog,
-) -> None:  # fmt: skip
+    robot: SpatialControlledRobot, numbers: BalanceNumbers, memory: BalanceMemory, log: BalanceLog
+) -> None:
     """Add the tasks of centre of mass and moment of momentum, of which only wrenches are part."""
     program, center, mass = memory.program, memory.center, robot.mass
     goal_x = goal_y = goal_z = 0.0
-    feet = numbers.foot.shape[0]
+    feet, standing = numbers.foot.shape[0], 0
     for foot in range(feet):
+        standing += memory.stands[foot]
         goal_x += memory.sole[foot, 0] / feet
         goal_y += memory.sole[foot, 1] / feet
         goal_z += memory.sole[foot, 2] / feet
@@ -313,13 +327,15 @@ def want_momentum(
     for axis in range(3):
         row = scratch_row(program)
         for foot in range(feet):
-            program.rows[row, robot.nv + WRENCH * foot + axis] = 1.0 / mass
+            program.rows[row, robot.nv + WRENCH * foot + axis] = memory.stands[foot] / mass
         wanted = numbers.kp * off[axis] - numbers.kd * memory.momentum[axis] / mass
         missing = wanted - robot.model.gravity[axis]
         add_task(program.rows, row, missing, numbers.momentum, program)
         row = scratch_row(program)
         for foot in range(feet):
             first = robot.nv + WRENCH * foot
+            if memory.stands[foot] == 0:
+                continue
             arm = less(
                 (memory.sole[foot, 0], memory.sole[foot, 1], memory.sole[foot, 2]),
                 (center[0], center[1], center[2]),
@@ -355,11 +371,11 @@ def want_posture(
 
 
 @kernel
-def want_little_force(first: int, price: float, numbers: BalanceNumbers, program: Program) -> None:
+def want_little_force(first: int, numbers: BalanceNumbers, program: Program) -> None:
     """Add a price on the wrench of a foot."""
     for i in range(WRENCH):
         unit = numbers.weight if i < 3 else numbers.weight * numbers.height
-        program.hessian[first + i, first + i] += price / (unit * unit)
+        program.hessian[first + i, first + i] += numbers.force / (unit * unit)
 
 
 @controller
@@ -374,33 +390,29 @@ def hold_balance(
     passive_force(model, state.q, state.v, memory.passive)
     center_of_mass(model, work, memory.center)
     momentum(model, work, memory.momentum)
-    place_soles(state, robot, parameters, memory)
+    place_soles(state, contacts, robot, parameters, memory)
     clear(program)
-    add_dynamics(robot, parameters, memory)
-    standing = 0
+    add_dynamics(state, robot, parameters, memory)
     for foot in range(parameters.foot.shape[0]):
         first = robot.nv + WRENCH * foot
-        if stands(foot, contacts, robot, parameters):
-            standing += 1
+        want_little_force(first, parameters, program)
+        if memory.stands[foot] == 1:
             want_rest(WRENCH * foot, foot, state, robot, parameters, memory)
             add_ground(first, foot, parameters, memory)
-            want_little_force(first, parameters.force, parameters, program)
-        else:
-            want_little_force(first, IN_THE_AIR, parameters, program)
-    want_momentum(standing, robot, parameters, memory, log)
+    want_momentum(robot, parameters, memory, log)
     want_posture(state, robot, parameters, memory)
     solve_or_relax(program)
     log.relaxed = program.relaxed
-    memory.relaxed += program.relaxed > 0
-    if program.status != SOLVED:
-        memory.unsolved += 1
+    log.unsolved = int(program.status != SOLVED)
+    if log.unsolved == 1:
         return  # with the torques of before
     for i in range(robot.nu):
         k = int(model.actuator_velocity[i])
         total = torque_row(k, 1.0, robot.nv, memory, program)
         for j in range(program.x.shape[0]):
             total += program.rows[program.count, j] * program.x[j]
-        torque[i] = min(max(total, model.torque_lower[i]), model.torque_upper[i])
+        possible = min(max(total, model.torque_lower[i]), model.torque_upper[i])
+        torque[i] = motor_limit(i, possible, state, robot)
 
 
 class HoldBalance(Law):

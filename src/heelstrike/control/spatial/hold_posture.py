@@ -93,8 +93,9 @@ class HoldPosture(Law):
 
     Notes
     -----
-    Torques are held over a step h: with the inertia I that a joint moves, h² kp + 2 h kd must stay
-    below 4 I. A simulation warns of gains beyond that.
+    Torques are held over n steps, a time T in all: with the inertia I that a joint moves,
+    T² kp / n + 2 T kd must stay below 4 I, and T kp (1 − 1/n) below 2 kd. A simulation warns of
+    gains beyond that.
     """
 
     @takes(ControllerError)

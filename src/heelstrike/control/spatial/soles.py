@@ -19,16 +19,16 @@ LEAST = 1e-3
 
 @dataclass(frozen=True)
 class Soles:
-    """The soles of a robot's feet, each a rectangle along the x and y axes of its posture."""
+    """The soles of a robot's feet, each the least rectangle about its lowest points."""
 
     link: tuple[int, ...]
     """Link of each foot."""
     middle: Floats
     """(feet, 3) Middle of each, in the axes of its link (m)."""
     axes: Floats
-    """(feet, 3, 3) Their directions forwards, to the left and up, one a row, in those axes."""
+    """(feet, 3, 3) Their directions along, across and up, one a row, in those axes."""
     half: Floats
-    """(feet, 2) Half their lengths and widths (m)."""
+    """(feet, 2) Half their lengths and widths, which are the shorter (m)."""
     height: float
     """Of the robot's centre of mass over them, in the posture (m)."""
 
@@ -46,7 +46,7 @@ def soles_in_space(robot: SpatialRobot, posture: Floats) -> Soles:
     Returns
     -------
     Soles
-        The rectangles about the lowest contact points of each foot.
+        The least rectangles about the lowest contact points of each foot.
 
     Raises
     ------
@@ -61,20 +61,40 @@ def soles_in_space(robot: SpatialRobot, posture: Floats) -> Soles:
     for foot in robot.feet:
         own = points[list(foot.contacts)]
         own = own[own[:, 2] <= own[:, 2].min() + LOWEST]
-        low, high = own.min(axis=0), own.max(axis=0)
-        if np.any(0.5 * (high - low)[:2] < LEAST):
+        between, along, lengths = least_rectangle(own[:, :2])
+        if min(lengths) < LEAST:
             raise ControllerError(
                 f"balance is held on soles, and the foot {foot.name!r} of robot {robot.name!r} "
                 "touches the ground along a line or in a point only"
             )
-        rotation = poses.rotation[foot.link]
-        between = np.array([*(0.5 * (low + high))[:2], low[2]])
-        middle.append(rotation.T @ (between - poses.origin[foot.link]))
-        axes.append(rotation)  # whose rows are the axes of the world in those of the link
-        half.append(0.5 * (high - low)[:2])
-        height.append(low[2])
+        rotation, lowest = poses.rotation[foot.link], own[:, 2].min()
+        middle.append(rotation.T @ (np.array([*between, lowest]) - poses.origin[foot.link]))
+        ahead, aside = (*along, 0.0), (-along[1], along[0], 0.0)
+        axes.append(np.array([ahead, aside, (0.0, 0.0, 1.0)]) @ rotation)
+        half.append(lengths)
+        height.append(lowest)
     center = spatial.center_of_mass(robot, posture)
     return Soles(
         tuple(foot.link for foot in robot.feet), np.array(middle), np.array(axes), np.array(half),
         float(center[2] - np.mean(height)),
     )  # fmt: skip
+
+
+def least_rectangle(points: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return middle, long direction and half the lengths of the least rectangle about points.
+
+    It has a side through two of them. They are (n, 2), the answers (2,) each.
+    """
+    apart = (points[:, None] - points[None]).reshape(-1, 2)
+    size = np.linalg.norm(apart, axis=1)
+    along = apart[size > 0.0] / size[size > 0.0, None]
+    if not len(along):
+        return points[0], np.array([1.0, 0.0]), np.zeros(2)
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    sides = np.stack([along, across], axis=1)  # of each rectangle
+    places = sides @ points.T
+    low, high = places.min(axis=2), places.max(axis=2)
+    best = int(np.argmin(np.prod(high - low, axis=1)))
+    half, middle = 0.5 * (high - low)[best], 0.5 * (high + low)[best] @ sides[best]
+    longer = int(np.argmax(half))
+    return middle, sides[best, longer], half[[longer, 1 - longer]]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cache
@@ -21,6 +20,7 @@ from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot, checked_state, quaternion_places
 from heelstrike.robot.state import State
+from heelstrike.robot.warning import warn
 from heelstrike.sim.contacts.latches import several
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law
@@ -33,6 +33,7 @@ from heelstrike.sim.spatial.controlled import (
     view_of,
     words_in_space,
 )
+from heelstrike.sim.spatial.held_gains import too_high
 from heelstrike.sim.spatial.memory import (
     SpatialMemory,
     SpatialScratch,
@@ -53,7 +54,7 @@ from heelstrike.sim.spatial.table import (
     WALL,
     most_rows_of,
 )
-from heelstrike.sim.time_stepping.doubts import SimulationWarning, largest_pull
+from heelstrike.sim.time_stepping.doubts import SimulationWarning
 from heelstrike.tolerances import STANDING_GAP
 
 
@@ -175,12 +176,12 @@ class Space(Dimension):
         """No scheme of space takes forces at the end of a step."""
 
     def doubt_gains(
-        self, robot: SpatialRobot, law: Law | None, memory: SpatialMemory, period: float
+        self, robot: SpatialRobot, law: Law | None, memory: SpatialMemory, step: float, steps: int
     ) -> None:
-        """Warn of gains that are too high for torques held so long (s)."""
-        told = too_high(robot, law, memory.q, period)
+        """Warn of gains that are too high for torques held over so many steps (s)."""
+        told = too_high(robot, law, memory.q, step, steps)
         if told:
-            warnings.warn(told, SimulationWarning, stacklevel=5)
+            warn(told, SimulationWarning)
 
     def look(self, robot: SpatialRobot) -> SpatialLook:
         """Return what looks at the contact points of a simulation."""
@@ -258,30 +259,6 @@ class Space(Dimension):
             f"no contact impulses could be certified at {now}, nor in parts of the step: "
             f"residual {memory.tally.unsolved:.3g}. A smaller step may get past it"
         )
-
-
-def too_high(robot: SpatialRobot, law: Law | None, q: Floats, period: float) -> str:
-    """Say which gains of a law are too high for torques held so long (s); nothing if none are.
-
-    As for springs and dampers in :mod:`heelstrike.sim.time_stepping.doubts`: of links that nothing
-    holds. What stands on the ground bears more.
-    """
-    if law is None or law.stiffness is None or law.damping is None or not np.all(np.isfinite(q)):
-        return ""
-    pull = np.zeros(robot.nv)
-    pull[robot.model.actuator_velocity] = 0.25 * period**2 * law.stiffness
-    pull[robot.model.actuator_velocity] += 0.5 * period * law.damping
-    if not np.any(pull > robot.model.armature):
-        return ""
-    value, worst = largest_pull(spatial.mass_matrix(robot, q), pull)
-    if value <= 1.0:
-        return ""
-    joint = robot.joint_names[robot.model.velocity_joint[worst]]
-    return (
-        f"the gains of controller {law.function.name!r} on joint {joint!r} are {value:.2g} times "
-        f"too high for torques that are held over {period:g} s: a link that is free to swing on "
-        "them chatters. Use lower ones there, or a smaller step or control_period"
-    )
 
 
 def has_walls(ground: SpatialGround) -> bool:
