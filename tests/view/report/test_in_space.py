@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 from pathlib import Path
@@ -12,10 +13,13 @@ from synthetic_runs import box, make_run
 from typer.testing import CliRunner
 
 import heelstrike as hs
+from heelstrike.analysis.diagnosis.changes import Tried
 from heelstrike.analysis.diagnosis.measures import motor_loads
 from heelstrike.cli.main import app
 from heelstrike.sim.spatial import SpatialRun
 from heelstrike.view import ViewError
+from heelstrike.view.report.account import account_of
+from heelstrike.view.report.differences import differences
 from heelstrike.view.report.space import InSpace
 
 POST = """
@@ -118,3 +122,19 @@ def test_the_command_reports_runs_in_space(runs: dict[str, SpatialRun], tmp_path
     )
     assert refused.exit_code == 2
     assert "--gait" in refused.stderr
+
+
+def test_one_orientation_is_no_difference(robot: hs.SpatialRobot) -> None:
+    run = pushed(robot, 1.0)
+    position = run.position.copy()
+    position[:, 3:7] *= -1.0  # of the quaternion of the free joint
+    turned = dataclasses.replace(run, position=position)
+    _, rows = differences({"one": account_of("one", run), "other": account_of("other", turned)})
+    told = {what: values for what, *values in rows}
+    assert told["coordinates, largest difference (rad, m)"][1] == "0"
+
+
+def test_what_was_tried_is_not_dropped(runs: dict[str, SpatialRun], tmp_path: Path) -> None:
+    tried = Tried("another gain", "it stood", True)
+    with pytest.raises(ViewError, match="nothing is tried beside runs in space"):
+        account_of("stands", runs["stands"], tried=[tried])

@@ -91,6 +91,11 @@ class Account(ABC):
     def center_of_mass(self) -> Floats:
         """Where its centre of mass is in each row, (nt, 2) or (nt, 3), in m."""
 
+    def coordinates(self) -> Floats:
+        """Positions in each row that may be subtracted, (nt, any), in m and rad."""
+        positions: Floats = self.run.position
+        return positions
+
     def touchdowns(self) -> list[float] | None:
         """When its steps touch down (s); None where steps are not counted."""
         return None
@@ -125,7 +130,7 @@ def account_of(
     Raises
     ------
     ViewError
-        If it is no run, or has no rows, or has a gait and is in space.
+        If it is no run, has no rows, or is in space and has a gait or tried runs.
     """
     if not isinstance(run, AnyRun):
         raise ViewError(f"a report is of runs, got {run!r}; load_run reads one from its file")
@@ -139,5 +144,7 @@ def account_of(
 
     if gait is not None:
         raise ViewError(f"gaits are for robots in the plane, and {name} is in space: leave it out")
+    if tried:
+        raise ViewError(f"nothing is tried beside runs in space, and {name} is one: leave it out")
     in_space: Any = run
     return InSpace(in_space)

@@ -43,8 +43,9 @@ def _apart(account: Account, reference: Account) -> dict[str, str]:
         center, other = (at(each.run.time, each.center_of_mass()) for each in (account, reference))
         apart = 1e3 * float(np.linalg.norm(center - other, axis=1).max())
         if run.robot.joint_names == first.robot.joint_names:
-            ours, others = at(run.time, run.position), at(first.time, first.position)
-            coordinates = float(np.abs(ours - others).max())
+            ours = at(run.time, account.coordinates())
+            others = at(first.time, reference.coordinates())
+            coordinates = float(np.abs(ours - others).max(initial=0.0))
         if landings and theirs:
             late = 1e3 * max(abs(a - b) for a, b in zip(landings, theirs, strict=False))
     found = {

@@ -73,6 +73,13 @@ class InSpace(Account):
         """Return the script that draws its film."""
         return drawing_script()
 
+    def coordinates(self) -> Floats:
+        """Positions of hinges and slides: q and −q of a quaternion are one orientation."""
+        model = self.run.robot.model
+        plain = model.joint_kind >= SLIDE
+        positions: Floats = self.run.position[:, model.first_position[plain]]
+        return positions
+
     def center_of_mass(self) -> Floats:
         """Where its centre of mass is."""
         return centroidal_motion(self.run).center_of_mass
