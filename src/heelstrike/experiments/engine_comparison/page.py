@@ -98,8 +98,8 @@ process, takes torques, and returns its state and contact forces. The controller
 compiled one, called with the engine's state and forces every 2 ms, or as often as the table says.
 Times cover the engine's steps and the Python calls that they need; heelstrike's include the
 controller. Other work ran at the same time: ignore differences below a factor of two. The tables
-may come from several runs; each states its steps, controller and step size. What was kept from
-an earlier run has its computing times.
+may come from several runs; each states its steps, controller and step size. Rows that were kept
+from an earlier run have the computing times of that run.
 
 `heelstrike compare bravo7 --engines all` makes the tables; with `--scenes --page docs/engines.md`
 it writes this page. For one engine use `--engines mujoco`, for a quick trial `--quick`. `--films`
@@ -121,7 +121,8 @@ The columns of the walks:
   report all contact forces as means over steps;
 - *noise*: difference of the ground force from its mean over 10 ms in single support, root mean
   square, in percent of the weight;
-- *peak*: largest force on a foot, as a mean over a step, in multiples of the weight;
+- *peak*: largest force on a foot, as a mean over a step, in multiples of the weight. A touchdown is
+  an impulse within one step, so a shorter step has a larger peak;
 - *step*: computing time of a step.
 
 ComputedTorque follows the gait without balancing, so errors of the contact can make the robot fall.
@@ -199,9 +200,10 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
         + "\nWhere licences and systems were read:\n\n"
         + "\n".join(f"- {_title(name)}: {f.read}." for name, f in FACTS.items())
         + "\n\nheelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
-        "its angle of friction, at defaults and a step of 1 ms; by Coulomb's law it is zero. The "
-        "last columns have the step sizes, in ms, at which bravo7 takes all its steps under a "
-        "controller.\n\n"
+        "its angle of friction, at defaults and a step of 1 ms; by Coulomb's law it is zero. Each "
+        "of the last columns is for one controller and its settings. The cells have the step "
+        "sizes, in ms, at which bravo7 takes all its steps; *as defaults* means that the search "
+        "found no better settings.\n\n"
         + _table(headings, ours)
     )  # fmt: skip
 
@@ -279,8 +281,8 @@ def _figure(row: Mapping[str, Any], name: str, factor: float, walks: bool) -> st
 
 
 _WHY = (
-    'Why they did not walk ("completed": the simulation reached its end, but the robot took too '
-    "few steps or went down):"
+    'Why they did not walk (after "completed", which means that the simulation reached its end: '
+    "the steps taken, or the first cause of the fall and what followed):"
 )
 
 
@@ -418,8 +420,8 @@ def _scenes(found: Mapping[str, Any]) -> str:
     why |= dict.fromkeys(f"- {each}." for each in why_not_at_steps(found))
     return (
         "## Scenes with closed forms\n\nThe exact result of each scene:\n\n" + "\n".join(listed)
-        + f"\n\n{_SYMBOLS}\n\nThe table has the errors (simulated less exact, in the units above) "
-        f"at a step of {1e3 * found['step_s']:g} ms and {found['settings']}:\n\n"
+        + f"\n\n{_SYMBOLS}\n\nThe table has the errors (simulated minus exact value, in the units "
+        f"above) at a step of {1e3 * found['step_s']:g} ms and {found['settings']}:\n\n"
         + _table(headings, rows)
         + "\nA dash for a bouncing ball marks an engine without a coefficient of restitution. An "
         "error of many times the exact value means that the simulation diverged."
@@ -433,15 +435,16 @@ def _compass(found: Mapping[str, Any]) -> str:
         "## The compass gait\n\nThe passive walker of Goswami, Thuilot and Espiau (1998) starts on "
         f"its cycle down a slope of 3 degrees and takes up to {found['strides']} steps, at "
         f"{found['settings']}. Its legs are of one length, so the swing foot passes through the "
-        "ground at mid-stance: an engine has the walker on its stance foot until the stance leg is "
-        "upright on the slope, and on both feet from there until the foot behind is highest after "
-        "the landing. The cycle is the mean of the last five steps; *spread* is how far they still "
-        "differ. The Floquet multipliers come from a fit to one step after each of 32 random "
-        "disturbances, with the standard error (±) of the largest one's modulus. An engine that "
+        "ground at mid-stance: an engine gets contact points on the stance foot only until the "
+        "stance leg is perpendicular to the slope. From then on it gets those of both feet, until "
+        "after the landing the rear foot is highest. The cycle is the mean of the last five "
+        "steps; *spread* is how far they still differ. The Floquet multipliers come from a fit to "
+        "one step after each of 32 random disturbances, with the standard error (±) of the "
+        "largest one's modulus. An engine that "
         "resolves a landing within its steps takes it early or late by up to one step, and the "
-        "next step differs. Where that exceeds the disturbances, the standard error is large and "
-        "the multipliers are not resolved. Each row is `heelstrike compare bravo7 --engines NAME "
-        "--scenes`. Published: "
+        "next step differs. Where this difference exceeds the disturbances, the standard error is "
+        "large and the multipliers are not resolved. Each row is `heelstrike compare bravo7 "
+        "--engines NAME --scenes`. Published: "
         "0.734346391 s, 0.535445415 m, −0.199726 ± 0.544476i and 0.131573. If an engine falls in a "
         "disturbed step, the multipliers' column has the reason. "
         f"Rows may come from separate runs.{_not_run(found)}\n\n"
@@ -480,7 +483,7 @@ def _guards(found: Mapping[str, Any]) -> str:
         "difference of a coordinate from heelstrike (m, rad), and *order* the order of its "
         "convergence. *extrapolated* is this difference extrapolated to step zero; it must be at "
         "most 1e-6, or 1e-3 in single precision. The second is *weight*, the sum of the normal "
-        "forces on the robot at rest over its weight; it must be 1 to 1 %.\n\n"
+        "forces on the robot at rest over its weight; it must be 1, within 1 %.\n\n"
         + _table(
             ["engine", "precision", "flight, 0.25 ms", "order", "extrapolated", "weight",
              "holds"],

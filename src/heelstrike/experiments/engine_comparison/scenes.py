@@ -123,7 +123,9 @@ def _on_slope(name: str, angle: float) -> Scene:
     return Scene(
         name, Scenario(name, robot, start, duration, friction=FRICTION),
         lambda q, _: float(q[0]), 0.5 * pull * duration**2, "m",
-        "it stays, or slides by ½ g (sin β − μ cos β) t²",
+        f"it slides by ½ g (sin β − μ cos β) t² in t = {duration:g} s"
+        if pull > 1e-9
+        else "it stays",
     )  # fmt: skip
 
 
@@ -163,8 +165,8 @@ def _on_a_corner() -> Scene:
         ),
         lambda q, v: _upright_rate(float(q[2]) - 0.25 * math.pi, float(v[2]), pull),
         after, "rad/s",
-        "rate after the landing, by the angular momentum about the corner, which turns on: "
-        "½ I ω² + m g R cos φ is constant",
+        "rate ω when it is upright on its corner. The landing conserves the angular momentum "
+        "about the corner; then ½ I ω² + m g R cos φ is constant",
     )  # fmt: skip
 
 
@@ -209,7 +211,8 @@ def _rocking() -> Scene:
             )
         ),
         kept * landing, "rad/s",
-        "rate after it has landed once: (1 − 2 m R² sin² α / I) of that before (Housner 1963)",
+        "rate after its first landing: the rate before it, times 1 − 2 m R² sin² α / I "
+        "(Housner 1963)",
     )  # fmt: skip
 
 
@@ -334,8 +337,8 @@ def _rimless_beside_its_cycle() -> Scene:
     name = "rimless wheel beside its limit cycle"
     return Scene(
         name, Scenario(name, robot, start, BACK, friction=FRICTION), multiplier, kept, "",
-        "its Floquet multiplier, cos² 2α of ω² (McGeer 1990), from what is left of a disturbance "
-        f"after {LANDINGS} landings",
+        "the Floquet multiplier of ω², cos² 2α (McGeer 1990). It is measured by what remains of a "
+        f"disturbance after {LANDINGS} landings",
     )  # fmt: skip
 
 

@@ -171,7 +171,8 @@ DISTURBANCES: tuple[Disturbance, ...] = (
         by_chance=True,
     ),
     Disturbance(
-        "friction", "least", "μ", "the slipperiest patch, two steps long, on ground of μ = 0.75",
+        "friction", "least", "μ",
+        "friction of the slipperiest patch withstood, two steps long, on ground of μ = 0.75",
         _friction, less=True,
     ),
     Disturbance(

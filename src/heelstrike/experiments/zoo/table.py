@@ -195,15 +195,15 @@ def _explained(there: Sequence[Disturbance]) -> list[str]:
 def _measure(results: Results, share: float) -> list[str]:
     settings = results.settings
     return [
-        "A size counts if the walk strictly recovers (`heelstrike.analysis.recovery`) from it and "
+        "A size is withstood if the walk recovers (`heelstrike.analysis.recovery`) from it and "
         f"from every smaller size tried. Up to {settings.strides} growing sizes are tried until "
         f"the walk fails, then {settings.halvings} bisections follow. ≥ means that the largest "
         "size tried was withstood, < that the smallest was not. Pushes begin at "
         f"{counted(settings.trials, 'phase', 'phases')} of a step, and rough ground has "
         f"{counted(settings.trials, 'shape', 'shapes')}, drawn from the seed, the same for all. "
-        "The tables give the size withstood in all of them; with "
-        f"{SURE:.0%} confidence each size is withstood at {share:.0%} of all phases or shapes at "
-        "least. "
+        "The tables give the size withstood at all of these "
+        f"phases or shapes. From this follows, with {SURE:.0%} confidence, that at least "
+        f"{share:.0%} of all phases or shapes are withstood. "
         "Everything else has one trial.",
         "",
         "A controller is not tested further if its undisturbed walk falls, leans by more than "
