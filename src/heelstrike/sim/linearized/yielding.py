@@ -85,7 +85,7 @@ differentiated: laws are linear in it, so that any does."""
 
 @kernel
 def act(
-    model: Model, ground: GroundModel, time: float, control: Control, memory: Memory, laws: Laws,
+    model: Model, ground: GroundModel, time: float, laws: Laws, control: Control, memory: Memory,
     corners: Corners, now: Rates, own_rows: Floats, force: Floats,
 ) -> None:  # fmt: skip
     """Find forces and rates of the state in `memory`, under the commands that are there."""
@@ -260,7 +260,7 @@ class Yielding:
             memory.command[:] = law.torque()
         wanted = memory.command.copy()
         act(
-            model, ground, time, simulation._control, memory, work.laws, work.corners, now,
+            model, ground, time, work.laws, simulation._control, memory, work.corners, now,
             work.now_rows, work.force,
         )  # fmt: skip
         if not np.array_equal(memory.torque, wanted):
