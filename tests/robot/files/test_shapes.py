@@ -100,7 +100,7 @@ def test_urdf_says_that_it_drops_them(tmp_path: Path) -> None:
     ("change", "said"),
     [
         (('data="0.07 ', 'data="-0.07 '), "outline:0:root_pitch must be a radius >= 0"),
-        (('data="0.07 ', 'data="nan '), "which is no finite number"),
+        (('data="0.07 ', 'data="nan '), "which is not a finite number"),
     ],
 )
 def test_spoilt_outlines(change: tuple[str, str], said: str, tmp_path: Path) -> None:
