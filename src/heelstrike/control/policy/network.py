@@ -282,6 +282,8 @@ def load_network(path: str | os.PathLike[str]) -> Network:
         raise ControllerError(f"{path}: not a policy in the layout {FORMAT!r}")
     try:
         return _network(arrays)
+    except ControllerError as error:
+        raise ControllerError(f"{path}: damaged, {error}") from error
     except (KeyError, TypeError, ValueError) as error:
         raise ControllerError(f"{path}: damaged, {error} is missing or no number") from error
     except ControllerError as error:
