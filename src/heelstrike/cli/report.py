@@ -77,6 +77,7 @@ def report(
     status is 0 if all runs lasted to their end, 1 if not.
     """
     from heelstrike.experiments.what_if import NO_CONTROLLER, tried_beside
+    from heelstrike.sim.run import Run
     from heelstrike.view.page.page import check_page
     from heelstrike.view.report import report
 
@@ -87,7 +88,9 @@ def report(
     if files:
         _refuse_options_of_a_walk(context)
         runs, followed = _read(files, walking.gait)
-        tried: dict[str, tuple[Tried, ...]] = dict.fromkeys(runs, (NO_CONTROLLER,))
+        tried: dict[str, tuple[Tried, ...]] = {
+            name: (NO_CONTROLLER,) for name, run in runs.items() if isinstance(run, Run)
+        }
     elif len(what) > 1:
         raise typer.BadParameter("give one robot; repeat --method to compare methods")
     else:

@@ -286,8 +286,6 @@ def load_network(path: str | os.PathLike[str]) -> Network:
         raise ControllerError(f"{path}: damaged, {error}") from error
     except (KeyError, TypeError, ValueError) as error:
         raise ControllerError(f"{path}: damaged, {error} is missing or no number") from error
-    except ControllerError as error:
-        raise ControllerError(f"{path}: {error}") from error
 
 
 def _network(arrays: Mapping[str, Any]) -> Network:
