@@ -26,7 +26,7 @@ KNOWN: tuple[tuple[str, str, str], ...] = (
      "zmp_margin_min_m=float(np.fmax.reduce(margin,"),
     ("analysis/summary.py", "m in {s.duration_s:.4} s (", "m in {s.duration_s:.4} ms ("),
     ("sim/run.py", '"m/s or rad/s"', '"m/s or deg/s"'),
-    ("sim/run.py", 'unit="N m", label="joint torques within their limits"',
+    ("sim/run.py", 'unit="N m or N", label="joint torques within their limits"',
      'unit="N", label="joint torques within their limits"'),
     ("sim/files/layout.py", '"window": ["start", "duration"]', '"window": ["start", "end"]'),
     ("sim/files/layout.py", '"component": ["normal", "tangent"]',
