@@ -141,7 +141,7 @@ def test_moved_footholds_keep_a_run_on_toes_up() -> None:
     """In which no motor moves the trunk: without them it falls, with them it bears a push."""
     robot = walking.bravo7()
     assert steps(hs.WholeBody(robot, running())) < 20.0
-    push = hs.Push("trunk", force=(0.02 * robot.weight, 0.0), start=1.0, duration=0.1)
+    push = hs.Push("trunk", force=(0.01 * robot.weight, 0.0), start=1.0, duration=0.1)
     law = hs.FootstepFeedback(robot, running())
     assert steps(law) == pytest.approx(20.5)
     assert steps(law, (push,)) == pytest.approx(20.5)
