@@ -78,8 +78,8 @@ class Log(Bundle):
 
     relaxed: int = cell(int, label="Levels of rows given up")
     unsolved: int = cell(int, label="Programmes that were not solved so far")
-    """relaxed, unsolved: By the quadratic programme; no torque is asked for where it is not
-    solved."""
+    """relaxed, unsolved: By the quadratic programme; where it is not solved, the last torques
+    stay."""
 
 
 @kernel
