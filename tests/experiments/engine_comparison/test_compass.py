@@ -134,7 +134,7 @@ def test_the_table_says_who_walks_and_why_others_do_not(
 ) -> None:
     asked: list[str] = []
 
-    def in_engine(entry: Any, step: float, given: Any, start: Any) -> dict[str, Any]:
+    def in_engine(entry: Any, *_: Any) -> dict[str, Any]:
         asked.append(entry.title)
         if entry.title == "Bullet":
             raise InvalidRunError("its process was ended by SIGABRT")

@@ -29,6 +29,7 @@ from heelstrike.experiments.engine_comparison.settings import DEFAULTS, settings
 from heelstrike.experiments.engine_comparison.tables import short
 from heelstrike.experiments.engines.packages import PACKAGES, compared, peers
 from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.experiments.engines.served import EngineProcesses
 from heelstrike.field_texts import dataclass
 from heelstrike.robot import State
 from heelstrike.sim import TimeStepping
@@ -144,6 +145,7 @@ def compare_compass(
     settings: str = DEFAULTS,
     steps: Sequence[float] = STEPS,
     folder: Path | str | None = None,
+    processes: EngineProcesses | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> CompassTable:
     """Let the passive compass gait walk down its slope in every engine.
@@ -158,6 +160,8 @@ def compare_compass(
         Steps of the engines, in s.
     folder : path, optional
         Where rows are kept as they come, to go on from there.
+    processes : EngineProcesses, optional
+        Where engines have been asked before; they are not ended.
     progress : callable, optional
         Called before each walk with a text, and the share of them that is done.
 
@@ -195,7 +199,7 @@ def compare_compass(
             found = kept.entries(
                 f"compass-{name}-{settings}-{step:g}",
                 told,
-                partial(_in_engine, entry, step, given, start),
+                partial(_in_engine, entry, step, given, start, processes),
             )
         except InvalidRunError as refused:
             rows.append(replace(row, reason=str(refused)))
@@ -204,8 +208,11 @@ def compare_compass(
     return CompassTable(STRIDES, settings, tuple(rows))
 
 
-def _in_engine(entry: Entry, step: float, given: Mapping[str, Any], start: State) -> dict[str, Any]:
-    mover = InEngine(entry, step, given)
+def _in_engine(
+    entry: Entry, step: float, given: Mapping[str, Any], start: State,
+    processes: EngineProcesses | None,
+) -> dict[str, Any]:  # fmt: skip
+    mover = InEngine(entry, step, given, processes)
     try:
         return _told(compass_walk(mover, start))
     finally:

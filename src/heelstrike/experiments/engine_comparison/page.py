@@ -24,6 +24,7 @@ from heelstrike.experiments.engine_comparison.settings import (
     found_for_others,
 )
 from heelstrike.experiments.engine_comparison.tables import BY_ITSELF, WALKING, short
+from heelstrike.experiments.engine_comparison.whole import taken
 
 SHOWN = 1e-3
 """Step (s) whose walks the page shows in full."""
@@ -67,6 +68,7 @@ def engines_page(folder: Path, figure: str) -> str:
         raise SimulationError(f"{scenes_file} is from before: it lacks {lacks[0]!r}. {first}")
     parts = [
         _INTRODUCTION,
+        _taken(folder / "whole.json"),
         _in_short(walks),
         _table_1(walks, scenes),
         _best(walks),
@@ -97,12 +99,11 @@ Each engine gets the robot link by link, with heelstrike's contact points. It ru
 process, takes torques, and returns its state and contact forces. The controller is heelstrike's
 compiled one, called with the engine's state and forces every 2 ms, or as often as the table says.
 Times cover the engine's steps and the Python calls that they need; heelstrike's include the
-controller. Other work ran at the same time: ignore differences below a factor of two. The tables
-may come from several runs; each states its steps, controller and step size. Rows that were kept
-from an earlier run have the computing times of that run.
+controller. Other work ran at the same time: ignore differences below a factor of two.
 
-`heelstrike compare bravo7 --engines all` makes the tables; with `--scenes --page docs/engines.md`
-it writes this page. For one engine use `--engines mujoco`, for a quick trial `--quick`. `--films`
+`heelstrike compare bravo7 --engines all --whole` makes the tables; with `--page docs/engines.md` it
+writes this page, and `--fine` adds shorter steps. It keeps each row as it comes and goes on where
+it was interrupted. For one engine use `--engines mujoco`, for a quick trial `--quick`. `--films`
 shows the walks that fall. CONTRIBUTING says how to add an engine.
 
 The columns of the walks:
@@ -128,6 +129,21 @@ The columns of the walks:
 ComputedTorque follows the gait without balancing, so errors of the contact can make the robot fall.
 FootstepFeedback corrects them by its footholds.
 """
+
+
+def _taken(file: Path) -> str:
+    """Say by which command the page was made, and how long that took."""
+    found = taken(file)
+    if not found:
+        return ""
+    sittings = found["sittings"]
+    days = list(dict.fromkeys(each["date"] for each in sittings))
+    wall, processor = (sum(each[k] for each in sittings) / 60.0 for k in ("wall_s", "processor_s"))
+    return (
+        f"`{found['command']} --page docs/engines.md` made all of it on {' and '.join(days)}. It "
+        f"took {wall:.0f} minutes on {found['processors']} processors that others used, too, and "
+        f"{processor:.0f} minutes of processor time.\n"
+    )
 
 
 def _table(headings: Sequence[str], rows: Rows) -> str:
@@ -340,12 +356,15 @@ def _peaks(walks: Mapping[str, Any]) -> str:
     headings = ["engine", "settings"]
     headings += [f"peak, {1e3 * h:g} ms" for h in sizes]
     headings += [f"computing time (s), {1e3 * h:g} ms" for h in sizes]
+    called = ",".join(f"{h:g}" for h in sizes)
     return (
         "## Foot force over step size\n\nThe largest force on a foot (a mean over a step, in "
         f"multiples of the weight) and the computing time of the same walk under {law}. With hard "
         "contact a touchdown is an impulse within one step, so its force grows as the step "
         "shrinks. With soft contact the force is that of the spring. Walks that fall are "
-        "included.\n\n"
+        f"included. Each row is `heelstrike compare {found['robot']} --controller "
+        f"{law.partition(' ')[0]} --engines NAME --settings SETTINGS --sizes {called} "
+        f"--steps {found['steps']}`.\n\n"
         + _table(headings, rows)
     )  # fmt: skip
 
@@ -421,7 +440,8 @@ def _scenes(found: Mapping[str, Any]) -> str:
     return (
         "## Scenes with closed forms\n\nThe exact result of each scene:\n\n" + "\n".join(listed)
         + f"\n\n{_SYMBOLS}\n\nThe table has the errors (simulated minus exact value, in the units "
-        f"above) at a step of {1e3 * found['step_s']:g} ms and {found['settings']}:\n\n"
+        f"above) at a step of {1e3 * found['step_s']:g} ms and {found['settings']}. Each row is "
+        "`heelstrike compare bravo7 --engines NAME --scenes`:\n\n"
         + _table(headings, rows)
         + "\nA dash for a bouncing ball marks an engine without a coefficient of restitution. An "
         "error of many times the exact value means that the simulation diverged."
@@ -483,7 +503,8 @@ def _guards(found: Mapping[str, Any]) -> str:
         "difference of a coordinate from heelstrike (m, rad), and *order* the order of its "
         "convergence. *extrapolated* is this difference extrapolated to step zero; it must be at "
         "most 1e-6, or 1e-3 in single precision. The second is *weight*, the sum of the normal "
-        "forces on the robot at rest over its weight; it must be 1, within 1 %.\n\n"
+        "forces on the robot at rest over its weight; it must be 1, within 1 %. Each row is "
+        "`heelstrike compare bravo7 --engines NAME --scenes`.\n\n"
         + _table(
             ["engine", "precision", "flight, 0.25 ms", "order", "extrapolated", "weight",
              "holds"],
