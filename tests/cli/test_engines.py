@@ -212,7 +212,9 @@ def whole(monkeypatch: pytest.MonkeyPatch, asked: list[dict[str, Any]]) -> list[
 
 def test_one_command_makes_all_of_the_page(tmp_path: Path, whole: list[dict[str, Any]]) -> None:
     page = tmp_path / "engines.md"
-    result = invoke(tmp_path, "--engines", "mujoco,ode", "--whole", "--page", str(page))
+    result = invoke(
+        tmp_path, "--engines", "mujoco,ode", "--whole", "--processes", "1", "--page", str(page)
+    )
     assert result.exit_code == 0, result.stderr
     walks = [call for call in whole if "law" in call]
     assert [(call["law"], call["steps"], call["control_period"]) for call in walks] == [
@@ -236,7 +238,7 @@ def test_one_command_makes_all_of_the_page(tmp_path: Path, whole: list[dict[str,
 
 
 def test_finer_steps_come_apart(tmp_path: Path, whole: list[dict[str, Any]]) -> None:
-    result = invoke(tmp_path, "--engines", "all", "--whole", "--fine", "--json")
+    result = invoke(tmp_path, "--engines", "all", "--whole", "--processes", "1", "--fine", "--json")
     assert result.exit_code == 0, result.stderr
     first, *others = [call for call in whole if "law" in call]
     assert first["step_sizes"][-2:] == (1e-4, 5e-5)
@@ -246,7 +248,7 @@ def test_finer_steps_come_apart(tmp_path: Path, whole: list[dict[str, Any]]) -> 
 
 
 def test_a_quick_whole_comparison_is_short(tmp_path: Path, whole: list[dict[str, Any]]) -> None:
-    result = invoke(tmp_path, "--engines", "all", "--whole", "--quick")
+    result = invoke(tmp_path, "--engines", "all", "--whole", "--processes", "1", "--quick")
     assert result.exit_code == 0, result.stderr
     walks = [call for call in whole if "law" in call]
     assert all((call["steps"], call["step_sizes"]) == (4, (1e-3,)) for call in walks)
@@ -265,7 +267,7 @@ def test_a_whole_comparison_refuses_what_it_decides_itself(
         (["--quick", "--fine"], "--fine"),
         (["--quick", "--page", "page.md"], "--page"),
     ):
-        result = invoke(tmp_path, "--engines", "all", "--whole", *options)
+        result = invoke(tmp_path, "--engines", "all", "--whole", "--processes", "1", *options)
         assert result.exit_code == 2
         assert f"{named}: " in " ".join(result.output.split())
     apart = invoke(tmp_path, "--engines", "all", "--fine")

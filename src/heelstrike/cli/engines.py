@@ -92,6 +92,16 @@ class InEngines:
         ),
     ] = False
 
+    processes: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            max=2,
+            help="With --whole: processes that walk at once, one from the first engine on and one "
+            "from the last.",
+        ),
+    ] = 2
+
     @property
     def names(self) -> list[str] | str:
         """Names of the engines."""
@@ -121,7 +131,7 @@ class InEngines:
 
     def refuse_beside_whole(self) -> None:
         """Refuse options that the whole comparison decides, or that ask for part of it."""
-        if given := self._given("engines", "page", "quick", "whole", "fine"):
+        if given := self._given("engines", "page", "quick", "whole", "fine", "processes"):
             raise SimulationError(
                 f"{', '.join(given)}: the whole comparison has its own walks, scenes and pushes. "
                 "Leave out, or leave --whole out"
@@ -158,6 +168,8 @@ def compare_in_engines(
     refuse_a_quick_page(asked)
     if asked.fine:
         raise SimulationError("--fine: for the whole comparison only. Add --whole, or use --sizes")
+    if asked.processes != InEngines().processes:
+        raise SimulationError("--processes: for the whole comparison only. Add --whole")
     sizes: tuple[float, ...] = QUICK_SIZES if asked.quick else STEP_SIZES
     if asked.sizes is not None:
         sizes = tuple(numbers_called(asked.sizes, "--sizes"))

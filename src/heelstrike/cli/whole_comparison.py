@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -26,10 +29,14 @@ from heelstrike.cli.terminal import output, stage, tell
 from heelstrike.errors import SimulationError
 
 if TYPE_CHECKING:
+    from multiprocessing.synchronize import Event
+
     from heelstrike.experiments.engine_comparison import EngineComparison, SceneTable
     from heelstrike.experiments.engine_comparison.whole import Part
     from heelstrike.experiments.engines.served import EngineProcesses
     from heelstrike.experiments.walk import Beginning, Case
+
+    Progress = Callable[[str, float], None]
 
 
 def compare_whole(
@@ -48,7 +55,7 @@ def compare_whole(
     processes = EngineProcesses()
     options = "".join(f" --{each}" for each in ("quick", "fine") if getattr(asked, each))
     command = f"heelstrike compare {case.robot.name} --engines {asked.engines} --whole{options}"
-    with sitting(file, command):
+    with sitting(file, command), _helped(case, asked, walking, out):
         try:
             comparison, scenes = _compared(case, asked, walking, out, processes, as_json=as_json)
         finally:
@@ -68,16 +75,14 @@ def _compared(
 ) -> tuple[EngineComparison, SceneTable]:  # fmt: skip
     """Walk, push, and simulate the scenes; return the first walks, and the scenes."""
     from heelstrike.experiments.engine_comparison.settings import DEFAULTS
-    from heelstrike.experiments.engine_comparison.whole import PARTS, QUICK
-    from heelstrike.experiments.laws import law_called
-    from heelstrike.experiments.walk import beginning
     from heelstrike.view.style import save_figure
 
     found = []
-    for part in QUICK if asked.quick else PARTS:
-        own = with_gait(replace(case, law=law_called(part.law)), walking.gait)
-        start = beginning(own.robot, own.gait, own.ground, own.law)
-        comparison = walked_part(part, own, start, asked, out, processes)
+    for part, own, start in _parts(case, asked, walking):
+        with stage(f"walking in engines under {part.law}") as show:
+            comparison = _walked(part, own, start, asked, out, processes, show.doing)
+        name = named(start, replace(asked, period=part.control_period))
+        written(out / f"engines-{name}.json", comparison)
         found.append(comparison)
         if not as_json:
             output().print(comparison)
@@ -89,33 +94,109 @@ def _compared(
     return found[0], scenes
 
 
-def walked_part(
+def _parts(
+    case: Case, asked: InEngines, walking: Walking
+) -> Iterator[tuple[Part, Case, Beginning]]:
+    """Return the parts of the comparison, each with what is walked and its beginning."""
+    from heelstrike.experiments.engine_comparison.whole import PARTS, QUICK
+    from heelstrike.experiments.laws import law_called
+    from heelstrike.experiments.walk import beginning
+
+    for part in QUICK if asked.quick else PARTS:
+        own = with_gait(replace(case, law=law_called(part.law)), walking.gait)
+        check(own)
+        yield part, own, beginning(own.robot, own.gait, own.ground, own.law)
+
+
+def _walked(
     part: Part, case: Case, start: Beginning, asked: InEngines, out: Path,
-    processes: EngineProcesses,
+    processes: EngineProcesses, progress: Progress,
 ) -> EngineComparison:  # fmt: skip
-    """Walk a part of the whole comparison, and write what came of it."""
+    """Walk a part of the whole comparison."""
     from heelstrike.experiments.engine_comparison import compare_engines
     from heelstrike.experiments.engine_comparison.whole import LONGEST
 
     assert start.controller is not None
-    check(case)
     assert case.followed is not None
-    with stage(f"walking in engines under {part.law}") as show:
-        comparison = compare_engines(
-            case.robot,
-            start.controller,
-            case.followed,
-            engines=asked.names,
-            steps=part.steps,
-            step_sizes=part.step_sizes + (part.finer if asked.fine else ()),
-            settings=part.settings,
-            control_period=part.control_period,
-            friction=friction_of(case),
-            folder=out / "engines",
-            longest=LONGEST if asked.fine else None,
-            processes=processes,
-            progress=show.doing,
-        )
-    name = named(start, replace(asked, period=part.control_period))
-    written(out / f"engines-{name}.json", comparison)
-    return comparison
+    return compare_engines(
+        case.robot,
+        start.controller,
+        case.followed,
+        engines=asked.names,
+        steps=part.steps,
+        step_sizes=part.step_sizes + (part.finer if asked.fine else ()),
+        settings=part.settings,
+        control_period=part.control_period,
+        friction=friction_of(case),
+        folder=out / "engines",
+        longest=LONGEST if asked.fine else None,
+        processes=processes,
+        progress=progress,
+    )
+
+
+@contextmanager
+def _helped(case: Case, asked: InEngines, walking: Walking, out: Path) -> Iterator[None]:
+    """Have another process fill the folder of rows from the last engine on, for a while."""
+    if asked.processes < 2:
+        yield
+        return
+    spawn = multiprocessing.get_context("spawn")
+    enough = spawn.Event()
+    helper = spawn.Process(target=_from_the_last, args=(case, asked, walking, out, enough))
+    helper.start()
+    try:
+        yield
+    finally:
+        enough.set()
+        helper.join()
+
+
+class _EnoughError(Exception):
+    """What there was to do has been done."""
+
+
+def _from_the_last(
+    case: Case, asked: InEngines, walking: Walking, out: Path, enough: Event
+) -> None:
+    """Walk, push and simulate in the engines from the last one on; rows are kept as they come.
+
+    The other process begins with the first engine. Where they meet, each finds what the other has
+    done.
+    """
+    from heelstrike.experiments.engine_comparison import (
+        compare_compass,
+        compare_pushes,
+        compare_scenes,
+    )
+    from heelstrike.experiments.engine_comparison.entries import entries_called
+    from heelstrike.experiments.engine_comparison.whole import PATIENCE
+    from heelstrike.experiments.engines.served import EngineProcesses
+
+    def progress(text: str, share: float) -> None:  # noqa: ARG001
+        if enough.is_set():
+            raise _EnoughError
+
+    processes = EngineProcesses()
+    names = list(reversed(entries_called(asked.names)))
+    own = replace(asked, engines=",".join(names))
+    shared: Any = {
+        "engines": names, "folder": out / "engines", "processes": processes, "progress": progress
+    }  # fmt: skip
+    try:
+        for part, walked, start in _parts(case, own, walking):
+            _walked(part, walked, start, own, out, processes, progress)
+            if part.pushes:
+                assert start.controller is not None
+                assert walked.followed is not None
+                compare_pushes(
+                    walked.robot, start.controller, walked.followed,
+                    friction=friction_of(walked), control_period=part.control_period, **shared,
+                )  # fmt: skip
+        compare_scenes(steps=(), patience=PATIENCE, **shared)
+        if not asked.quick:
+            compare_compass(**shared)
+    except (_EnoughError, KeyboardInterrupt):
+        pass
+    finally:
+        processes.end()

@@ -11,6 +11,8 @@ from matplotlib.lines import Line2D
 from heelstrike.view.style import INK, label_powers, new_figure, styled
 
 MARKS = "osD^v<>Phd*Xp"
+COLORS = 10
+"""Colours there are; an engine beyond them shares one, and its line is dashed."""
 OURS = "heelstrike"
 FAINT = 0.35
 """Opacity of the lines of defaults, where there are better settings."""
@@ -111,7 +113,7 @@ def _look(name: str, names: Sequence[str]) -> tuple[str, str, Any]:
         return INK, MARKS[own.index(name)], ("-", "--", ":")[own.index(name) % 3]
     others = [each for each in names if not each.startswith(OURS)]
     place = others.index(name)
-    return f"C{place % 10}", MARKS[(place + 3) % len(MARKS)], "-"
+    return f"C{place % COLORS}", MARKS[(place + 3) % len(MARKS)], "-" if place < COLORS else "--"
 
 
 def _draw(

@@ -130,6 +130,20 @@ ENTRIES: dict[str, Entry] = {
         },
         advice="iterations up to 255 for articulations (PhysX 5 documentation, Best Practices)",
     ),
+    "newton": Entry(
+        "Newton Steel", "newton",
+        choices={
+            "iterations": (50, 200),
+            "baumgarte": (0.05, 0.8),
+            "beta": (0.0,),
+            "warm": (True,),
+            "cfm": (0.0,),
+        },
+        advice=(
+            "iterations, Baumgarte's part and friction by patches or by points (newton, "
+            "docstring of SolverSteel)"
+        ),
+    ),
     "siconos": Entry(
         "Siconos", "siconos",
         choices={"theta": (0.75, 1.0), "solver": ("nsgs",), "tolerance": (1e-12,)},
@@ -160,12 +174,6 @@ ABSENT: dict[str, str] = {
         "DART, Bullet and ODE of the rows above"
     ),
     "OpenHRP/Choreonoid": "no package for Python; its engine is its own",
-    "Newton": (
-        "newton 1.8.0 installs for a CPU, in single precision, but has no adapter: its "
-        "Featherstone and semi-implicit solvers tell no contact forces (only MuJoCo Warp, XPBD and "
-        "Kamino have update_contacts), the main one is MuJoCo's, which has a row, and Kamino is in "
-        "beta"
-    ),
     "Genesis": (
         "genesis-world 1.4.5 installs for a CPU, in double precision, and reads the robot as MJCF, "
         "but has no adapter: its kernels were not compiled after four minutes on a loaded machine"
