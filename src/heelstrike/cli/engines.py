@@ -256,7 +256,8 @@ def scenes_in_engines(
     from heelstrike.experiments.engines.served import EngineProcesses
 
     engines, own = asked.names, processes or EngineProcesses()
-    landing, walker = ((), QUICK_SIZES) if asked.quick else (STEPS, COMPASS_STEPS)
+    landing: tuple[float, ...] = () if asked.quick else STEPS
+    walker: tuple[float, ...] = QUICK_SIZES if asked.quick else COMPASS_STEPS
     if asked.quick and asked.whole:
         walker = ()  # it would take longest
     shared: Any = {"engines": engines, "processes": own, "folder": out / "engines"}
