@@ -466,9 +466,9 @@ def _compass(found: Mapping[str, Any]) -> str:
         "large and the multipliers are not resolved. Each row is `heelstrike compare bravo7 "
         "--engines NAME --scenes`. Published: "
         "0.734346391 s, 0.535445415 m, −0.199726 ± 0.544476i and 0.131573. If an engine falls in a "
-        "disturbed step, the multipliers' column has the reason. "
-        f"Rows may come from separate runs.{_not_run(found)}\n\n"
-        + _table(COMPASS, [compass_cells(row) for row in found["rows"]])
+        "disturbed step, the multipliers' column has the reason. *best* marks rows at the best "
+        "settings, of engines in which it falls at defaults. "
+        f"{_not_run(found)}\n\n" + _table(COMPASS, [compass_cells(row) for row in found["rows"]])
     )
 
 
