@@ -21,9 +21,9 @@ from heelstrike.robot.model import Floats
 
 wp.config.quiet = True
 
-SMALL_SPHERE = 1e-4
+LEAST_SPHERE = 1e-4
 """Least radius of a contact point, in m: its spheres have some size."""
-NEARLY_NOTHING = 1e-6
+LEAST_BODY = 1e-6
 """Mass (kg) and inertia (kg m²) of what has none: a millionth of the lightest link."""
 
 
@@ -92,10 +92,10 @@ class NewtonPeer(Peer):
         cfg = newton.ModelBuilder.ShapeConfig(**surface)
         joints = []
         self._point: dict[int, int] = {}
-        for link in links(robot, least_radius=SMALL_SPHERE):
-            inertia = max(link.inertia, NEARLY_NOTHING)
+        for link in links(robot, least_radius=LEAST_SPHERE):
+            inertia = max(link.inertia, LEAST_BODY)
             body = builder.add_link(
-                mass=max(link.mass, NEARLY_NOTHING), com=wp.vec3(*link.center),
+                mass=max(link.mass, LEAST_BODY), com=wp.vec3(*link.center),
                 inertia=wp.mat33(inertia * np.eye(3)), lock_inertia=True, label=link.name,
             )  # fmt: skip
             add = builder.add_joint_revolute if link.hinge else builder.add_joint_prismatic
