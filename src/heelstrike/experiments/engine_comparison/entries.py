@@ -63,8 +63,8 @@ ENTRIES: dict[str, Entry] = {
             "stiction": (1e-3, 1e-5),
         },
         advice=(
-            "stiffness and dissipation of points are properties of the geometries, stiction's "
-            "tolerance one of the plant (drake.mit.edu, Contact modeling in Drake)"
+            "stiffness and dissipation are properties of the geometries, stiction's tolerance of "
+            "the plant (drake.mit.edu, Contact modeling in Drake)"
         ),
     ),
     "drake_sap": Entry(
@@ -151,20 +151,20 @@ ABSENT: dict[str, str] = {
     "Vortex": "commercial, no package for this platform; no free engine is of its kind",
     "RaiSim": "needs a licence file of its maker; DART and Siconos solve the same contact problem",
     "CoppeliaSim (V-REP)": (
-        "no package for Python that carries its engines: Bullet, ODE and MuJoCo, which have rows, "
+        "no package for Python has its engines: Bullet, ODE and MuJoCo, which have rows, "
         "Newton Dynamics and Vortex"
     ),
     "Webots": "no package; its engine is a fork of ODE, which has a row",
     "Gazebo": (
-        "its physics library is C++ alone in Debian (libignition-physics-dev); its engines are "
-        "DART, Bullet and ODE of the rows above"
+        "its physics library is C++ alone in Debian (libignition-physics-dev); its engines DART, "
+        "Bullet and ODE have rows"
     ),
     "OpenHRP/Choreonoid": "no package for Python; its engine is its own",
     "Newton": (
         "newton 1.8.0 installs for a CPU, in single precision, but has no adapter: its "
-        "Featherstone and semi-implicit solvers tell no contact forces (only MuJoCo Warp, XPBD and "
-        "Kamino have update_contacts), the main one is MuJoCo's, which has a row, and Kamino is in "
-        "beta"
+        "Featherstone and semi-implicit solvers report no contact forces (only MuJoCo Warp, XPBD "
+        "and Kamino have update_contacts), the main one is MuJoCo's, which has a row, and Kamino "
+        "is in beta"
     ),
     "Genesis": (
         "genesis-world 1.4.5 installs for a CPU, in double precision, and reads the robot as MJCF, "
