@@ -483,9 +483,9 @@ def _guards(found: Mapping[str, Any]) -> str:
         "## Guards\n\nTwo checks confirm that an engine has the same robot:\n\n- a flight of 0.1 s "
         "with all joints turning, at steps of 1, 0.5 and 0.25 ms. *flight* is the largest "
         "difference of a coordinate from heelstrike (m, rad), *order* its order of convergence. "
-        "*extrapolated*, its value at step zero, must be at most 1e-6, or 1e-3 in single precision;\n- *weight*, "
-        "the sum of the normal forces at rest over the robot's weight. It must be 1, within 1 %."
-        "\n\n"
+        "*extrapolated*, its value at step zero, must be at most 1e-6, or 1e-3 in single "
+        "precision;\n- *weight*, the sum of the normal forces at rest over the robot's weight. It "
+        "must be 1, within 1 %.\n\n"
         + _table(
             ["engine", "precision", "flight, 0.25 ms", "order", "extrapolated", "weight",
              "holds"],
