@@ -155,14 +155,14 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         "",
         "The tables give the largest disturbance that each controller withstands on each robot. "
         "Each robot has one gait. Each controller has one set of gains, tuned on one robot and "
-        "scaled with weight and height. This command makes the page, its figure and its numbers:",
+        "scaled with weight and height. This command makes the page:",
         "",
         "```sh",
         command,
         "```",
         "",
-        f"It ran with heelstrike {settings.version}, {settings.method}, seed {settings.seed}, and "
-        "controllers called once a millisecond, or once a time step where that is longer.",
+        f"It used heelstrike {settings.version}, {settings.method}, seed {settings.seed}, and "
+        "control periods of a millisecond, or a time step where that is longer.",
         "",
         f"![Largest disturbance by robot and controller, one panel for each disturbance]({link})",
         "",
@@ -197,18 +197,16 @@ def _measure(results: Results, share: float) -> list[str]:
     return [
         "A size is withstood if the walk recovers (`heelstrike.analysis.recovery`) from it and "
         f"from every smaller size tried. Up to {settings.strides} growing sizes are tried until "
-        f"the walk fails, then {settings.halvings} bisections follow. ≥ means that the largest "
-        "size tried was withstood, < that the smallest was not. Pushes begin at "
+        f"the walk fails, then {settings.halvings} bisections follow. ≥ (for friction ≤) means "
+        "that the hardest size tried was withstood, < that the easiest was not. Pushes begin at "
         f"{counted(settings.trials, 'phase', 'phases')} of a step, and rough ground has "
         f"{counted(settings.trials, 'shape', 'shapes')}, drawn from the seed, the same for all. "
-        "The tables give the size withstood at all of these "
-        f"phases or shapes. From this follows, with {SURE:.0%} confidence, that at least "
-        f"{share:.0%} of all phases or shapes are withstood. "
+        "A size in the tables is withstood at all of them. So, "
+        f"with {SURE:.0%} confidence, at least {share:.0%} of all phases or shapes are withstood. "
         "Everything else has one trial.",
         "",
-        "A controller is not tested further if its undisturbed walk falls, leans by more than "
-        "0.6 rad, or changes its speed. Standing controllers meet pushes and masses only, and have "
-        "no price.",
+        "Tests end if the undisturbed walk falls, leans by more than 0.6 rad, or changes its "
+        "speed. Standing controllers meet pushes and masses only, and have no price.",
     ]
 
 
