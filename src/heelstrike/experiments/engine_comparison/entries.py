@@ -90,8 +90,8 @@ ENTRIES: dict[str, Entry] = {
             "enableConeFriction": (0,),
         },
         advice=(
-            "iterations and ERP (Bullet User Manual; PyBullet Quickstart, "
-            "setPhysicsEngineParameter)"
+            "iterations and ERP, the share of an error that a step corrects (Bullet User Manual; "
+            "PyBullet Quickstart, setPhysicsEngineParameter)"
         ),
     ),
     "dart": Entry("DART", "dart", choices={"split": (True,), "detector": ("FCL", "BULLET", "ODE")}),
@@ -103,8 +103,8 @@ ENTRIES: dict[str, Entry] = {
             "solver": ("quick",),
         },
         advice=(
-            "ERP of 0.1 to 0.8, CFM of 1e-9 to 1, the exact step where accuracy counts (ode.org, "
-            "ODE Manual, chapter 3)"
+            "ERP of 0.1 to 0.8, CFM (softness) of 1e-9 to 1, the exact step where accuracy counts "
+            "(ode.org, ODE Manual, chapter 3)"
         ),
     ),
     "simbody": Entry(
@@ -161,14 +161,11 @@ ABSENT: dict[str, str] = {
     ),
     "OpenHRP/Choreonoid": "no package for Python; its engine is its own",
     "Newton": (
-        "newton 1.8.0 installs for a CPU, in single precision, but has no adapter: its "
-        "Featherstone and semi-implicit solvers report no contact forces (only MuJoCo Warp, XPBD "
-        "and Kamino have update_contacts), the main one is MuJoCo's, which has a row, and Kamino "
-        "is in beta"
+        "newton 1.8.0 has no adapter: its main solver is MuJoCo's, which has a row; Featherstone "
+        "and semi-implicit ones report no contact forces"
     ),
     "Genesis": (
-        "genesis-world 1.4.5 installs for a CPU, in double precision, and reads the robot as MJCF, "
-        "but has no adapter: its kernels were not compiled after four minutes on a loaded machine"
+        "genesis-world 1.4.5 has no adapter: its kernels were not compiled after four minutes"
     ),
 }
 """Simulators of the paper's Table 1 and others that are not run here, and why."""

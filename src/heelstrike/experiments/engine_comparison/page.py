@@ -89,37 +89,37 @@ def _files(folder: Path, kind: str) -> list[Path]:
 
 _INTRODUCTION = """# Other engines
 
-The paper's Table 1 compares simulators by their own descriptions. Here the same robot walks the
-same gait under the same controller in each engine. The reference is an event-driven run at a
-tolerance of 1e-9.
+Table 1 of [the paper](paper.md) compares simulators by their own descriptions. Here the same robot
+walks the same gait under the same controller in each engine. The reference is an event-driven run
+of heelstrike at a tolerance of 1e-9.
 
 - Each engine gets the robot link by link, with heelstrike's contact points. It runs in its own
   process, takes torques, and returns its state and contact forces.
 - heelstrike's compiled controller gets this state and these forces every 2 ms, or as often as the
   table says. ComputedTorque follows the gait without balancing, so errors of the contact can make
   the robot fall. FootstepFeedback corrects them by its footholds.
-- Times cover the engine's steps and their Python calls; heelstrike's include the controller. Other
-  work ran at the same time: ignore differences below a factor of two. Tables may come from several
-  runs, and rows kept from an earlier run have its times.
+- Times cover the engine's steps and their Python calls, without the controller; only heelstrike's
+  include it. Other work ran at the same time, and rows come from several runs: ignore differences
+  below a factor of two.
 
 `heelstrike compare bravo7 --engines all` makes the tables; with `--scenes --page docs/engines.md`
 it writes this page. Use `--engines mujoco` for one engine, `--quick` for a trial, and `--films` to
-see the walks that fall. CONTRIBUTING says how to add an engine.
+see the walks that fall.
 
-The columns of the walks follow. Differences are from the reference; *rms* is root mean square.
+The columns of the walks follow. Differences are from the reference.
 
-- *walks*: whether the robot takes all steps and stays up; if not, how many steps it took (stumbles
-  may add some);
+- *walks*: whether the robot takes all steps and stays up; if not, how many steps it took. Stumbles
+  count as steps, so there may be more;
 - *tracking*: error of the joints from the gait, rms;
 - *error*: difference of all coordinates over the walk, rms; large also if the robot is late or
   displaced;
-- *touchdown*: largest difference of a touchdown's time; a delay lasts to the end of the walk;
+- *touchdown*: largest difference of a touchdown's time. A robot that is once late stays late;
 - *impulse*: mean difference of the touchdown impulses;
 - *ZMP*: difference of the stance foot's zero moment point, rms;
 - *slip*, *depth*: longest slide of a loaded contact point; deepest penetration;
-- *energy*: largest energy that appears or disappears without work. A dash marks engines that do not
-  report all contact forces as means over steps;
-- *noise*: difference of the ground force from its mean over 10 ms in single support, rms, in
+- *energy*: largest energy that appears or disappears without work. It follows from all contact
+  forces as means over steps; engines that do not report these have a dash;
+- *noise*: rms difference of the ground force in single support from its running mean over 10 ms, in
   percent of the weight;
 - *peak*: largest force on a foot, as a mean over a step, in multiples of the weight;
 - *step*: computing time of a step.
@@ -188,6 +188,7 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
     headings = ["simulator", "contact", "Coulomb's law", "restitution", "certificate", "creep mm/s"]
     for law, found in walks.items():
         headings += [f"{law}, {which}" for which in _settings(found)]
+    sizes = [row["step_s"] for found in walks.values() for row in found["rows"]]
     return (
         f"## Table 1, renewed\n\nOf {date.today().isoformat()}, in the paper's columns:\n\n"
         + _table(
@@ -199,10 +200,12 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
         + _table(["simulator", "why"], list(ABSENT.items()))
         + "\nWhere licences and systems were read:\n\n"
         + "\n".join(f"- {', '.join(names)}: {where}." for where, names in read.items())
-        + "\n\nheelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
-        "its angle of friction, at defaults and a step of 1 ms; by Coulomb's law it is zero. The "
-        "last columns have the step sizes, in ms, at which bravo7 takes all its steps under a "
-        "controller; *as defaults* means that the search found no better settings.\n\n"
+        + "\n\nheelstrike's columns, added to the paper's, follow. Creep is the speed of a cube on "
+        "a slope 0.05 rad below its angle of friction, at defaults and a step of 1 ms; by "
+        "Coulomb's law it is zero. The last columns have the step sizes, in ms, at which bravo7 "
+        f"takes all its steps under a controller (none above {1e3 * max(sizes):g} or below "
+        f"{1e3 * min(sizes):g} was tried); *as defaults* means that the search found no better "
+        "settings.\n\n"
         + _table(headings, ours)
     )  # fmt: skip
 
@@ -268,7 +271,8 @@ def _best(walks: Mapping[str, Any]) -> str:
             rows,
         )
         + "".join(f"\n{each}.\n" for each in others)
-        + "\nThe settings tried follow the maintainers' advice:\n\n" + "\n".join(advice) + "\n"
+        + "\nThe settings tried follow the maintainers' advice. Names are the engines' own:\n\n"
+        + "\n".join(advice) + "\n"
     )  # fmt: skip
 
 
@@ -280,8 +284,8 @@ def _figure(row: Mapping[str, Any], name: str, factor: float, walks: bool) -> st
 
 
 _WHY = (
-    "Why the others did not walk: the steps taken, or the first cause of the fall and what "
-    'followed ("completed": the simulation reached its end):'
+    'Why the others did not walk: how the simulation ended ("completed": at its planned time), '
+    "then the steps taken, or why the robot fell:"
 )
 
 
@@ -365,8 +369,8 @@ def _pushes(file: Path) -> str:
         "largest impulse (N s) that the robot survives, as it does all smaller ones tried. In "
         "brackets is the smallest that it does not. heelstrike simulates the walk event-driven to "
         "the end of the push. From there each engine continues with this state and the "
-        "controller's memory, at steps of 1 ms. Messages of engines that fail count time from "
-        "there. Each row is "
+        "controller's memory, at steps of 1 ms. Times in messages of engines that fail are from "
+        "the end of the push. Each row is "
         f"`heelstrike compare {found['robot']} --controller {law} --engines NAME "
         f"--settings {settings}{period} --largest-push`.\n\n"
         + _table(
@@ -439,17 +443,18 @@ def _compass(found: Mapping[str, Any]) -> str:
         "## The compass gait\n\nThe passive walker of Goswami, Thuilot and Espiau (1998) starts on "
         f"its cycle down a slope of 3 degrees and takes up to {found['strides']} steps, at "
         f"{found['settings']}. Its legs are of one length, so the swing foot passes through the "
-        "ground at mid-stance. Therefore only the stance foot has contact points until the stance "
-        "leg is perpendicular to the slope, then both feet, until after the landing the rear foot "
-        "is highest. Published: 0.734346391 s, 0.535445415 m, −0.199726 ± 0.544476i and 0.131573."
-        "\n\nThe cycle is the mean of the last five steps; *spread* is how far they still differ. "
-        "The Floquet multipliers are fitted to one step after each of 32 random disturbances; ± "
-        "is the standard error of the largest one's modulus. An engine that resolves a landing "
-        "within its steps takes it early or late by up to one step, and the next step differs. "
-        "Where this difference exceeds the disturbances, ± is large and the multipliers are not "
-        "resolved. If an engine falls in a disturbed step, their column has the reason.\n\nEach "
-        "row is `heelstrike compare bravo7 --engines NAME --scenes`; they may come from separate "
-        f"runs.{_not_run(found)}\n\n"
+        "ground at mid-stance. Therefore only the stance foot has contact points from when the "
+        "rear foot is highest after a landing to when the stance leg is perpendicular to the "
+        "slope; then both feet have them. Published: period 0.734346391 s, step 0.535445415 m, "
+        "multipliers −0.199726 ± 0.544476i and 0.131573."
+        "\n\nThe cycle is the mean of the last five steps; *spread* is how far they still differ "
+        "from it. The Floquet multipliers are fitted to one step after each of 32 random "
+        "disturbances; ± is the standard error of the largest one's modulus. An engine that puts "
+        "landings at the ends of time steps is early or late by up to one time step, which changes "
+        "the walker's next step. Where this change exceeds the disturbances, ± is large and the "
+        "multipliers are not resolved. If the walker falls after a disturbance, the column "
+        "*multipliers* has the reason.\n\nEach row is `heelstrike compare bravo7 --engines NAME "
+        f"--scenes`.{_not_run(found)}\n\n"
         + _table(COMPASS, [compass_cells(row) for row in found["rows"]])
     )
 
@@ -483,9 +488,9 @@ def _guards(found: Mapping[str, Any]) -> str:
         "## Guards\n\nTwo checks confirm that an engine has the same robot:\n\n- a flight of 0.1 s "
         "with all joints turning, at steps of 1, 0.5 and 0.25 ms. *flight* is the largest "
         "difference of a coordinate from heelstrike (m, rad), *order* its order of convergence. "
-        "*extrapolated*, its value at step zero, must be at most 1e-6, or 1e-3 in single "
-        "precision;\n- *weight*, the sum of the normal forces at rest over the robot's weight. It "
-        "must be 1, within 1 %.\n\n"
+        "*extrapolated* is *flight* extrapolated to a step of zero, and must be at most 1e-6, or "
+        "1e-3 in single precision;\n- *weight*, the sum of the normal forces at rest over the "
+        "robot's weight. It must be 1, within 1 %.\n\n"
         + _table(
             ["engine", "precision", "flight, 0.25 ms", "order", "extrapolated", "weight",
              "holds"],
