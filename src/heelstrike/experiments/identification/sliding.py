@@ -168,7 +168,7 @@ def may_slide(
         return None
     near = around(log.time)  # slides begin before they surely show
     padded = np.pad(senses != 0.0, ((near, near), (0, 0)))
-    found: NDArray[np.bool_] = sliding_window_view(padded, 2 * near + 1, axis=0).any(axis=-1)
+    found = np.asarray(sliding_window_view(padded, 2 * near + 1, axis=0).any(axis=-1))
     if friction.samples:
         for foot in equations.robot.feet:
             normal, tangent = np.moveaxis(log.force[:, list(foot.contacts)].sum(axis=1), 1, 0)
