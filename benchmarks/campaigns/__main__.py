@@ -2,7 +2,7 @@
 
     python benchmarks/campaigns cost --trials 400
     python benchmarks/campaigns kills --kills 200
-    python benchmarks/campaigns clusters --trials 128
+    python benchmarks/campaigns clusters --trials 640 --only Dask
     python benchmarks/campaigns schedulers --kills 5
 
 `cost` walks trials of ``mix.toml`` by :class:`~heelstrike.Campaign`, kept on disk, and the very
@@ -14,7 +14,8 @@ moments and begins it again, until it is through; then the same with the workers
 must be there, once, and be the one of a campaign that was left alone.
 
 `clusters` has trials of ``mix.toml`` worked on by a pool of processes, a Dask cluster and jobs of
-submitit, where these are installed, and compares outcomes and processor time with own threads.
+submitit, where these are installed, or only one of them beside own threads. It compares outcomes
+and processor time: what beginning and end cost, what each trial does, and what 10 000 would.
 `schedulers` kills the scheduler of a Dask cluster at random moments, and goes on with another one.
 """
 
@@ -35,7 +36,7 @@ from heelstrike.experiments.campaigns.trials import laid_out
 # Run as a folder, its modules would be on the path and not the package.
 sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
-from campaigns.clusters import compare, kill_schedulers  # noqa: E402
+from campaigns.clusters import EXECUTORS, FEW, compare, kill_schedulers  # noqa: E402
 from campaigns.killing import campaign_of, killed, short_campaign  # noqa: E402
 
 MIX = Path(__file__).parent / "mix.toml"
@@ -129,17 +130,21 @@ def main() -> None:
     deaths.add_argument("--trials", type=int, default=4000)
     deaths.add_argument("--seed", type=int, default=0)
     others = commands.add_parser("clusters", help="compare workers of others with own threads")
-    others.add_argument("--trials", type=int, default=128)
+    others.add_argument("--trials", type=int, default=5 * FEW)
+    others.add_argument("--only", choices=list(EXECUTORS), help="one of them beside own threads")
     schedulers = commands.add_parser("schedulers", help="kill schedulers of Dask")
     schedulers.add_argument("--kills", type=int, default=5)
     schedulers.add_argument("--trials", type=int, default=1500)
     schedulers.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
+    if options.command == "clusters" and options.trials <= FEW:
+        parser.error(f"clusters tells beginning and trials apart by more than {FEW} trials")
     if options.command == "cost":
         cost(options.trials, options.rounds, options.workers)
     elif options.command == "clusters":
         with tempfile.TemporaryDirectory() as folder:
-            compare(mix(options.trials, Path(folder)), Path(folder))
+            few, campaign = (mix(count, Path(folder)) for count in (FEW, options.trials))
+            compare(few, campaign, Path(folder), options.only)
     elif options.command == "schedulers":
         with tempfile.TemporaryDirectory() as folder:
             campaign = short_campaign(Path(folder), options.trials)
