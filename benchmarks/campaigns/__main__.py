@@ -70,7 +70,7 @@ def cost(trials: int, rounds: int, workers: int) -> None:
         few.run(workers=workers)  # compiles
         bare(few, workers)
         least = {"campaign": np.inf, "bare batch": np.inf}
-        wall = dict(least)
+        wall, memory = dict(least), {}
         for round_ in range(rounds):
             for name in least:
                 begin, at = time.process_time(), time.perf_counter()
@@ -82,15 +82,15 @@ def cost(trials: int, rounds: int, workers: int) -> None:
                     batch = bare(campaign, workers)
                 least[name] = min(least[name], time.process_time() - begin)
                 wall[name] = min(wall[name], time.perf_counter() - at)
+                memory.setdefault(name, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
         for name, seconds in least.items():
             print(
                 f"{name}: {1e3 * seconds / trials:.1f} ms of a processor a trial, "
-                f"{wall[name]:.1f} s on the wall"
+                f"{wall[name]:.1f} s on the wall, {memory[name]:.0f} MB of memory at most until then"
             )
         print(f"ratio {least['campaign'] / least['bare batch']:.3f} of processor time")
         print(f"10 000 on {workers} quiet processors: "
               f"{1e4 * least['campaign'] / trials / workers / 60.0:.1f} min")  # fmt: skip
-        print(f"memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
         lasted = int(np.count_nonzero(batch.completed))
         print(f"{results}; {lasted} of {trials} lasted in the batch")
 
