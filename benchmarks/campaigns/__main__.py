@@ -86,7 +86,7 @@ def cost(trials: int, rounds: int, workers: int) -> None:
         for name, seconds in least.items():
             print(
                 f"{name}: {1e3 * seconds / trials:.1f} ms of a processor a trial, "
-                f"{wall[name]:.1f} s on the wall, {memory[name]:.0f} MB of memory at most until then"
+                f"{wall[name]:.1f} s on the wall, at most {memory[name]:.0f} MB until then"
             )
         print(f"ratio {least['campaign'] / least['bare batch']:.3f} of processor time")
         print(f"10 000 on {workers} quiet processors: "
