@@ -201,7 +201,8 @@ def _footprint(part: dict[str, Any]) -> Iterator[Table]:
         body.append([f"peak memory after {memory['short_s']:g} s of walking", before])
         body.append(
             [
-                f"peak memory after {memory['long_s']:g} s more, with as many samples as before",
+                f"peak memory after {memory['long_s']:g} s more, recorded "
+                f"{memory['long_s'] / memory['short_s']:g} times as sparsely",
                 after,
             ]
         )

@@ -452,10 +452,10 @@ class Robot(Counted, ShownInNotebooks):
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the robot to a file: MJCF (``.xml``) holds all of it, URDF and SDF most.
 
-        What is read back has the same dynamics, on the same coordinates. URDF (``.urdf``) cannot
-        hold springs, armature of joints without a motor, and torque limits that differ between the
-        two senses; SDF (``.sdf``) cannot hold the last. The zero configuration of either becomes
-        the robot's reference.
+        What is read back has the same dynamics, on the same coordinates. URDF (``.urdf``) and SDF
+        (``.sdf``) cannot hold speed-torque lines and torque limits that differ between the two
+        senses; URDF cannot hold springs and armature of joints without a motor either. The zero
+        configuration of either becomes the robot's reference.
 
         Parameters
         ----------

@@ -151,8 +151,8 @@ ABSENT: dict[str, str] = {
     "Vortex": "commercial, no package for this platform; no free engine is of its kind",
     "RaiSim": "needs a licence file of its maker; DART and Siconos solve the same contact problem",
     "CoppeliaSim (V-REP)": (
-        "no package for Python has its engines: Bullet, ODE and MuJoCo, which have rows, "
-        "Newton Dynamics and Vortex"
+        "no package for Python; of its engines Bullet, ODE and MuJoCo have rows, "
+        "Newton Dynamics and Vortex none"
     ),
     "Webots": "no package; its engine is a fork of ODE, which has a row",
     "Gazebo": (

@@ -284,8 +284,8 @@ def _figure(row: Mapping[str, Any], name: str, factor: float, walks: bool) -> st
 
 
 _WHY = (
-    'Why the others did not walk: how the simulation ended ("completed": at its planned time), '
-    "then the steps taken, or why the robot fell:"
+    "The others did not walk (*completed* means only that the simulation reached its planned "
+    "time). Steps taken, or the fall's cause and consequences:"
 )
 
 
@@ -366,9 +366,9 @@ def _pushes(file: Path) -> str:
     return (
         f"## Largest push under {law}{called}\n\n"
         "A push acts on the trunk for 0.1 s, in the middle of the third step. The table has the "
-        "largest impulse (N s) that the robot survives, as it does all smaller ones tried. In "
-        "brackets is the smallest that it does not. heelstrike simulates the walk event-driven to "
-        "the end of the push. From there each engine continues with this state and the "
+        "largest impulse (N s) up to which the robot survives every push tried. In brackets is the "
+        "smallest not survived. heelstrike simulates the walk event-driven to the end of the push. "
+        "From there each engine continues with this state and the "
         "controller's memory, at steps of 1 ms. Times in messages of engines that fail are from "
         "the end of the push. Each row is "
         f"`heelstrike compare {found['robot']} --controller {law} --engines NAME "
@@ -443,9 +443,9 @@ def _compass(found: Mapping[str, Any]) -> str:
         "## The compass gait\n\nThe passive walker of Goswami, Thuilot and Espiau (1998) starts on "
         f"its cycle down a slope of 3 degrees and takes up to {found['strides']} steps, at "
         f"{found['settings']}. Its legs are of one length, so the swing foot passes through the "
-        "ground at mid-stance. Therefore only the stance foot has contact points from when the "
-        "rear foot is highest after a landing to when the stance leg is perpendicular to the "
-        "slope; then both feet have them. Published: period 0.734346391 s, step 0.535445415 m, "
+        "ground at mid-stance. Therefore the swing foot has no contact points from the instant "
+        "when it is highest after a landing until the stance leg is perpendicular to the slope. "
+        "Otherwise both feet have them. Published: period 0.734346391 s, step 0.535445415 m, "
         "multipliers −0.199726 ± 0.544476i and 0.131573."
         "\n\nThe cycle is the mean of the last five steps; *spread* is how far they still differ "
         "from it. The Floquet multipliers are fitted to one step after each of 32 random "

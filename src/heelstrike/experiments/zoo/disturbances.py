@@ -145,7 +145,7 @@ def _price(trial: Trial, _: Chance, __: Effort) -> Largest:
 
 DISTURBANCES: tuple[Disturbance, ...] = (
     Disturbance(
-        "push-forwards", "push →", "N s", "a push forwards of 0.1 s on the trunk, at any phase",
+        "push-forwards", "push →", "N s", "a push forwards of 0.1 s on the trunk",
         partial(_push, 1.0), by_chance=True, standing=True,
     ),
     Disturbance(

@@ -154,15 +154,16 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         "# Zoo of controllers",
         "",
         "The tables give the largest disturbance that each controller withstands on each robot. "
-        "Each robot has one gait. Each controller has one set of gains, tuned on one robot and "
-        "scaled with weight and height. This command makes the page:",
+        "Each robot has one gait, each controller one set of gains, tuned on one robot and "
+        "scaled with weight and height. The page *Command line* describes the controllers. The "
+        "command:",
         "",
         "```sh",
         command,
         "```",
         "",
         f"It used heelstrike {settings.version}, {settings.method}, seed {settings.seed}, and "
-        "control periods of a millisecond, or a time step where that is longer.",
+        "called controllers once a millisecond, at most once per time step.",
         "",
         f"![Largest disturbance by robot and controller, one panel for each disturbance]({link})",
         "",
@@ -188,7 +189,8 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
 
 
 def _explained(there: Sequence[Disturbance]) -> list[str]:
-    rows = [_line("disturbance", "name", "unit", "what it is"), _line("---", "---", "---", "---")]
+    heads = ("disturbance", "name for `--disturbances`", "unit", "what it is")
+    rows = [_line(*heads), _line(*["---"] * len(heads))]
     return rows + [_line(each.heading, f"`{each.name}`", each.unit, each.told) for each in there]
 
 
@@ -196,17 +198,18 @@ def _measure(results: Results, share: float) -> list[str]:
     settings = results.settings
     return [
         "A size is withstood if the walk recovers (`heelstrike.analysis.recovery`) from it and "
-        f"from every smaller size tried. Up to {settings.strides} growing sizes are tried until "
+        f"all smaller ones tried. Up to {settings.strides} growing sizes are tried until "
         f"the walk fails, then {settings.halvings} bisections follow. ≥ (for friction ≤) means "
         "that the hardest size tried was withstood, < that the easiest was not. Pushes begin at "
-        f"{counted(settings.trials, 'phase', 'phases')} of a step, and rough ground has "
+        f"{counted(settings.trials, 'phase', 'phases')} of a step, rough ground has "
         f"{counted(settings.trials, 'shape', 'shapes')}, drawn from the seed, the same for all. "
-        "A size in the tables is withstood at all of them. So, "
-        f"with {SURE:.0%} confidence, at least {share:.0%} of all phases or shapes are withstood. "
+        "A size in the tables is withstood at each: "
+        f"with {SURE:.0%} confidence, at least {share:.0%} of all phases or shapes are withstood, "
+        f"since {share:.2f}^{settings.trials} = {1.0 - SURE:.2f}. "
         "Everything else has one trial.",
         "",
-        "Tests end if the undisturbed walk falls, leans by more than 0.6 rad, or changes its "
-        "speed. Standing controllers meet pushes and masses only, and have no price.",
+        "Controllers under which the undisturbed walk falls, leans by more than 0.6 rad, or "
+        f"changes its speed are not tested. Rows with {NOTHING}: controllers that only stand.",
     ]
 
 
