@@ -103,8 +103,8 @@ ENTRIES: dict[str, Entry] = {
             "solver": ("quick",),
         },
         advice=(
-            "ERP of 0.1 to 0.8, CFM (softness) of 1e-9 to 1, the exact step where accuracy counts "
-            "(ode.org, ODE Manual, chapter 3)"
+            "ERP of 0.1 to 0.8, CFM (softness) of 1e-9 to 1, the exact solver `dWorldStep` for "
+            "accuracy (ode.org, ODE Manual, chapter 3)"
         ),
     ),
     "simbody": Entry(

@@ -117,8 +117,8 @@ The columns of the walks follow. Differences are from the reference.
 - *impulse*: mean difference of the touchdown impulses;
 - *ZMP*: difference of the stance foot's zero moment point, rms;
 - *slip*, *depth*: longest slide of a loaded contact point; deepest penetration;
-- *energy*: largest energy that appears or disappears without work. It follows from all contact
-  forces as means over steps; engines that do not report these have a dash;
+- *energy*: largest energy that appears or disappears without work, computed from the contact
+  forces, averaged over each step; engines that do not report all of them have a dash;
 - *noise*: rms difference of the ground force in single support from its running mean over 10 ms, in
   percent of the weight;
 - *peak*: largest force on a foot, as a mean over a step, in multiples of the weight;
@@ -443,9 +443,9 @@ def _compass(found: Mapping[str, Any]) -> str:
         "## The compass gait\n\nThe passive walker of Goswami, Thuilot and Espiau (1998) starts on "
         f"its cycle down a slope of 3 degrees and takes up to {found['strides']} steps, at "
         f"{found['settings']}. Its legs are of one length, so the swing foot passes through the "
-        "ground at mid-stance. Therefore the swing foot has no contact points from the instant "
-        "when it is highest after a landing until the stance leg is perpendicular to the slope. "
-        "Otherwise both feet have them. Published: period 0.734346391 s, step 0.535445415 m, "
+        "ground at mid-stance. Therefore the swing foot loses its contact points when, lifted off, "
+        "it begins to sink, and regains them when the stance leg is perpendicular to the slope. "
+        "Published: period 0.734346391 s, step 0.535445415 m, "
         "multipliers −0.199726 ± 0.544476i and 0.131573."
         "\n\nThe cycle is the mean of the last five steps; *spread* is how far they still differ "
         "from it. The Floquet multipliers are fitted to one step after each of 32 random "

@@ -203,9 +203,10 @@ def _measure(results: Results, share: float) -> list[str]:
         "that the hardest size tried was withstood, < that the easiest was not. Pushes begin at "
         f"{counted(settings.trials, 'phase', 'phases')} of a step, rough ground has "
         f"{counted(settings.trials, 'shape', 'shapes')}, drawn from the seed, the same for all. "
-        "A size in the tables is withstood at each: "
-        f"with {SURE:.0%} confidence, at least {share:.0%} of all phases or shapes are withstood, "
-        f"since {share:.2f}^{settings.trials} = {1.0 - SURE:.2f}. "
+        "A size in the tables was withstood at each of these. So, "
+        f"with {SURE:.0%} confidence, at least {share:.0%} of all phases or shapes allow recovery: "
+        f"if fewer did, the chance that all {settings.trials} do would be below "
+        f"{share:.2f}^{settings.trials} = {1.0 - SURE:.2f}. "
         "Everything else has one trial.",
         "",
         "Controllers under which the undisturbed walk falls, leans by more than 0.6 rad, or "
