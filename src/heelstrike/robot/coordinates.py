@@ -15,14 +15,14 @@ from heelstrike.robot.state import State
 from heelstrike.wording import meant
 
 if TYPE_CHECKING:
-    from heelstrike.robot.counted import Counted
+    from heelstrike.robot.named_tree import NamedTree
     from heelstrike.robot.robot import Robot
 
 Spread = float | Mapping[str | int, float]
 """One standard deviation for all coordinates, or one for each that is named."""
 
 
-def index_of(robot: Counted, what: str, names: tuple[str, ...], given: str | int) -> int:
+def index_of(robot: NamedTree, what: str, names: tuple[str, ...], given: str | int) -> int:
     """Return the index of something of a robot, given by its name or index.
 
     Raises
