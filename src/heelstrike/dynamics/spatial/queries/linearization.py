@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.dynamics.queries import equations_of_motion
+from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.dynamics.queries.linearization import solved
 from heelstrike.dynamics.spatial import configurations
-from heelstrike.dynamics.spatial.queries import equations_of_motion, points
-from heelstrike.dynamics.spatial.queries.evaluation import (
-    SpatialEvaluation,
-    position_vector,
-    spatial_contacts,
-    velocity_vector,
-)
+from heelstrike.dynamics.spatial.queries import points
+from heelstrike.dynamics.spatial.queries.evaluation import SpatialEvaluation, position_vector
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import BALL, FREE
@@ -58,9 +55,9 @@ def linearize_in_space(
     contacts: Iterable[int | str] = (),
 ) -> SpatialLinearization:
     """Linearise the equations of motion; see :func:`heelstrike.dynamics.linearize`."""
-    held = spatial_contacts(robot, contacts)
-    position, velocity = position_vector(robot, "q", q), velocity_vector(robot, "v", v)
-    gamma = velocity_vector(robot, "torque", torque)
+    held = contact_indices(robot, contacts)
+    position, velocity = position_vector(robot, "q", q), joint_vector(robot, "v", v)
+    gamma = joint_vector(robot, "torque", torque)
     n, k = robot.nv, len(held)
     equations, derivatives = _equations(robot, held)
     here = position, np.zeros(n), velocity
