@@ -9,6 +9,7 @@ import numpy as np
 
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.coordinates import index_of
+from heelstrike.robot.model import Integers
 from heelstrike.robot.state import State
 
 
@@ -161,3 +162,18 @@ class NamedTree(ABC):
             Its place among the torques.
         """
         return index_of(self, "actuator", self.actuator_names, actuator)
+
+
+def legs(robot: NamedTree) -> Integers:
+    """Index of the foot whose leg each link belongs to, -1 if it carries none or several."""
+    carried: list[set[int]] = [set() for _ in range(robot.nl)]
+    for index, foot in enumerate(robot.feet):
+        link = foot.link
+        while link >= 0:
+            carried[link].add(index)
+            link = int(robot.model.parent[link])
+    several = len(robot.feet) > 1
+    return np.array(
+        [next(iter(feet)) if several and len(feet) == 1 else -1 for feet in carried],
+        dtype=np.int64,
+    )
