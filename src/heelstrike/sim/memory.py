@@ -182,7 +182,7 @@ class Loops(Bundle):
     loop_force: Floats = array("loops", "axes")
     coupling_force: Floats = array("couplings")
     """Forces of the last solve."""
-    lean: Floats = array("loops", "axes")
+    multiple: Floats = array("loops", "axes")
     """What a row of each loop is of the other, where both say the same; see
     :func:`heelstrike.sim.contacts.loops.leave_one`."""
     entry: Integers = array("loop_rows", of=int)

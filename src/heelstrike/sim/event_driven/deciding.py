@@ -134,8 +134,8 @@ def leave_if_possible(
         if problem.set[place] == INTERVAL:
             continue
         apart = apart and free[row] >= 0.0
-        lean = -slide[contact] * friction[contact]
-        if delassus[row, row] + lean * delassus[row, row + 1] <= 0.0:
+        ratio = -slide[contact] * friction[contact]
+        if delassus[row, row] + ratio * delassus[row, row + 1] <= 0.0:
             # Pressing it harder would push it into the ground: there are other solutions.
             several = True
             log_event(time, PAINLEVE, owner[contact], 0.0, 0.0, record.told)

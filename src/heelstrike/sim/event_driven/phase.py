@@ -118,9 +118,10 @@ class HeldRows(Bundle):
 
     row: Integers = array("rows", of=int)
     """Row of the Jacobian that each unknown force acts along."""
-    lean: Floats = array("rows")
+    friction_ratio: Floats = array("rows")
+    """Tangential force per normal force of a point that slides, of either sign; zero of others."""
     scale: Floats = array("rows")
-    """lean, scale: Tangential force that it brings along; its unit."""
+    """Unit of the force."""
     system: Floats = array("rows", "rows + 1")
     unknown: Floats = array("rows")
     column: Integers = array("rows", of=int)
