@@ -47,7 +47,7 @@ def index_of(robot: NamedTree, what: str, names: tuple[str, ...], given: str | i
     )
 
 
-def checked(robot: Robot, state: State) -> State:
+def checked(robot: NamedTree, state: State) -> State:
     """Return a copy of a state that fits a robot.
 
     Raises
@@ -59,9 +59,10 @@ def checked(robot: Robot, state: State) -> State:
         raise RobotError(refusal("state", state, ["State"]))
     for what, vector, size in (("q", state.q, robot.nq), ("v", state.v, robot.nv)):
         if vector.shape != (size,) or not np.all(np.isfinite(vector)):
+            names = robot.position_names if what == "q" else robot.velocity_names
             raise RobotError(
                 f"{what} of a state of robot {robot.name!r} must be {size} finite numbers "
-                f"({', '.join(robot.joint_names)}), got {vector!r}."
+                f"({', '.join(names)}), got {vector!r}."
             )
     return State(state.q, state.v)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.coordinates import index_of
+from heelstrike.robot.coordinates import checked, index_of
 from heelstrike.robot.model import Integers
 from heelstrike.robot.state import State
 
@@ -93,9 +93,14 @@ class NamedTree(ABC):
         """State at rest in the reference configuration of the robot's file."""
         return State(self.model.reference.copy(), np.zeros(self.nv))
 
+    @property
     @abstractmethod
+    def driven(self) -> Integers:
+        """Index of the velocity that each actuator drives, (nu,)."""
+
     def _checked(self, state: State) -> State:
         """Return a copy of a state that fits the robot, or raise a `RobotError`."""
+        return checked(self, state)
 
     def positions(self, state: State) -> dict[str, float]:
         """Positions of a state by `position_names`, in rad and m.

@@ -15,7 +15,7 @@ from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.coordinates import Spread, checked, finite, spread_of
-from heelstrike.robot.model import Model
+from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.named_tree import NamedTree
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
@@ -95,8 +95,10 @@ class Robot(NamedTree, ShownInNotebooks):
         """Total mass times gravity, in N."""
         return self.total_mass * float(np.hypot(*self.model.gravity))
 
-    def _checked(self, state: State) -> State:
-        return checked(self, state)
+    @property
+    def driven(self) -> Integers:
+        """Index of the velocity that each actuator drives, (nu,)."""
+        return self.model.actuator_joint
 
     @takes(RobotError)
     def state(

@@ -61,7 +61,7 @@ def passive_force(at: AnyEvaluation) -> Floats:
 def applied_force(at: AnyEvaluation, torque: ArrayLike) -> Floats:
     """Generalised force SᵀΓ + passive of motors, dampers and springs."""
     force = passive_force.at(at)
-    force[at.driven] += at.vector("torque", torque)
+    force[at.robot.driven] += at.vector("torque", torque)
     return force
 
 

@@ -19,7 +19,7 @@ from heelstrike.dynamics import kernels as planar
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import RobotError
 from heelstrike.robot.coordinates import index_of
-from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.named_tree import NamedTree
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.spatial.robot import SpatialRobot
@@ -112,11 +112,6 @@ class AnyEvaluation(ABC):
     def _position(self, name: str, value: ArrayLike) -> Floats:
         """Check a position in numbers."""
 
-    @property
-    @abstractmethod
-    def driven(self) -> Integers:
-        """Velocity that each actuator drives, (nu,)."""
-
     @abstractmethod
     def mass_matrix(self) -> Floats:
         """Return the mass matrix."""
@@ -136,11 +131,6 @@ class Evaluation(AnyEvaluation):
 
     def _position(self, name: str, value: ArrayLike) -> Floats:
         return joint_vector(self.robot, name, value)
-
-    @property
-    def driven(self) -> Integers:
-        """Velocity that each actuator drives, (nu,)."""
-        return self.model.actuator_joint
 
     def mass_matrix(self) -> Floats:
         """Return the mass matrix."""

@@ -7,11 +7,11 @@ from dataclasses import field
 
 import numpy as np
 
-from heelstrike.arguments import refusal, takes
+from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.coordinates import index_of
-from heelstrike.robot.model import Floats
+from heelstrike.robot.coordinates import checked, index_of
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.named_tree import Foot, NamedTree
 from heelstrike.robot.spatial.model import BALL, FREE, JointKind, SpatialModel
 from heelstrike.robot.spatial.solids import Solid
@@ -74,6 +74,11 @@ class SpatialRobot(NamedTree):
     def weight(self) -> float:
         """Total mass times gravity, in N."""
         return self.total_mass * float(np.linalg.norm(self.model.gravity))
+
+    @property
+    def driven(self) -> Integers:
+        """Index of the velocity that each actuator drives, (nu,)."""
+        return self.model.actuator_velocity
 
     def _checked(self, state: State) -> State:
         return checked_state(self, state)
@@ -175,11 +180,5 @@ def checked_state(robot: SpatialRobot, state: State) -> State:
         If it is none, has not nq positions and nv velocities, all finite, or a quaternion is far
         from length one.
     """
-    if not isinstance(state, State):
-        raise RobotError(refusal("state", state, ["State"]))
-    if state.v.shape != (robot.nv,) or not np.all(np.isfinite(state.v)):
-        raise RobotError(
-            f"v of a state of robot {robot.name!r} must be {robot.nv} finite numbers "
-            f"({', '.join(robot.velocity_names)}), got {state.v!r}."
-        )
-    return State(checked_position(robot, state.q), state.v)
+    sound = checked(robot, state)
+    return State(checked_position(robot, sound.q), sound.v)

@@ -14,7 +14,7 @@ from heelstrike.dynamics.spatial import kernels as in_space
 from heelstrike.dynamics.spatial.algebra import Vector
 from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
 from heelstrike.errors import RobotError
-from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot, checked_position
 
@@ -33,11 +33,6 @@ class SpatialEvaluation(AnyEvaluation):
 
     def _position(self, name: str, value: ArrayLike) -> Floats:
         return position_vector(self.robot, name, value)
-
-    @property
-    def driven(self) -> Integers:
-        """Velocity that each actuator drives, (nu,)."""
-        return self.model.actuator_velocity
 
     def tree(self) -> TreeFactor:
         """Memory for a mass matrix and its factor."""
