@@ -88,7 +88,7 @@ def insist(fired: Integers, force: Floats, modes: Modes) -> None:
 def is_unclear(ahead: float, watch: Watch) -> bool:
     """Whether a force that reached its limit is not clearly beyond it in a moment."""
     for i in range(watch.fired.shape[0]):
-        if watch.fired[i] == 1 and watch.value[i] > -CLEARLY * watch.weight:
+        if watch.fired[i] == 1 and watch.value[i] > -CLEARLY * watch.force_scale:
             return ahead < LAST_LOOK
     return False
 
@@ -256,7 +256,7 @@ def contradicts_itself(modes: Modes, watch: Watch, deficient: int) -> bool:
     """
     if deficient == 1:
         return False
-    least = -CONTRADICTION * watch.weight
+    least = -CONTRADICTION * watch.force_scale
     for contact in range(modes.watched):
         if modes.carrier[contact] == 1 and watch.value[2 * contact] < least:
             return True

@@ -168,7 +168,7 @@ def list_pressing(
 
 @kernel
 def hold_by_saddle_point(
-    size: int, count: int, total: int, model: Model, rows: Rows, face: Integers, bend: Floats,
+    size: int, count: int, total: int, model: Model, rows: Rows, face: Integers, curvature: Floats,
     loop_bias: Floats, latched: Integers, candidate: Integers, jacobian: Floats, tree: Workspace,
     matrix: Floats, rate: Floats, answer: ContactAnswer, held: HeldRows, saddle: SaddlePoint,
 ) -> bool:  # fmt: skip
@@ -179,8 +179,9 @@ def hold_by_saddle_point(
     """
     nv, impulse, velocity = model.nv, answer.impulse, answer.velocity
     state_accelerations(
-        count, total, candidate, model, tree, rows, face, bend, loop_bias, jacobian, saddle.bias
-    )
+        count, total, candidate, model, tree, rows, face, curvature, loop_bias, jacobian,
+        saddle.bias,
+    )  # fmt: skip
     mass_matrix(model, tree, matrix)
     write_equations(size, nv, matrix, jacobian, held, saddle.system)
     for i in range(nv):
@@ -222,8 +223,8 @@ def hold_closed(
     for place in range(count):
         contact = candidate[place]
         free_gap_acceleration(
-            contact, place, model, equations.tree, rows, modes.face, modes.bend, equations.rate,
-            jacobian, free,
+            contact, place, model, equations.tree, rows, modes.face, modes.curvature,
+            equations.rate, jacobian, free,
         )  # fmt: skip
         impulse[2 * place] = 0.0
         impulse[2 * place + 1] = 0.0
@@ -238,8 +239,8 @@ def hold_closed(
     rank = solve_constraints(size, 1.0, assembly.problem.delassus, held)
     if is_delicate(size, rank, held.system):
         return hold_by_saddle_point(
-            size, count, total, model, rows, modes.face, modes.bend, loops.rows.bias, loops.held,
-            candidate, jacobian, equations.tree, equations.mass_matrix, equations.rate,
+            size, count, total, model, rows, modes.face, modes.curvature, loops.rows.bias,
+            loops.held, candidate, jacobian, equations.tree, equations.mass_matrix, equations.rate,
             assembly.answer, held, saddle,
         )  # fmt: skip
     if rank < size:
