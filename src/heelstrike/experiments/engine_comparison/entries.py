@@ -11,7 +11,6 @@ from dataclasses import field
 from typing import Any
 
 from heelstrike.errors import SimulationError
-from heelstrike.experiments.engines.packages import PACKAGES
 from heelstrike.field_texts import dataclass
 from heelstrike.wording import meant
 
@@ -201,14 +200,3 @@ def entries_called(names: Sequence[str] | str) -> dict[str, Entry]:
             )
         found[name] = ENTRIES[name]
     return found
-
-
-def package_title(name: str) -> str:
-    """Return what the package of a row is called.
-
-    Parameters
-    ----------
-    name : str
-        Name of a row.
-    """
-    return PACKAGES[ENTRIES[name].package].title
