@@ -75,8 +75,10 @@ def test_what_stands_rests(name: str) -> None:
         held = held_rows(mechanics.robot, phase)
         for t in np.linspace(0.0, phase.duration, 20):
             q, v = (phase.coordinates(t, order=order) for order in range(2))
-            moving = mechanics.at(q, v).jacobian @ v
+            now = mechanics.at(q, v)
+            moving = now.jacobian @ v
             assert max((abs(moving[row]) for row in held), default=0.0) < 1e-3
+            assert np.abs(now.tied @ v).max(initial=0.0) < 1e-3
 
 
 @pytest.mark.parametrize(
