@@ -160,22 +160,8 @@ def stopping(robot: hs.Robot) -> dict[str, Any]:
     return {"repeat": "never", "start": start, "end": end, "guess": guess}
 
 
-HURDLE = {"place": 0.15, "height": 0.12, "half_width": 0.05, "depth": 0.01}
+HURDLE = {"place": 0.15, "height": 0.10, "half_width": 0.02}
 """An obstacle between two footholds of the walk (m)."""
-
-
-def over_hurdle(now: hs.gait.Instant) -> Any:
-    """Heights of both soles, at five places along each, over the obstacle: not negative."""
-    heights = []
-    for ends in ((0, 1), (2, 3)):
-        heel, toe = (now.points[i, :] for i in ends)
-        for share in np.linspace(0.0, 1.0, 5):
-            x, z = casadi.horzsplit((1.0 - share) * heel + share * toe)
-            inside = 1.0 - ((x - HURDLE["place"]) / HURDLE["half_width"]) ** 2
-            beside = HURDLE["depth"]  # there the constraint has room, and the ground says enough
-            top = (HURDLE["height"] + beside) * casadi.fmax(inside, 0.0) ** 3 - beside
-            heights.append(z - top)
-    return casadi.vertcat(*heights)
 
 
 def stepping_over(robot: hs.Robot) -> dict[str, Any]:
@@ -183,7 +169,8 @@ def stepping_over(robot: hs.Robot) -> dict[str, Any]:
     walk = walk_of(robot)
     start, end = (state_of(walk, share * walk.duration) for share in (0.2, 2.2))
     return {
-        "repeat": "never", "start": start, "end": end, "constraint": over_hurdle,
+        "repeat": "never", "start": start, "end": end,
+        "constraint": hs.over_obstacle(robot, **HURDLE),
         "guess": lambda time: walk.position(time + 0.2 * walk.duration),
     }  # fmt: skip
 
@@ -200,6 +187,15 @@ def linked_ankles() -> hs.Robot:
     lower, upper = robot.model.lower.copy(), robot.model.upper.copy()
     lower[levers], upper[levers] = -1.0, 1.0
     return replace(robot, model=robot.model.replaced(lower=lower, upper=upper))
+
+
+def sprung_ankles() -> hs.Robot:
+    """The same with springs at the ankles, which have no motors of their own."""
+    robot = linked_ankles()
+    stiffness = robot.model.stiffness.copy()
+    for side in ("right", "left"):
+        stiffness[robot.joint_names.index(f"{side}_ankle")] = 100.0
+    return replace(robot, model=robot.model.replaced(stiffness=stiffness))
 
 
 def of_user(now: hs.gait.Instant) -> Any:
@@ -261,6 +257,9 @@ KINDS = {
         stepping_over,
     ),
     "closed loops": Kind(linked_ankles, (Phase("right_ankle", duration=0.6),), {"distance": 0.25}),
+    "closed loops and springs": Kind(
+        sprung_ankles, (Phase("right_ankle", duration=0.6),), {"distance": 0.25}
+    ),
 }
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from closing import Mechanics, gap, held_rows, lacking, mechanics_of
-from motion_kinds import FOLDER, KINDS, file_of, kept
+from motion_kinds import FOLDER, HURDLE, KINDS, file_of, kept
 
 import heelstrike as hs
 
@@ -89,6 +89,39 @@ def test_it_closes(name: str) -> None:
     """Followed by computed torque, it ends where it goes on: after the last landing, if it has."""
     _, motion, mechanics = loaded(name)
     assert gap(mechanics, motion) < CLOSED
+
+
+def test_the_design_knows_how_it_closes() -> None:
+    """Its own estimate, of every motion that was integrated when it was designed."""
+    known = []
+    for name in KINDS:
+        _, motion, _ = loaded(name)
+        if np.isfinite(motion.closes_to):
+            known.append(name)
+            assert motion.closes_to < CLOSED
+    assert {"starting", "stopping", "stepping over", "run", "closed loops"} <= set(known)
+
+
+def test_soles_stay_above_the_obstacle() -> None:
+    """All along them, at all times; and both feet pass it."""
+    robot, motion, _ = loaded("stepping over")
+    closest, share = [np.inf, np.inf], np.linspace(0.0, 1.0, 101)[:, None]
+    for t in np.linspace(0.0, motion.duration, 2000):
+        places = hs.dynamics.contact_positions(robot, motion.position(t))
+        for foot in range(2):
+            heel, toe = places[2 * foot : 2 * foot + 2]
+            sole = (1.0 - share) * heel + share * toe
+            over = np.abs(sole[:, 0] - HURDLE["place"]) <= HURDLE["half_width"]
+            closest[foot] = min(closest[foot], sole[over, 1].min(initial=np.inf))
+    for least in closest:
+        assert HURDLE["height"] - 2e-3 < least < 2.0 * HURDLE["height"]
+
+
+@pytest.mark.parametrize("wrong", [{"height": 0.0}, {"half_width": -1.0}, {"place": np.nan}])
+def test_obstacles_that_are_none(wrong: dict[str, float]) -> None:
+    robot = hs.load_robot("bravo7")
+    with pytest.raises(hs.GaitError, match="of an obstacle must be"):
+        hs.over_obstacle(robot, **{**HURDLE, **wrong})
 
 
 def test_a_motion_that_does_not_repeat_is_seen() -> None:
