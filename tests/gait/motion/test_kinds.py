@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closing import Mechanics, gap, held_rows, lacking, mechanics_of
+from closing import Mechanics, gap, gauss_times, held_rows, lacking, mechanics_of
 from motion_kinds import FOLDER, HURDLE, KINDS, file_of, kept
 
 import heelstrike as hs
@@ -122,6 +122,26 @@ def test_obstacles_that_are_none(wrong: dict[str, float]) -> None:
     robot = hs.load_robot("bravo7")
     with pytest.raises(hs.GaitError, match="of an obstacle must be"):
         hs.over_obstacle(robot, **{**HURDLE, **wrong})
+
+
+def test_forces_of_loops_are_told() -> None:
+    """They are what the joints without a motor need, by MuJoCo's rows; and are kept in the file."""
+    robot, motion, mechanics = loaded("closed loops")
+    free = np.setdiff1d(np.arange(robot.nv), robot.model.actuator_joint)
+    (phase,) = motion.phases
+    for t in gauss_times(phase).ravel()[::5]:
+        q, v, a = (phase.coordinates(t, order=order) for order in range(3))
+        now, pushed = mechanics.at(q, v), phase.forces(t)
+        lacks = now.mass @ a + now.force - np.einsum("ikj,ik->j", now.jacobian, pushed)
+        lacks -= hs.dynamics.loop_jacobian(robot, q).T @ phase.loop_forces(t)
+        assert np.abs(lacks[free]).max() < 1e-8 * robot.weight
+    assert np.abs(phase.loop_force).max() > 1.0
+
+
+def test_laws_refuse_motions_with_loops() -> None:
+    robot, motion, _ = loaded("closed loops")
+    with pytest.raises(hs.HeelstrikeError, match="a law that follows a motion knows robots"):
+        hs.MotionTracking(robot, motion)
 
 
 def test_a_motion_that_does_not_repeat_is_seen() -> None:
