@@ -216,7 +216,7 @@ def _endurance(part: dict[str, Any]) -> Iterator[Table]:
             ("failures", "contact problems without a solution"),
             ("unfinished", "runs that ended otherwise than walking or falling"),
             ("fell", "falls"),
-            ("fallbacks", "problems that needed another solver"),
+            ("fallbacks", "problems that needed a solver besides Lemke's method"),
         )
     ]
     for name in ("complementarity", "cone", "non_penetration"):
