@@ -39,6 +39,10 @@ class Evaluated:
     """(nc, 2, nv) Rows of every contact point, away from the ground and along it."""
     moved: Floats
     """(nc, 2) J̇v."""
+    tied: Floats
+    """(rows, nv) Rows of closed loops, along x and z."""
+    tied_moved: Floats
+    """(rows,) Their J̇v."""
 
 
 class Mechanics:
@@ -86,7 +90,26 @@ class Mechanics:
             # A disc rolls: what its lowest point accelerates by is that of its centre.
             mujoco.mj_jacDot(model, data, rate, unused, center, body)
             rows[i], moved[i] = self._frame @ jacobian, self._frame @ (rate @ v)
-        return Evaluated(mass, data.qfrc_bias - data.qfrc_passive, rows, moved)
+        tied, tied_moved = self._loops(v)
+        return Evaluated(mass, data.qfrc_bias - data.qfrc_passive, rows, moved, tied, tied_moved)
+
+    def _loops(self, v: Floats) -> tuple[Floats, Floats]:
+        """Rows of closed loops, each of which holds two sites together."""
+        model, data = self._model, self._data
+        rows, moved = np.zeros((0, model.nv)), np.zeros(0)
+        jacobian, rate, unused = (np.zeros((3, model.nv)) for _ in range(3))
+        for loop in range(model.neq):
+            assert model.eq_type[loop] == mujoco.mjtEq.mjEQ_CONNECT
+            assert model.eq_objtype[loop] == mujoco.mjtObj.mjOBJ_SITE
+            row, bias = np.zeros((2, model.nv)), np.zeros(2)
+            for site, sign in ((model.eq_obj1id[loop], 1.0), (model.eq_obj2id[loop], -1.0)):
+                body, point = int(model.site_bodyid[site]), data.site_xpos[site]
+                mujoco.mj_jac(model, data, jacobian, unused, point, body)
+                mujoco.mj_jacDot(model, data, rate, unused, point, body)
+                row += sign * jacobian[[0, 2]]
+                bias += sign * (rate @ v)[[0, 2]]
+            rows, moved = np.vstack([rows, row]), np.concatenate([moved, bias])
+        return rows, moved
 
 
 def gauss_times(phase: MotionPhase) -> Floats:
@@ -96,7 +119,11 @@ def gauss_times(phase: MotionPhase) -> Floats:
 
 
 def needed(mechanics: Mechanics, phase: MotionPhase) -> Floats:
-    """Forces on all coordinates that a phase needs of motors, at Gauss points, (K, STAGES, nv)."""
+    """Forces on all coordinates that a phase needs of motors, at Gauss points, (K, STAGES, nv).
+
+    Closed loops pull as they have to, for the coordinates without a motor.
+    """
+    free = np.setdiff1d(np.arange(mechanics.robot.nv), mechanics.robot.model.actuator_joint)
     times = gauss_times(phase)
     found = np.zeros((*times.shape, phase.pieces.shape[2]))
     for at in np.ndindex(times.shape):
@@ -104,6 +131,8 @@ def needed(mechanics: Mechanics, phase: MotionPhase) -> Floats:
         now = mechanics.at(q, v)
         pushed = np.einsum("ikj,ik->j", now.jacobian, phase.force[at])
         found[at] = now.mass @ a + now.force - pushed
+        pulled = np.linalg.lstsq(now.tied[:, free].T, found[at][free])[0]
+        found[at] -= now.tied.T @ pulled
     return found
 
 
@@ -148,7 +177,7 @@ def landed(
         return q, v
     now = mechanics.at(q, v)
     held = held_rows(mechanics.robot, after)
-    rows = np.array([now.jacobian[i, k] for i, k in held])
+    rows = np.vstack([[now.jacobian[i, k] for i, k in held], now.tied])
     v = v + _constrained(now.mass, rows, np.zeros(v.size), -rows @ v)
     return q, v
 
@@ -182,8 +211,9 @@ def _rate(mechanics: Mechanics, phase: MotionPhase) -> Callable[[float, Floats],
     def rate(t: float, state: Floats) -> Floats:
         q, v = np.split(state, 2)
         now = mechanics.at(q, v)
-        rows = np.array([now.jacobian[i, k] for i, k in held]).reshape(-1, q.size)
-        still = np.array([-now.moved[i, k] for i, k in held])
+        points = np.array([now.jacobian[i, k] for i, k in held]).reshape(-1, q.size)
+        rows = np.vstack([points, now.tied])
+        still = np.array([*(-now.moved[i, k] for i, k in held), *-now.tied_moved])
         given = phase.forces(t)
         forces = np.array([given[i, k] for i, k in held])
         at, fast, bend = (phase.coordinates(t, order=order) for order in range(3))
@@ -200,12 +230,14 @@ def _nearest(
 
     The minimum of |a_J - wanted|² + ε² |λ - given|² (forces in units of the weight) subject to the
     equations of the coordinates without a motor, in the same unit, and to those of the contacts.
+    Closed loops, the last rows, pull for nothing.
     """
     n, held, weight = len(now.mass), len(rows), robot.weight
+    forces = np.append(forces, np.zeros(held - forces.size))
     driven = robot.model.actuator_joint
     free = np.setdiff1d(np.arange(n), driven)
     weigh = np.zeros(n + held)
-    weigh[driven], weigh[n:] = 1.0, FORCES**2
+    weigh[driven], weigh[n : n + held - len(now.tied)] = 1.0, FORCES**2
     must = np.block([[now.mass[free] / weight, -rows.T[free]], [rows, np.zeros((held, held))]])
     target = np.concatenate([-now.force[free] / weight, still])
     system = np.block([[np.diag(weigh), must.T], [must, np.zeros((len(must), len(must)))]])

@@ -2,7 +2,7 @@
 
     python benchmarks/campaigns cost --trials 400
     python benchmarks/campaigns kills --kills 200
-    python benchmarks/campaigns clusters --trials 128
+    python benchmarks/campaigns clusters --trials 640 --only Dask
     python benchmarks/campaigns schedulers --kills 5
 
 `cost` walks trials of ``mix.toml`` by :class:`~heelstrike.Campaign`, kept on disk, and the very
@@ -14,7 +14,8 @@ moments and begins it again, until it is through; then the same with the workers
 must be there, once, and be the one of a campaign that was left alone.
 
 `clusters` has trials of ``mix.toml`` worked on by a pool of processes, a Dask cluster and jobs of
-submitit, where these are installed, and compares outcomes and processor time with own threads.
+submitit, where these are installed, or only one of them beside own threads. It compares outcomes
+and processor time: what beginning and end cost, what each trial does, and what 10 000 would.
 `schedulers` kills the scheduler of a Dask cluster at random moments, and goes on with another one.
 """
 
@@ -35,7 +36,7 @@ from heelstrike.experiments.campaigns.trials import laid_out
 # Run as a folder, its modules would be on the path and not the package.
 sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
-from campaigns.clusters import compare, kill_schedulers  # noqa: E402
+from campaigns.clusters import EXECUTORS, FEW, compare, kill_schedulers  # noqa: E402
 from campaigns.killing import campaign_of, killed, short_campaign  # noqa: E402
 
 MIX = Path(__file__).parent / "mix.toml"
@@ -69,7 +70,7 @@ def cost(trials: int, rounds: int, workers: int) -> None:
         few.run(workers=workers)  # compiles
         bare(few, workers)
         least = {"campaign": np.inf, "bare batch": np.inf}
-        wall = dict(least)
+        wall, memory = dict(least), {}
         for round_ in range(rounds):
             for name in least:
                 begin, at = time.process_time(), time.perf_counter()
@@ -81,15 +82,15 @@ def cost(trials: int, rounds: int, workers: int) -> None:
                     batch = bare(campaign, workers)
                 least[name] = min(least[name], time.process_time() - begin)
                 wall[name] = min(wall[name], time.perf_counter() - at)
+                memory.setdefault(name, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
         for name, seconds in least.items():
             print(
                 f"{name}: {1e3 * seconds / trials:.1f} ms of a processor a trial, "
-                f"{wall[name]:.1f} s on the wall"
+                f"{wall[name]:.1f} s on the wall, at most {memory[name]:.0f} MB until then"
             )
         print(f"ratio {least['campaign'] / least['bare batch']:.3f} of processor time")
         print(f"10 000 on {workers} quiet processors: "
               f"{1e4 * least['campaign'] / trials / workers / 60.0:.1f} min")  # fmt: skip
-        print(f"memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:.0f} MB")
         lasted = int(np.count_nonzero(batch.completed))
         print(f"{results}; {lasted} of {trials} lasted in the batch")
 
@@ -129,17 +130,21 @@ def main() -> None:
     deaths.add_argument("--trials", type=int, default=4000)
     deaths.add_argument("--seed", type=int, default=0)
     others = commands.add_parser("clusters", help="compare workers of others with own threads")
-    others.add_argument("--trials", type=int, default=128)
+    others.add_argument("--trials", type=int, default=5 * FEW)
+    others.add_argument("--only", choices=list(EXECUTORS), help="one of them beside own threads")
     schedulers = commands.add_parser("schedulers", help="kill schedulers of Dask")
     schedulers.add_argument("--kills", type=int, default=5)
     schedulers.add_argument("--trials", type=int, default=1500)
     schedulers.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
+    if options.command == "clusters" and options.trials <= FEW:
+        parser.error(f"clusters tells beginning and trials apart by more than {FEW} trials")
     if options.command == "cost":
         cost(options.trials, options.rounds, options.workers)
     elif options.command == "clusters":
         with tempfile.TemporaryDirectory() as folder:
-            compare(mix(options.trials, Path(folder)), Path(folder))
+            few, campaign = (mix(count, Path(folder)) for count in (FEW, options.trials))
+            compare(few, campaign, Path(folder), options.only)
     elif options.command == "schedulers":
         with tempfile.TemporaryDirectory() as folder:
             campaign = short_campaign(Path(folder), options.trials)

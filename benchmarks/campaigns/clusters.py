@@ -1,7 +1,8 @@
 """Campaigns whose work others do: pools of processes, a Dask cluster, jobs of submitit.
 
 Outcomes must be those of own threads to the last bit. What each costs is told in processor time,
-that of this process and of all workers together.
+that of this process and of all workers together, and apart: what it takes to begin and end, and
+what each further trial takes. A short campaign and a long one tell the two.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import heelstrike as hs
+from heelstrike.experiments.campaigns.campaign import BLOCK
 from heelstrike.experiments.campaigns.store import DATABASE
 from heelstrike.experiments.campaigns.workers import dask_client, process_pool
 
@@ -72,30 +75,82 @@ EXECUTORS: dict[str, Callable[[Path], contextlib.AbstractContextManager[Any]]] =
 }  # fmt: skip
 
 
-def compare(campaign: hs.Campaign, folder: Path) -> None:
-    """Print what each executor comes to, and what it costs."""
-    expected = repr(campaign.run(workers=1).outcomes)  # compiles
-    usual = 0.0
+FEW = 2 * WORKERS * BLOCK
+"""Trials of the short campaign: every worker has begun, and has had two blocks."""
+MANY = 10_000
+"""Trials that the ratio is told for."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Seconds that a campaign takes."""
+
+    processor: float
+    """Of a processor, of all processes together."""
+    wall: float
+    """On the wall."""
+
+    def beside(self, few: Cost, trials: int) -> tuple[Cost, Cost]:
+        """Return what beginning and end cost, and what each trial does, by a shorter campaign."""
+        each = [
+            (own - other) / (trials - FEW)
+            for own, other in ((self.processor, few.processor), (self.wall, few.wall))
+        ]
+        begin = [few.processor - FEW * each[0], few.wall - FEW * each[1]]
+        return Cost(*begin), Cost(*each)
+
+
+def compare(few: hs.Campaign, campaign: hs.Campaign, folder: Path, only: str | None = None) -> None:
+    """Print what each executor comes to, and what it costs.
+
+    Parameters
+    ----------
+    few : Campaign
+        The same with `FEW` trials.
+    campaign : Campaign
+        Whose trials are worked on.
+    folder : Path
+        Where outcomes are kept.
+    only : str, optional
+        One of `EXECUTORS`, beside own threads.
+    """
+    few.run(workers=1)  # compiles
+    usual: tuple[float, float] | None = None  # of a trial, and of many
+    expected = ""
     for name, make in EXECUTORS.items():
-        begin, wall = processor_time(), time.perf_counter()
+        if only not in (None, name) and expected:
+            continue
         try:
-            with make(folder) as executor:
-                kept = folder / name.replace(" ", "-")
-                results = campaign.run(kept, executor=executor, workers=WORKERS)
+            short, _ = _cost(few, make, folder / f"{name}, few")
+            whole, outcomes = _cost(campaign, make, folder / name)
         except ImportError as error:
             print(f"{name}: {error}")
             continue
-        spent, lasted = processor_time() - begin, time.perf_counter() - wall
-        usual = usual or spent
-        same = repr(results.outcomes) == expected
+        expected = expected or outcomes
+        begin, each = whole.beside(short, len(campaign))
+        many = begin.processor + MANY * each.processor
+        usual = usual or (each.processor, many)
         print(
-            f"{name}: outcomes the same: {same}; {1e3 * spent / len(campaign):.1f} ms of a "
-            f"processor a trial with its start and end, {spent / usual:.2f} of own threads, "
-            f"{lasted:.1f} s on the wall",
+            f"{name}: outcomes the same: {outcomes == expected}; {begin.processor:.1f} s of a "
+            f"processor to begin and end, then {1e3 * each.processor:.2f} ms a trial, "
+            f"{each.processor / usual[0]:.3f} of own threads; {MANY} trials so "
+            f"{many / usual[1]:.3f}; {len(campaign)} took {whole.wall:.1f} s on the wall",
             flush=True,
         )
-        if not same:
+        if outcomes != expected:
             raise SystemExit(1)
+
+
+def _cost(
+    campaign: hs.Campaign, make: Callable[[Path], contextlib.AbstractContextManager[Any]],
+    folder: Path,
+) -> tuple[Cost, str]:  # fmt: skip
+    """Run a campaign; return what it takes, and its outcomes with every digit."""
+    begin, wall = processor_time(), time.perf_counter()
+    with make(folder) as executor:
+        results = campaign.run(folder, executor=executor, workers=WORKERS)
+    spent = Cost(processor_time() - begin, time.perf_counter() - wall)
+    return spent, repr(results.outcomes)
 
 
 def kill_schedulers(campaign: hs.Campaign, folder: Path, count: int, seed: int) -> None:

@@ -200,7 +200,11 @@ def _footprint(part: dict[str, Any]) -> Iterator[Table]:
         before, after = (f"{memory[f'{when}_MiB']:.0f} MiB" for when in ("before", "after"))
         body.append([f"peak memory after {memory['short_s']:g} s of walking", before])
         body.append(
-            [f"peak memory after {memory['long_s']:g} s more, with as many recorded rows", after]
+            [
+                f"peak memory after {memory['long_s']:g} s more, recorded "
+                f"{memory['long_s'] / memory['short_s']:g} times as sparsely",
+                after,
+            ]
         )
     yield Table("start-up, allocations and memory", ["what", "measured"], body)
 
@@ -212,14 +216,14 @@ def _endurance(part: dict[str, Any]) -> Iterator[Table]:
             ("failures", "contact problems without a solution"),
             ("unfinished", "runs that ended otherwise than walking or falling"),
             ("fell", "falls"),
-            ("fallbacks", "problems that needed another solver"),
+            ("fallbacks", "problems that needed a solver besides Lemke's method"),
         )
     ]
     for name in ("complementarity", "cone", "non_penetration"):
         body.append([f"{name.replace('_', '-')} residual", f"{part[name]:.1e}"])
     body.append(["penetration", f"{part['penetration_m']:.1e} m"])
     share = part["shortcuts"] / max(part["solves"], 1)
-    body.append(["answered by the modes of the step before, verified", f"{100 * share:.2f} %"])
+    body.append(["solved with the contact modes of the step before", f"{100 * share:.2f} %"])
     title = f"{part['steps']} steps of {part['runs']} walks under random pushes"
     yield Table(title, ["what", "number or worst value"], body)
 

@@ -131,6 +131,7 @@ if TYPE_CHECKING:
     from heelstrike.gait import make_invariant as make_invariant
     from heelstrike.gait import optimize_gait as optimize_gait
     from heelstrike.gait import optimize_motion as optimize_motion
+    from heelstrike.gait import over_obstacle as over_obstacle
     from heelstrike.gait import plan_motion as plan_motion
     from heelstrike.robot import Robot as Robot
     from heelstrike.robot import RobotBuilder as RobotBuilder
@@ -305,6 +306,7 @@ _HOME = {
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
     "optimize_motion": "heelstrike.gait",
+    "over_obstacle": "heelstrike.gait",
     "part": "heelstrike.compiler.bundle",
     "plan_motion": "heelstrike.gait",
     "report": "heelstrike.view.report",

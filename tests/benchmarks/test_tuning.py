@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sqlite3
 import subprocess
 import sys
+import time
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -56,3 +58,48 @@ def test_a_study_goes_on_where_it_was_ended(tmp_path: Path) -> None:
         )
         assert "of the walks go on" in ended.stdout
     assert "Using an existing study" in ended.stderr
+
+
+FINISHED = """
+select t.number, t.state, v.value from trials t left join trial_values v on v.trial_id = t.trial_id
+where t.state in ('COMPLETE', 'PRUNED') order by t.number
+"""
+
+
+def finished(study: Path) -> list[tuple[int, str, float | None]]:
+    """Trials of a study that are finished: number, state and value, as its file has them."""
+    try:
+        with sqlite3.connect(f"file:{study}?mode=ro", uri=True) as connection:
+            return connection.execute(FINISHED).fetchall()
+    except sqlite3.OperationalError:  # it is not there yet, or is being written
+        return []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="kill -9 is of POSIX")
+def test_a_study_that_is_killed_goes_on(tmp_path: Path) -> None:
+    """What was finished at the kill is there unchanged, and the rest is done, no more."""
+    pytest.importorskip("optuna")
+    study = tmp_path / "study.sqlite"
+    command = [sys.executable, tuning.__file__, "--walks", "2", "--study", str(study)]
+    killed = subprocess.Popen(
+        [*command, "--trials", "50"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        end = time.monotonic() + 240.0
+        while len(finished(study)) < 2 and killed.poll() is None and time.monotonic() < end:
+            time.sleep(0.02)
+        assert killed.poll() is None
+    finally:
+        killed.kill()
+        killed.wait()
+    before = finished(study)
+    assert 2 <= len(before) < 50
+    wanted = len(before) + 2
+    ended = subprocess.run(
+        [*command, "--trials", str(wanted)], capture_output=True, text=True, check=True
+    )
+    assert "Using an existing study" in ended.stderr
+    after = finished(study)
+    assert after[: len(before)] == before
+    assert len(after) == wanted

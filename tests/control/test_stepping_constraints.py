@@ -12,7 +12,7 @@ import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.compiler.compilation import uncompiled
 from heelstrike.control import stepping_constraints as law_module
-from heelstrike.control.bearable import nearing
+from heelstrike.control.feasible import nearing
 from heelstrike.control.stepping_constraints import Memory, follow, shift_at_end, take_up
 from heelstrike.gait.phased.surface import Surface
 from heelstrike.sim import Contacts

@@ -67,8 +67,8 @@ def test_lengths_count_what_forces_bring_along() -> None:
     system, unknown = np.array([[1.0, 1.0, 11.0], [1.0, 1.0, 11.0]]), np.zeros(2)
     column = np.zeros(2, dtype=np.int64)
     rank = uncompiled(solve_to_rank)(2, system, column, unknown)
-    lean = np.array([3.0, 0.0])
-    uncompiled(shorten)(0, 2, rank, np.ones(2), lean, column, system, unknown)
+    ratio = np.array([3.0, 0.0])
+    uncompiled(shorten)(0, 2, rank, np.ones(2), ratio, column, system, unknown)
     np.testing.assert_allclose(unknown, [1.0, 10.0], rtol=1e-12)
 
 

@@ -56,6 +56,14 @@ def test_a_built_in_robot_loads_without_a_word(name: str) -> None:
     assert robot.feet
 
 
+@pytest.mark.parametrize("folders", [".", ["here", "there"]])
+def test_a_built_in_robot_needs_no_packages(folders: str | list[str]) -> None:
+    """A user who names folders of packages means a file of theirs."""
+    with pytest.raises(RobotError, match=r"'bravo7' is built in.*leave out package_path"):
+        load_robot("bravo7", package_path=folders)
+    assert load_robot("bravo7", package_path=()).name == "bravo7"
+
+
 @pytest.mark.parametrize("name", ACTUATED)
 def test_a_built_in_robot_is_a_complete_biped(name: str) -> None:
     robot = load_robot(name)

@@ -7,8 +7,7 @@ import numpy as np
 from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.model import Floats, Integers
-from heelstrike.robot.robot import Robot
+from heelstrike.robot.model import Floats
 from heelstrike.sim.run import AnyRun, Run
 
 
@@ -35,15 +34,6 @@ def torque_cost(run: Run, *, start: float = -np.inf, end: float = np.inf) -> flo
     return float((square * held)[inside].sum())
 
 
-def driven(run: AnyRun) -> Integers:
-    """Index of the velocity that each actuator of a run's robot drives, (nu,)."""
-    model = run.robot.model
-    found: Integers = (
-        model.actuator_joint if isinstance(run.robot, Robot) else model.actuator_velocity
-    )
-    return found
-
-
 def actuator_power(run: AnyRun) -> Floats:
     """Mean mechanical power τ ω of every actuator from each row to the next, (nt − 1, nu), in W.
 
@@ -59,7 +49,7 @@ def actuator_power(run: AnyRun) -> Floats:
     (nt - 1, nu) float
         Mean power from each row to the next, in W.
     """
-    speed = run.velocity[:, driven(run)]
+    speed = run.velocity[:, run.robot.driven]
     return np.asarray(mean_over_intervals(run, run.torque) * 0.5 * (speed[:-1] + speed[1:]))
 
 
@@ -81,7 +71,7 @@ def torque_bounds(run: AnyRun) -> tuple[Floats, Floats]:
     model = run.robot.model
     lower = np.broadcast_to(model.torque_lower, run.torque.shape)
     upper = np.broadcast_to(model.torque_upper, run.torque.shape)
-    moved = driven(run)
+    moved = run.robot.driven
     stall = model.stall_torque[moved]
     with np.errstate(invalid="ignore"):
         drag = np.where(

@@ -124,7 +124,7 @@ def recovery(
     if largest >= pitch:
         reasons.append(f"the trunk leant by {largest:.3g} rad")
     if lasted and not abs(now - normal) <= max(speed * abs(normal), SLOW):
-        reasons.append(f"its speed is {now:.3g} m/s, before it was {normal:.3g} m/s")
+        reasons.append(f"the walk changed: its speed is {now:.3g} m/s instead of {normal:.3g} m/s")
     return Recovery(
         recovered=not reasons, reason="; ".join(reasons), hip=lowest, pitch=largest,
         speed=now, normal_speed=normal,

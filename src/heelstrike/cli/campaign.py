@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from heelstrike.cli.options import AsJson, method_called
+from heelstrike.cli.options import Afresh, AsJson, Workers, method_called
 from heelstrike.cli.terminal import complain, many, output, spoken, stage, tell, this_command, wrote
 
 if TYPE_CHECKING:
@@ -36,9 +36,7 @@ def campaign(
             show_default="the file's name without .toml",
         ),
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Threads.", show_default="one a processor")
-    ] = None,
+    workers: Workers = None,
     processes: Annotated[
         int | None,
         typer.Option(min=1, help="Processes instead of threads; one that dies is replaced."),
@@ -50,9 +48,7 @@ def campaign(
     film: Annotated[
         bool, typer.Option("--film/--no-film", help="Write a film and a page of a replayed trial.")
     ] = True,
-    afresh: Annotated[
-        bool, typer.Option("--afresh", help="Discard what is in --out and start again.")
-    ] = False,
+    afresh: Afresh = False,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
     """Simulate many trials of a walk, each with other numbers.

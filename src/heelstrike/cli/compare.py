@@ -18,6 +18,7 @@ from heelstrike.cli.options import (
     RobotName,
     Step,
     Steps,
+    TableFolder,
     Walking,
 )
 from heelstrike.cli.planning import asked_for, methods_asked, with_gait
@@ -66,9 +67,7 @@ def compare(
     ] = 0.0,
     others: InEngines,
     how: Reading,
-    out: Annotated[
-        Path, typer.Option(file_okay=False, help="Directory for the table and the figure.")
-    ] = Path("compare"),
+    out: TableFolder = Path("compare"),
     as_json: AsJson = False,
 ) -> None:
     """Walk the same steps by several methods or in several engines, and report the differences."""

@@ -45,6 +45,14 @@ SEVERAL = "Simulation method; repeat the option to see several side by side."
 USUAL_METHOD = f"{Method.TIME_STEPPING}; {Method.EVENT_DRIVEN} without motors"
 
 
+class Animation(StrEnum):
+    """Kinds of animation."""
+
+    MP4 = "mp4"
+    GIF = "gif"
+    NONE = "none"
+
+
 class Way(StrEnum):
     """Where a robot looks in its file."""
 
@@ -54,10 +62,8 @@ class Way(StrEnum):
     RIGHT = "-y"
 
 
-RobotName = Annotated[
-    str,
-    typer.Argument(help="A built-in robot, or an MJCF, URDF or SDF file.", autocompletion=built_in),
-]
+ROBOT = "A built-in robot, or an MJCF, URDF or SDF file."
+RobotName = Annotated[str, typer.Argument(help=ROBOT, autocompletion=built_in)]
 OnGround = Annotated[
     str,
     typer.Option(
@@ -82,18 +88,25 @@ OWN_LAW = (
 )
 Steps = Annotated[int, typer.Option(min=1, help="Steps to walk.")]
 Step = Annotated[float, typer.Option(help="Time step in s of the methods that have one.")]
+FixedStep = Annotated[float, typer.Option(help="Time step h in s.")]
 Rate = Annotated[
     float | None, typer.Option(help="Rows a second, where there is no column of times.")
 ]
 Unit = Annotated[
     str, typer.Option(help="Unit of columns that name none: rad or deg.", show_default="rad")
 ]
-MeasuredRobot = Annotated[
-    str, typer.Option("--robot", help="A built-in robot, or an MJCF, URDF or SDF file.")
-]
+MeasuredRobot = Annotated[str, typer.Option("--robot", help=ROBOT)]
 Friction = Annotated[float, typer.Option(help="Friction coefficient of the ground.")]
 OneMethod = Annotated[Method | None, typer.Option(help=METHOD, show_default=USUAL_METHOD)]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else.")]
+Afresh = Annotated[bool, typer.Option("--afresh", help="Discard what is in --out and start again.")]
+Workers = Annotated[
+    int | None, typer.Option(min=1, help="Threads.", show_default="one a processor")
+]
+Animated = Annotated[Animation, typer.Option(help="Kind of animation.")]
+TableFolder = Annotated[
+    Path, typer.Option(file_okay=False, help="Directory for the table and the figure.")
+]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from heelstrike.cli.options import AsJson, Friction, Reading, RobotName
+from heelstrike.cli.options import AsJson, Friction, Reading, RobotName, TableFolder
 from heelstrike.cli.planning import planar_robot_called
 from heelstrike.cli.terminal import FAILED, output, spoken, stage, tell, wrote
 from heelstrike.cli.values import numbers_called
@@ -26,9 +26,7 @@ def planners(
     friction: Friction = 0.75,
     steps: Annotated[int, typer.Option(min=2, help="Steps of each walk.")] = 10,
     how: Reading,
-    out: Annotated[
-        Path, typer.Option(file_okay=False, help="Directory for the table and the figure.")
-    ] = Path("planners"),
+    out: TableFolder = Path("planners"),
     as_json: AsJson = False,
 ) -> None:
     """Compare walks planned by the cart-table model with the optimal gait.

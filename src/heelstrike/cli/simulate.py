@@ -8,7 +8,16 @@ from typing import Annotated
 import typer
 
 from heelstrike.cli import INTERRUPTED
-from heelstrike.cli.options import AsJson, Friction, OnGround, Reading, RobotName
+from heelstrike.cli.options import (
+    Animated,
+    Animation,
+    AsJson,
+    FixedStep,
+    Friction,
+    OnGround,
+    Reading,
+    RobotName,
+)
 from heelstrike.cli.planning import FIRST_TIME
 from heelstrike.cli.terminal import (
     FAILED,
@@ -20,7 +29,6 @@ from heelstrike.cli.terminal import (
     wrote,
 )
 from heelstrike.cli.values import ground_called, spatial_pushes_called
-from heelstrike.cli.walk import Animation
 
 
 # As many arguments as the command has options: a person's.
@@ -41,7 +49,7 @@ def simulate(
     above: Annotated[
         float, typer.Option(help="Height of the lowest contact point above the ground in m.")
     ] = 0.0,
-    step: Annotated[float, typer.Option(help="Time step h in s.")] = 1e-3,
+    step: FixedStep = 1e-3,
     ground: OnGround = "flat",
     friction: Friction = 0.75,
     push: Annotated[
@@ -59,7 +67,7 @@ def simulate(
             file_okay=False, help="Folder of the results; files of the same names are replaced."
         ),
     ] = Path("simulation"),
-    animation: Annotated[Animation, typer.Option(help="Kind of animation.")] = Animation.MP4,
+    animation: Animated = Animation.MP4,
     as_json: AsJson = False,
 ) -> None:
     """Drop a robot in space, or let it hold its posture, and write data, a film and a page.

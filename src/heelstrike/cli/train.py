@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from heelstrike.cli.options import AsJson
+from heelstrike.cli.options import Afresh, AsJson
 from heelstrike.cli.terminal import many, output, spoken, stage, tell, wrote
 from heelstrike.cli.values import range_called, ranges_called
 from heelstrike.errors import SimulationError
@@ -77,9 +77,7 @@ def train(
     film: Annotated[
         bool, typer.Option("--film/--no-film", help="Write film and page of a run, too.")
     ] = True,
-    afresh: Annotated[
-        bool, typer.Option("--afresh", help="Discard what is in --out and start again.")
-    ] = False,
+    afresh: Afresh = False,
     as_json: AsJson = False,
 ) -> None:  # fmt: skip
     """Learn to run, or to walk at a commanded speed, by proximal policy optimisation.

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from heelstrike.cli import INTERRUPTED
-from heelstrike.cli.options import AsJson, OneMethod, Reading, RobotName, Steps, Walking
+from heelstrike.cli.options import (
+    Animated,
+    Animation,
+    AsJson,
+    OneMethod,
+    Reading,
+    RobotName,
+    Steps,
+    Walking,
+)
 from heelstrike.cli.planning import (
     FIRST_TIME,
     asked_for,
@@ -41,14 +49,6 @@ if TYPE_CHECKING:
 SUITS = "suits the robot's size"
 
 
-class Animation(StrEnum):
-    """Kinds of animation."""
-
-    MP4 = "mp4"
-    GIF = "gif"
-    NONE = "none"
-
-
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
 @spoken
 def walk(
@@ -76,7 +76,7 @@ def walk(
             file_okay=False, help="Folder of the results; those of an earlier walk are deleted."
         ),
     ] = Path("walk"),
-    animation: Annotated[Animation, typer.Option(help="Kind of animation.")] = Animation.MP4,
+    animation: Animated = Animation.MP4,
     html: Annotated[
         Path | None,
         typer.Option(

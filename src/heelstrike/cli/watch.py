@@ -15,6 +15,7 @@ from heelstrike.cli.options import (
     METHODS,
     METHODS_IN_SPACE,
     OWN_LAW,
+    FixedStep,
     Friction,
     Method,
     OneMethod,
@@ -60,7 +61,7 @@ def watch(
         ),
     ] = None,
     method: OneMethod = None,
-    step: Annotated[float, typer.Option(help="Time step h in s.")] = 1e-3,
+    step: FixedStep = 1e-3,
     ground: OnGround = "flat",
     friction: Friction = 0.75,
     dimension: Annotated[

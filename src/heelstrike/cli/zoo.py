@@ -9,7 +9,16 @@ from typing import Annotated
 
 import typer
 
-from heelstrike.cli.options import METHOD, AsJson, Method, Reading, Step, method_called
+from heelstrike.cli.options import (
+    METHOD,
+    Afresh,
+    AsJson,
+    Method,
+    Reading,
+    Step,
+    Workers,
+    method_called,
+)
 from heelstrike.cli.terminal import many, output, spoken, stage, tell, this_command, wrote
 
 ROBOTS = "bravo7,geyer7,spring_flamingo,rabbit,human7,walker2d"
@@ -44,9 +53,7 @@ def zoo(
     quick: Annotated[bool, typer.Option("--quick", help="A coarse and fast table.")] = False,
     method: Annotated[Method, typer.Option(help=METHOD)] = Method.TIME_STEPPING,
     step: Step = 1e-3,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Threads.", show_default="one a processor")
-    ] = None,
+    workers: Workers = None,
     how: Reading,
     out: Annotated[
         Path,
@@ -66,9 +73,7 @@ def zoo(
             show_default="zoo.svg in --out",
         ),
     ] = None,
-    afresh: Annotated[
-        bool, typer.Option("--afresh", help="Discard what is in --out and start again.")
-    ] = False,
+    afresh: Afresh = False,
     as_json: AsJson = False,
 ) -> None:
     """Find how large a disturbance each controller withstands on each robot.

@@ -6,6 +6,7 @@ Kernels use the plain integers; people use the enums, whose members have the sam
 from __future__ import annotations
 
 import enum
+from typing import Self
 
 OPEN, STICK, SLIP_FORWARD, SLIP_BACKWARD, SLIDING_FORWARD, SLIDING_BACKWARD = range(6)
 
@@ -33,7 +34,32 @@ class ContactMode(enum.IntEnum):
     SLIDING_BACKWARD = SLIDING_BACKWARD
 
 
-class Solver(enum.Enum):
+class Coded(enum.Enum):
+    """Members that kernels know by their places in the list of them."""
+
+    @property
+    def code(self) -> int:
+        """Return the integer by which kernels know this one."""
+        return list(type(self)).index(self)
+
+    @classmethod
+    def from_code(cls, code: int) -> Self:
+        """Return the one that kernels know by this integer.
+
+        Parameters
+        ----------
+        code : int
+            The integer.
+
+        Returns
+        -------
+        Coded
+            The member.
+        """
+        return list(cls)[int(code)]
+
+
+class Solver(Coded):
     """The ways to solve a contact problem; the values are the names that options accept.
 
     Kernels know them by their places in this list.
@@ -47,27 +73,6 @@ class Solver(enum.Enum):
     GAUSS_SEIDEL = "gauss_seidel"
     WARM_START = "warm_start"
     COMBINATIONS = "combinations"
-
-    @property
-    def code(self) -> int:
-        """Return the integer by which kernels know this solver."""
-        return list(Solver).index(self)
-
-    @classmethod
-    def from_code(cls, code: int) -> Solver:
-        """Return the solver that kernels know by this integer.
-
-        Parameters
-        ----------
-        code : int
-            The integer.
-
-        Returns
-        -------
-        Solver
-            The solver.
-        """
-        return list(cls)[int(code)]
 
 
 class SolveStatus(enum.IntEnum):

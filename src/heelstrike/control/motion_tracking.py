@@ -31,8 +31,10 @@ from heelstrike.control.followed_motion import (
     place_in_phase,
 )
 from heelstrike.dynamics.dense import solve_to_rank
+from heelstrike.errors import ControllerError
 from heelstrike.gait.motion.motion import Motion
 from heelstrike.gait.polynomials import motion_in_piece
+from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
@@ -227,6 +229,7 @@ def tracked(
 ) -> tuple[dict[str, Any], dict[str, int]]:
     """Return the numbers of the law about a motion, and how much it remembers."""
     motion.check_robot(robot)
+    refuse_loops(robot, "a law that follows a motion", ControllerError)
     numbers = {
         **followed_motion(robot, motion),
         "force": np.concatenate([phase.force_pieces for phase in cycle_of(robot, motion)]),

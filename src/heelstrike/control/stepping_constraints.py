@@ -24,7 +24,14 @@ from numpy.typing import ArrayLike
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import gains_of, must_be, number_of
-from heelstrike.control.bearable import GROUND_ROWS, JOINT_ROWS, Bearable, Bounds, bear, prepare
+from heelstrike.control.feasible import (
+    GROUND_ROWS,
+    JOINT_ROWS,
+    Bounds,
+    Feasible,
+    find_feasible_force,
+    prepare,
+)
 from heelstrike.control.virtual_constraints import series
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.family import StepFamily
@@ -105,7 +112,7 @@ class Memory(StanceClock):
     value: Floats = array("nu")
     gradient: Floats = array("nu")
     curvature: Floats = array("nu")
-    bearable: Bearable = part(Bearable)
+    feasible: Feasible = part(Feasible)
     momentum: Floats = array(3)
     center: Floats = array("axes")
 
@@ -298,7 +305,7 @@ def stepping_constraints(
     """Joint torques that follow the gait of a family which brings the energy back."""
     ahead = ahead_of_swing(state, parameters, memory)
     if memory.begun == 0:
-        prepare(memory.bearable.program)
+        prepare(memory.feasible.program)
         begin_step(state, contacts, robot, parameters, memory)
     elif exchange_at_touchdown(t, ahead, 0.0, contacts, robot.contact_foot, memory):
         begin_step(state, contacts, robot, parameters, memory)
@@ -314,17 +321,17 @@ def stepping_constraints(
     follow(memory, theta, memory.shift, share1 * change / half, share2 * change / (half * half))
     if memory.landed == 1:
         take_up(memory, theta)
-    bearable = memory.bearable
+    feasible = memory.feasible
     for i in range(robot.nu):
         error = state.joint_position[i] - memory.value[i]
         error_rate = state.joint_velocity[i] - memory.gradient[i] * rate
-        bearable.slope[i] = memory.gradient[i]
-        bearable.wanted[i] = memory.curvature[i] * rate * rate
+        feasible.slope[i] = memory.gradient[i]
+        feasible.wanted[i] = memory.curvature[i] * rate * rate
         # An impact that takes a while is not fought: no motor is a match for it.
         if memory.landed == 1:
-            bearable.wanted[i] -= parameters.kp[i] * error + parameters.kd[i] * error_rate
-    bear(
-        state, contacts, robot, parameters.phase, memory.stance, parameters.bounds, memory.bearable
+            feasible.wanted[i] -= parameters.kp[i] * error + parameters.kd[i] * error_rate
+    find_feasible_force(
+        state, contacts, robot, parameters.phase, memory.stance, parameters.bounds, memory.feasible
     )
     joint_torques(robot, torque)
 

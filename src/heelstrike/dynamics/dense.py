@@ -229,14 +229,14 @@ class LinearEquations(Bundle):
 
 @kernel
 def shorten(
-    first: int, size: int, rank: int, unit: Floats, lean: Floats, column: Integers, system: Floats,
+    first: int, size: int, rank: int, unit: Floats, ratio: Floats, column: Integers, system: Floats,
     unknown: Floats,
 ) -> None:  # fmt: skip
     """Choose among the solutions of equations that :func:`solve_to_rank` left open the shortest.
 
     Which unknowns that leaves free, and zero, depends on rounding where pivots tie; the shortest
     solution does not, and changes no faster than the equations do. Unknowns from `first` on count
-    for their length, each for that of a force with `lean` as much across it; those before follow.
+    for their length, each for that of a force with `ratio` as much across it; those before follow.
 
     Parameters
     ----------
@@ -244,7 +244,8 @@ def shorten(
         First unknown that counts, number of unknowns, rank of the equations.
     unit : (size,) float
         What an unknown of the system stands for in `unknown`.
-    lean : (size - first,) float
+    ratio : (size - first,) float
+        Force across each unknown, for one along it.
     column : (size,) int
     system : (size, size + 1) float
         What elimination left. Out: the free directions in the rows from `rank` on, orthogonal to
@@ -264,26 +265,26 @@ def shorten(
         for i in range(size):
             direction[i] *= unit[i]
         for earlier in range(rank, free):
-            remove(system[earlier], first, size, lean, direction)
-        length = math.sqrt(product(direction, direction, first, size, lean))
+            remove(system[earlier], first, size, ratio, direction)
+        length = math.sqrt(product(direction, direction, first, size, ratio))
         for i in range(size):
             direction[i] = direction[i] / length if length > 0.0 else 0.0
-        remove(direction, first, size, lean, unknown)
+        remove(direction, first, size, ratio, unknown)
 
 
 @kernel
-def product(one: Floats, other: Floats, first: int, size: int, lean: Floats) -> float:
+def product(one: Floats, other: Floats, first: int, size: int, ratio: Floats) -> float:
     """Product of two vectors, as :func:`shorten` reckons lengths."""
     total = 0.0
     for i in range(first, size):
-        total += (1.0 + lean[i - first] * lean[i - first]) * one[i] * other[i]
+        total += (1.0 + ratio[i - first] * ratio[i - first]) * one[i] * other[i]
     return total
 
 
 @kernel
-def remove(direction: Floats, first: int, size: int, lean: Floats, vector: Floats) -> None:
+def remove(direction: Floats, first: int, size: int, ratio: Floats, vector: Floats) -> None:
     """Make a vector orthogonal to a direction of length one, as :func:`shorten` reckons them."""
-    along = product(direction, vector, first, size, lean)
+    along = product(direction, vector, first, size, ratio)
     for i in range(size):
         vector[i] -= along * direction[i]
 

@@ -10,6 +10,7 @@ from heelstrike.gait.gait import Footing, Gait, Phase
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.motion.file import load_motion
 from heelstrike.gait.motion.motion import Motion, MotionPhase
+from heelstrike.gait.motion.obstacle import over_obstacle
 from heelstrike.gait.motion.optimize import optimize_motion
 from heelstrike.gait.motion.phases import ContactPhase
 from heelstrike.gait.motion.request import Repeat
@@ -42,5 +43,6 @@ __all__ = [
     "make_invariant",
     "optimize_gait",
     "optimize_motion",
+    "over_obstacle",
     "plan_motion",
 ]

@@ -42,26 +42,47 @@ def rate_of(
     GaitError
         If the motors have no such numbers, or a function returns no number.
     """
+    total, small = smooth_rate_of(costs, now), 2.0 * ROUNDED * unit_of_power
+    for weight, one, other in powers_of(costs, now, heat):
+        apart = one - other
+        total += 0.5 * weight * casadi.sum1(one + other + casadi.sqrt(apart**2 + small**2) - small)
+    return total
+
+
+def smooth_rate_of(costs: dict[Cost, float] | OwnCost, now: Instant) -> Any:
+    """Return the rate of those costs that have derivatives everywhere, as an expression."""
     if not isinstance(costs, dict):
         return _own_rate(costs, now)
-    small = ROUNDED * unit_of_power
+    return costs.get(Cost.TORQUE, 0.0) * casadi.sumsqr(now.torque)
+
+
+def powers_of(
+    costs: dict[Cost, float] | OwnCost, now: Instant, heat: Floats | None
+) -> list[tuple[float, Any, Any]]:
+    """Return the costs that have corners: their weights, and two powers of every motor, (nu,).
+
+    What a motor spends is the greater of the two: P and −P, or P with its heat and zero.
+
+    Raises
+    ------
+    GaitError
+        If the motors have no such numbers.
+    """
+    powers: list[tuple[float, Any, Any]] = []
+    if not isinstance(costs, dict):
+        return powers
     power = now.torque * now.motor_velocity
-    total = casadi.SX(0)
     for cost, weight in costs.items():
-        if cost is Cost.TORQUE:
-            rate = casadi.sumsqr(now.torque)
-        elif cost is Cost.MECHANICAL_ENERGY:
-            rate = casadi.sum1(casadi.sqrt(power**2 + small**2) - small)
-        else:
+        if cost is Cost.MECHANICAL_ENERGY:
+            powers.append((weight, power, -power))
+        elif cost is Cost.ELECTRICAL_ENERGY:
             if heat is None:
                 raise GaitError(
                     "cost 'electrical_energy' needs motors: stall_torque and no_load_speed of "
                     "every driven joint. Give them to the robot, or ask for 'mechanical_energy'."
                 )
-            spent = power + casadi.DM(heat) * now.torque**2
-            rate = 0.5 * casadi.sum1(spent + casadi.sqrt(spent**2 + small**2) - small)
-        total += weight * rate
-    return total
+            powers.append((weight, power + casadi.DM(heat) * now.torque**2, 0.0 * power))
+    return powers
 
 
 def heat_of(model: Model) -> Floats | None:

@@ -33,8 +33,12 @@ POINTS = 4
 PRICE_OF_EQUATIONS = 1000.0
 """Price of violating an equation in an elastic program; that of an inequality is 1. Equations say
 what a periodic step is, so that they give way last."""
-SHIFT = 1e-12
+SHIFT = 1e-15
 """Added to the squares of the singular values of equations (scaled) that may be dependent."""
+MOST_STEPS = 10
+"""Steps of Newton's method that satisfy equations."""
+ROUNDING = 1e-12
+"""Scaled violation of equations that counts as rounding."""
 RESERVE = 1e-6
 """Scaled distance kept from every bound along the path, for the time between the instants."""
 
@@ -412,12 +416,23 @@ def satisfied(
     lower, upper = bounds
     exact = np.flatnonzero(lower == upper)
     found = unknowns.copy()
-    for _ in range(3):
+    for k in range(MOST_STEPS):
         missing = value(found)[exact] - lower[exact]
+        if k >= 3 and np.abs(missing).max(initial=0.0) <= ROUNDING:
+            break
         rows = slopes(found).sparse().tocsr()[exact][:, free]
-        # Equations may depend on each other: then, and only then, does the shift matter.
-        normal = rows @ rows.T + SHIFT * scipy.sparse.identity(exact.size)
-        found[free] -= rows.T @ scipy.sparse.linalg.spsolve(normal.tocsc(), missing)
+        # Equations may depend on each other: then, and only then, does the shift matter. They may
+        # nearly do so on a fine mesh, so that their normal equations would lose all digits.
+        count = rows.shape[1]
+        system = scipy.sparse.bmat(
+            [
+                [scipy.sparse.identity(count), rows.T],
+                [rows, -SHIFT * scipy.sparse.identity(exact.size)],
+            ],
+            format="csc",
+        )
+        right = np.concatenate([np.zeros(count), missing])
+        found[free] -= scipy.sparse.linalg.splu(system).solve(right)[:count]
     return found
 
 

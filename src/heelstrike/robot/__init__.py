@@ -7,8 +7,9 @@ from heelstrike.robot.human import BodyTable, human
 from heelstrike.robot.inspection import Inspection, inspect_robot
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.model import JointProperties, Model
+from heelstrike.robot.named_tree import Foot
 from heelstrike.robot.plausibility import Finding, FindingKind
-from heelstrike.robot.robot import Foot, LockedJoint, Robot
+from heelstrike.robot.robot import LockedJoint, Robot
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.robot.spatial import JointKind, SpatialFoot, SpatialModel, SpatialRobot

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.contact_points import ContactPoint
 from heelstrike.robot.model import NUMBERS, Floats, Model, label
+from heelstrike.robot.named_tree import Foot
 from heelstrike.robot.plausibility import unlikely_numbers
-from heelstrike.robot.robot import Foot, LockedJoint, Robot
+from heelstrike.robot.robot import LockedJoint, Robot
 from heelstrike.robot.sides.averaging import averaged
 from heelstrike.robot.sides.symmetry import find_mirror
 from heelstrike.robot.warning import warn
 from heelstrike.wording import some_of
+
+if TYPE_CHECKING:
+    from heelstrike.robot.spatial.model import SpatialModel
 
 LARGEST_NUMBER = 1e10
 """Largest length, mass, inertia … of a robot in SI units; MuJoCo's own bound on a state."""
@@ -125,7 +130,26 @@ def find_feet(model: Model, names: tuple[str, ...], origin: Floats) -> tuple[Foo
         return ()
     center = model.mass @ (origin + model.center_of_mass) / model.mass.sum()
     bottom = (origin[model.contact_link] + model.contact_position)[:, 1] - model.contact_radius
-    low = bottom.min() + 0.5 * max(0.0, float(center[1] - bottom.min()))
+    return low_leaves(model, names, bottom, float(center[1]))
+
+
+def low_leaves(
+    model: Model | SpatialModel, names: tuple[str, ...], bottom: Floats, height: float
+) -> tuple[Foot, ...]:
+    """Return the leaves that are as low as feet; see :func:`find_feet`.
+
+    Parameters
+    ----------
+    model : Model or SpatialModel
+        The robot's arrays.
+    names : tuple of str
+        Name of every link.
+    bottom : (nc,) float
+        Height of the lowest point of every contact in the reference configuration (m).
+    height : float
+        That of the centre of mass.
+    """
+    low = bottom.min() + 0.5 * max(0.0, height - float(bottom.min()))
     leaves = np.setdiff1d(model.contact_link, model.parent).tolist()
     contacts = {link: np.flatnonzero(model.contact_link == link) for link in leaves}
     return tuple(

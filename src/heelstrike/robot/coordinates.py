@@ -15,14 +15,14 @@ from heelstrike.robot.state import State
 from heelstrike.wording import meant
 
 if TYPE_CHECKING:
-    from heelstrike.robot.counted import Counted
+    from heelstrike.robot.named_tree import NamedTree
     from heelstrike.robot.robot import Robot
 
 Spread = float | Mapping[str | int, float]
 """One standard deviation for all coordinates, or one for each that is named."""
 
 
-def index_of(robot: Counted, what: str, names: tuple[str, ...], given: str | int) -> int:
+def index_of(robot: NamedTree, what: str, names: tuple[str, ...], given: str | int) -> int:
     """Return the index of something of a robot, given by its name or index.
 
     Raises
@@ -47,7 +47,7 @@ def index_of(robot: Counted, what: str, names: tuple[str, ...], given: str | int
     )
 
 
-def checked(robot: Robot, state: State) -> State:
+def checked(robot: NamedTree, state: State) -> State:
     """Return a copy of a state that fits a robot.
 
     Raises
@@ -59,9 +59,10 @@ def checked(robot: Robot, state: State) -> State:
         raise RobotError(refusal("state", state, ["State"]))
     for what, vector, size in (("q", state.q, robot.nq), ("v", state.v, robot.nv)):
         if vector.shape != (size,) or not np.all(np.isfinite(vector)):
+            names = robot.position_names if what == "q" else robot.velocity_names
             raise RobotError(
                 f"{what} of a state of robot {robot.name!r} must be {size} finite numbers "
-                f"({', '.join(robot.joint_names)}), got {vector!r}."
+                f"({', '.join(names)}), got {vector!r}."
             )
     return State(state.q, state.v)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Unpack
@@ -28,14 +28,15 @@ from heelstrike.robot.library import (
     load_robot,
 )
 from heelstrike.robot.loops import coupling_words, latch_words
-from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats, Integers, label
+from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats, Integers, Number, label
+from heelstrike.robot.named_tree import Foot, NamedTree
 from heelstrike.robot.plausibility import (
     Finding,
     FindingKind,
     is_possible,
     unlikely_numbers,
 )
-from heelstrike.robot.robot import Foot, Robot
+from heelstrike.robot.robot import Robot
 from heelstrike.robot.sides.symmetry import find_mirror
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.warning import RobotWarning
@@ -477,13 +478,6 @@ def facts(inspection: Inspection) -> dict[str, Any]:
         from heelstrike.robot.spatial.inspection import spatial_facts
 
         return result | spatial_facts(robot)
-    model = robot.model
-
-    of_joints = {
-        name: [value if math.isfinite(value) else None for value in getattr(model, name).tolist()]
-        for name, number in NUMBERS.items()
-        if number.shape in (("nq",), ("nv",), ("nu",)) and number.kind is float
-    }
     return {
         **result,
         "name": robot.name,
@@ -491,6 +485,21 @@ def facts(inspection: Inspection) -> dict[str, Any]:
         "floating": robot.floating,
         "symmetric": robot.mirror is not None,
         "coordinates": list(robot.joint_names),
+        **facts_of_parts(robot),
+        "locked": [asdict(one) for one in robot.locked],
+        "loops": list(robot.loop_names),
+        "couplings": [coupling_words(robot, k) for k in range(robot.model.couplings)],
+        "latches": [latch_words(robot, k) for k in range(robot.model.latches)],
+        "brakes": list(robot.brake_names),
+        "brake_limits": _finite_or_none(robot.model.brake_limit),
+        **facts_of_joints(robot, NUMBERS),
+    }
+
+
+def facts_of_parts(robot: NamedTree) -> dict[str, Any]:
+    """Return the links, actuators, contact points and feet of a robot, for JSON."""
+    model = robot.model
+    return {
         "links": list(robot.link_names),
         "parent": model.parent.tolist(),
         "link_mass_kg": model.mass.tolist(),
@@ -500,11 +509,17 @@ def facts(inspection: Inspection) -> dict[str, Any]:
         "contact_points": list(robot.contact_names),
         **{name: getattr(model, name).tolist() for name in SCALES},
         "feet": [foot.name for foot in robot.feet],
-        "locked": [asdict(one) for one in robot.locked],
-        "loops": list(robot.loop_names),
-        "couplings": [coupling_words(robot, k) for k in range(robot.model.couplings)],
-        "latches": [latch_words(robot, k) for k in range(robot.model.latches)],
-        "brakes": list(robot.brake_names),
-        "brake_limits": [x if math.isfinite(x) else None for x in model.brake_limit.tolist()],
-        **of_joints,
     }
+
+
+def facts_of_joints(robot: NamedTree, numbers: Mapping[str, Number]) -> dict[str, Any]:
+    """Return the numbers of the joints of a robot, for JSON. Infinity becomes None."""
+    return {
+        name: _finite_or_none(getattr(robot.model, name))
+        for name, number in numbers.items()
+        if number.shape in (("nq",), ("nv",), ("nu",), ("nj",)) and number.kind is float
+    }
+
+
+def _finite_or_none(values: Floats) -> list[float | None]:
+    return [value if math.isfinite(value) else None for value in values.tolist()]

@@ -14,27 +14,15 @@ from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
-from heelstrike.robot.coordinates import Spread, checked, finite, index_of, spread_of
-from heelstrike.robot.counted import Counted
-from heelstrike.robot.model import Model
+from heelstrike.robot.coordinates import Spread, checked, finite, spread_of
+from heelstrike.robot.model import Integers, Model
+from heelstrike.robot.named_tree import NamedTree
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.robot.state import State
 
 if TYPE_CHECKING:
     from heelstrike.contact.ground import Ground
-
-
-@dataclass(frozen=True)
-class Foot:
-    """A link that ends a leg and carries contact points."""
-
-    name: str
-    """Name of the foot's body in the robot file."""
-    link: int
-    """Index of the foot's link."""
-    contacts: tuple[int, ...]
-    """Indices of its contact points, ordered from heel to toe."""
 
 
 @dataclass(frozen=True)
@@ -55,23 +43,11 @@ class LockedJoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Robot(Counted, ShownInNotebooks):
+class Robot(NamedTree, ShownInNotebooks):
     """A planar robot."""
 
-    name: str
-    """Name of the robot."""
     model: Model
     """The arrays that the kernels use."""
-    joint_names: tuple[str, ...]
-    link_names: tuple[str, ...]
-    """joint_names, link_names: Names of the nv coordinates and of the links they move. A body with
-    several joints gives several links that share its name."""
-    actuator_names: tuple[str, ...]
-    """Names of the nu actuators."""
-    contact_names: tuple[str, ...]
-    """Names of the nc contact points."""
-    feet: tuple[Foot, ...]
-    """Links that end a leg and carry contact points, in file order."""
     mirror: Mirror | None
     """Exchange of left and right, or None for a robot that is not symmetric."""
     floating: bool
@@ -119,25 +95,10 @@ class Robot(Counted, ShownInNotebooks):
         """Total mass times gravity, in N."""
         return self.total_mass * float(np.hypot(*self.model.gravity))
 
-    def joint_index(self, joint: str | int) -> int:
-        """Index of a coordinate, given by the name of its joint (or by an index, which is checked).
-
-        Parameters
-        ----------
-        joint : str or int
-            Name of the joint, or an index.
-
-        Returns
-        -------
-        int
-            Its place in q and v.
-
-        Raises
-        ------
-        RobotError
-            If there is no such joint; the message lists those there are.
-        """
-        return index_of(self, "joint", self.joint_names, joint)
+    @property
+    def driven(self) -> Integers:
+        """Index of the velocity that each actuator drives, (nu,)."""
+        return self.model.actuator_joint
 
     @takes(RobotError)
     def state(
@@ -186,36 +147,6 @@ class Robot(Counted, ShownInNotebooks):
                 index = self.joint_index(joint)
                 vector[index] = finite(self, what, self.joint_names[index], value)
         return state
-
-    def positions(self, state: State) -> dict[str, float]:
-        """Positions of a state by the names of the joints, in rad and m.
-
-        Parameters
-        ----------
-        state : State
-            The state.
-
-        Returns
-        -------
-        dict
-            Position by name of the joint.
-        """
-        return dict(zip(self.joint_names, checked(self, state).q.tolist(), strict=True))
-
-    def velocities(self, state: State) -> dict[str, float]:
-        """Velocities of a state by the names of the joints, in rad/s and m/s.
-
-        Parameters
-        ----------
-        state : State
-            The state.
-
-        Returns
-        -------
-        dict
-            Velocity by name of the joint.
-        """
-        return dict(zip(self.joint_names, checked(self, state).v.tolist(), strict=True))
 
     def mirrored(self, state: State) -> State:
         """Return a state with left and right exchanged.
@@ -452,10 +383,10 @@ class Robot(Counted, ShownInNotebooks):
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the robot to a file: MJCF (``.xml``) holds all of it, URDF and SDF most.
 
-        What is read back has the same dynamics, on the same coordinates. URDF (``.urdf``) cannot
-        hold springs, armature of joints without a motor, and torque limits that differ between the
-        two senses; SDF (``.sdf``) cannot hold the last. The zero configuration of either becomes
-        the robot's reference.
+        What is read back has the same dynamics, on the same coordinates. URDF (``.urdf``) and SDF
+        (``.sdf``) cannot hold speed-torque lines and torque limits that differ between the two
+        senses; URDF cannot hold springs and armature of joints without a motor either. The zero
+        configuration of either becomes the robot's reference.
 
         Parameters
         ----------

@@ -6,7 +6,8 @@ import numpy as np
 
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
-from heelstrike.robot.robot import Foot, Robot
+from heelstrike.robot.named_tree import Foot
+from heelstrike.robot.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)

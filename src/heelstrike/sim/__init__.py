@@ -16,7 +16,8 @@ from heelstrike.dynamics.places import point_bias as point_bias
 from heelstrike.dynamics.places import point_velocity as point_velocity
 from heelstrike.dynamics.queries.evaluation import link_index as link_index
 from heelstrike.sim.batch.batch import Batch
-from heelstrike.sim.batch.runs import BatchResult, simulate_batch
+from heelstrike.sim.batch.result import BatchResult
+from heelstrike.sim.batch.runs import simulate_batch
 from heelstrike.sim.clock import Clock as Clock
 from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus, Scheme
 from heelstrike.sim.compliant import Compliant

@@ -13,7 +13,7 @@ class Clock(Bundle):
     time: float = cell(float)
     """Time now (s)."""
     index: int = cell(int)
-    """Steps begun since `start`."""
+    """Steps completed since `start`."""
     until: float = cell(float)
     """Time at which the loop comes back (s)."""
     pause: int = cell(int)

@@ -66,6 +66,8 @@ class Dimension(ABC):
     run: ClassVar[type[AnyRun]]
     quantities: ClassVar[Mapping[str, Quantity]]
     """run, quantities: Class of its runs, and what they record."""
+    batch_result: ClassVar[Any]
+    """Class of what many simulations came to; its fields are what is counted of each."""
     record: ClassVar[Any]
     """Class of its records."""
     certificates: ClassVar[type]

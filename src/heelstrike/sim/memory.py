@@ -102,7 +102,7 @@ class Surface(Bundle):
     """friction, restitution: Of contact points and their second faces; of joint stops zero, of
     constraints their own, and friction 1 of dry joints and what else rubs. Numbered by the table of
     rows."""
-    bend: Floats = array("nc")
+    curvature: Floats = array("nc")
     """Curvature (1/m) of the way along the ground of the centre of each contact point's disc,
     positive over a hill: zero but on smooth ground."""
 
@@ -182,7 +182,7 @@ class Loops(Bundle):
     loop_force: Floats = array("loops", "axes")
     coupling_force: Floats = array("couplings")
     """Forces of the last solve."""
-    lean: Floats = array("loops", "axes")
+    multiple: Floats = array("loops", "axes")
     """What a row of each loop is of the other, where both say the same; see
     :func:`heelstrike.sim.contacts.loops.leave_one`."""
     entry: Integers = array("loop_rows", of=int)
@@ -254,7 +254,7 @@ class Memory(Bundle):
     """Equations of motion of the state now."""
     contacts: Contacts = part(Contacts)
     """Contact points now; their forces are those of the last solve."""
-    seconds: Contacts = part(Contacts)
+    second_faces: Contacts = part(Contacts)
     """The same points on their second faces, in concave corners."""
     surface: Surface = part(Surface, flat=True)
     """The ground under them."""
@@ -319,7 +319,7 @@ def _laid_out(robot: Robot) -> Memory:
         rows=rows,
         equations=Equations.allocate(extents, programs=programs),
         contacts=_contacts_of(POINT, rows, extents),
-        seconds=_contacts_of(SECOND_FACE, rows, extents),
+        second_faces=_contacts_of(SECOND_FACE, rows, extents),
         assembly=assembly,
         solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
         usual=UsualPoints.allocate(

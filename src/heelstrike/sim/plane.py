@@ -18,6 +18,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.sim.batch.result import BatchResult
 from heelstrike.sim.contacts.brakes import braked_joints, brakes_of, brakes_on, put_on
 from heelstrike.sim.contacts.latches import latches_at, latches_of
 from heelstrike.sim.contacts.loops import HOLDS, PUT_ON
@@ -40,6 +41,7 @@ class Plane(Dimension):
     flat = Ground()
     run = Run
     quantities = QUANTITIES
+    batch_result = BatchResult
     record = Record
     certificates = Certificates
     compiles_meanwhile = True

@@ -9,7 +9,7 @@ from heelstrike.analysis.friction import friction_coefficient, friction_use
 from heelstrike.analysis.support import foot_sums, pushing_feet
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
 from heelstrike.errors import ViewError
-from heelstrike.robot.robot import Foot
+from heelstrike.robot.named_tree import Foot
 from heelstrike.sim.run import Run
 from heelstrike.view.panels import (
     NOTE,

@@ -26,6 +26,7 @@ from heelstrike.dynamics import LinkPoses, link_poses
 from heelstrike.errors import ViewError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.named_tree import legs
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import are_around
 from heelstrike.robot.spatial.robot import SpatialRobot
@@ -274,21 +275,6 @@ def _disc(center: Floats, radius: float) -> list[tuple[Floats, Floats]]:
     turn = np.linspace(0.0, 2.0 * np.pi, DISC_CORNERS + 1)
     rim = center + radius * np.column_stack((np.cos(turn), np.sin(turn)))
     return list(pairwise(rim))
-
-
-def legs(robot: Robot) -> Integers:
-    """Index of the foot whose leg each link belongs to, -1 if it carries none or several."""
-    carried: list[set[int]] = [set() for _ in range(robot.nv)]
-    for index, foot in enumerate(robot.feet):
-        link = foot.link
-        while link >= 0:
-            carried[link].add(index)
-            link = int(robot.model.parent[link])
-    several = len(robot.feet) > 1
-    return np.array(
-        [next(iter(feet)) if several and len(feet) == 1 else -1 for feet in carried],
-        dtype=np.int64,
-    )
 
 
 def leg_labels(robot: Robot) -> list[tuple[str, str]]:

@@ -1,16 +1,8 @@
-"""The picture of a run at one instant, redrawn frame by frame on a single canvas.
-
-Only what moves is drawn again: the canvas is wiped with a copy of its background, and a handful of
-artists whose data change are drawn over it.
-"""
+"""The picture of a run at one instant, redrawn frame by frame on a single canvas."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -21,18 +13,17 @@ from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows, draw_scale
+from heelstrike.view.canvas import Canvas
 from heelstrike.view.drawing import body, extent, leg_labels
 from heelstrike.view.milestones import Milestones
 from heelstrike.view.style import (
     FORCE_COLOR,
     GREY,
-    INK,
     ORANGE,
     PALE,
     ZERO_MOMENT_POINT_COLOR,
 )
 
-DPI = 100
 FOLLOWS_WITHIN = 0.6
 """Seconds over which the camera evens out the motion of the centre of mass."""
 
@@ -117,11 +108,8 @@ class Film:
         self.size = size
         self._ground = run.ground
         self._camera = self._follow(1.0 / fps * speed)
-        scale = min(size) / 540.0
-        figure = Figure(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI)
-        self._canvas = FigureCanvasAgg(figure)
-        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        axes.set_axis_off()
+        self._canvas = canvas = Canvas(size, speed)
+        axes, scale, font = canvas.axes, canvas.scale, canvas.font
         self._frame_view(size)
         axes.set(xlim=self._x, ylim=self._z)
         self._body = body(run.robot)
@@ -132,7 +120,6 @@ class Film:
         for collection in (self._marks, self._robot):
             axes.add_collection(collection, autolim=False)
         self._arrows = Arrows(axes, self._size, run.robot.weight, width=2.5 * scale)
-        font = 11.0 * scale
         if run.robot.nc:
             place = np.array([0.9 * self._x[0] + 0.1 * self._x[1], 0.45 * self._z[1]])
             weight = run.robot.weight
@@ -141,29 +128,13 @@ class Film:
             [], [], "D", color=ZERO_MOMENT_POINT_COLOR, mec="white", ms=9.0 * scale
         )
         (self._center,) = axes.plot([], [], "o", color=ORANGE, mec="white", ms=7.0 * scale)
-        self._clock = axes.text(
-            0.02, 0.97, "", transform=axes.transAxes, va="top", fontsize=1.3 * font, color=INK
-        )
         self._metres = Milestones(0.9 * font)
         axes.add_artist(self._metres)
-        self._speed = "" if speed == 1.0 else f"   (speed × {speed:g})"
-        self._legend(figure, run, font)
-        self._moving: list[Artist] = [
-            self._soil,
-            self._marks,
-            self._metres,
-            self._robot,
-            self._arrows.shafts,
-            self._arrows.heads,
-            self._center,
-            self._pressure,
-            self._clock,
-        ]
-        for artist in self._moving:
-            artist.set_animated(True)
-        canvas: Any = self._canvas  # matplotlib leaves these without types
-        canvas.draw()
-        self._background = canvas.copy_from_bbox(figure.bbox)
+        self._legend(canvas.figure, run, font)
+        canvas.begin([
+            self._soil, self._marks, self._metres, self._robot, self._arrows.shafts,
+            self._arrows.heads, self._center, self._pressure,
+        ])  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.frames.time)
@@ -171,8 +142,6 @@ class Film:
     def draw(self, index: int) -> memoryview:
         """Draw a frame; return its pixels, four bytes each, valid until the next one."""
         frames, camera = self.frames, self._camera[index]
-        canvas: Any = self._canvas
-        canvas.restore_region(self._background)
         self._draw_ground(camera)
         self._body.move(self._robot, frames.segments[index] - camera)
         self._arrows.show(frames.point[index] - camera, frames.force[index])
@@ -181,11 +150,7 @@ class Film:
             (self._center, frames.center[index] - camera),
         ):
             marker.set_data(place[:1], place[1:])
-        self._clock.set_text(f"t = {frames.time[index]:.2f} s{self._speed}")
-        renderer = canvas.get_renderer()
-        for artist in self._moving:
-            artist.draw(renderer)
-        return memoryview(canvas.buffer_rgba())
+        return self._canvas.drawn(frames.time[index])
 
     def _follow(self, interval: float) -> Floats:
         """Place of the camera in the world, (nf, 2): on the ground, ahead with the robot."""

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from heelstrike.analysis.tracking import reference_motion
 from heelstrike.errors import ViewError
-from heelstrike.view.drawing import legs
+from heelstrike.robot.named_tree import legs
 from heelstrike.view.panels import Curve, Excerpt, Panel, draw_panels
 from heelstrike.view.style import INK, foot_color, in_words
 

@@ -24,7 +24,7 @@ import walking
 from scipy import stats
 
 import heelstrike as hs
-from heelstrike.experiments.campaigns import Draw, Outcome, Share
+from heelstrike.experiments.campaigns import Draw, Outcome, Share, sending
 from heelstrike.experiments.campaigns import campaign as module
 from heelstrike.experiments.campaigns import trials as trials_module
 from heelstrike.experiments.campaigns.store import COLUMNS, DATABASE, Store
@@ -228,7 +228,8 @@ def counted(monkeypatch: pytest.MonkeyPatch, most: int = 10**9) -> list[int]:
         seen.extend(block.numbers)
         return run_block(block, *stopped)
 
-    monkeypatch.setattr(module, "run_block", run)
+    for each in (module, sending):  # own threads, and others
+        monkeypatch.setattr(each, "run_block", run)
     return seen
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import pickle
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,8 @@ from scipy import stats
 
 import heelstrike as hs
 from heelstrike.errors import SimulationError
-from heelstrike.experiments.campaigns import Draw
-from heelstrike.experiments.campaigns.workers import dask_client, is_death
+from heelstrike.experiments.campaigns import Draw, sending
+from heelstrike.experiments.campaigns.workers import dask_client, is_death, process_pool
 
 FRICTION = {"ground.friction": stats.uniform(0.2, 0.6), "state.v.root_x": stats.norm(0.0, 0.3)}
 
@@ -178,6 +178,75 @@ def test_a_scheduler_that_is_gone_before_a_result_ends_it_in_words() -> None:
 
     with pytest.raises(SimulationError, match="any more: the scheduler is gone"):
         made(2).run(executor=Lost())
+
+
+class Jams:
+    """A controller whose link to something breaks when the robot moves forward."""
+
+    def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+        if state.v[0] > 0.0:
+            raise ConnectionError("the motors do not answer")
+        return np.zeros(6)
+
+
+def test_an_oserror_of_a_trial_is_its_outcome_and_no_loss_of_workers() -> None:
+    trial = replace(cases.limp(), controller=Jams())
+    speeds = {"state.v.root_x": [-0.5, 0.5, 0.0]}
+    campaign = hs.Campaign(trial, speeds, draw=Draw.GRID)
+    results = campaign.run(executor=Client())
+    assert as_text(results) == as_text(campaign.run(workers=1))
+    assert [each.status for each in results.outcomes].count("controller_failed") >= 1
+    assert "the motors do not answer" in results.outcomes[1].message
+
+
+class Reads:
+    """A controller that reads a file where it is unpickled, which only this machine has."""
+
+    def __init__(self) -> None:
+        self.file = "policy.npz"
+
+    def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+        return np.zeros(6)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        raise FileNotFoundError(2, "No such file or directory", state["file"])
+
+
+@pytest.mark.parametrize(
+    "executor", [Client(), pytest.param(process_pool(1), marks=pytest.mark.slow)]
+)
+def test_what_a_worker_cannot_read_is_no_loss_of_workers_and_no_crash_of_trials(
+    tmp_path: Path, executor: Any
+) -> None:
+    """It is told as it is, nothing is kept of it, and the same folder goes on without it."""
+    trial = replace(cases.limp(), controller=Reads())
+    campaign = hs.Campaign(trial, FRICTION, 40, 3)
+    with pytest.raises(SimulationError, match="worker cannot read the trials: FileNotFound") as at:
+        campaign.run(tmp_path, executor=executor)
+    assert "policy.npz" in str(at.value)
+    assert "nobody works" not in str(at.value)
+    assert len(campaign.load(tmp_path)) == 0
+    assert len(campaign.run(tmp_path, workers=1)) == 40
+
+
+def test_trials_that_cannot_be_sent_are_refused() -> None:
+    class Local:
+        def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+            return np.zeros(6)
+
+        def __reduce__(self) -> Any:
+            raise OSError("a device")
+
+    trial = replace(cases.limp(), controller=Local())
+    with pytest.raises(SimulationError, match="cannot be sent to workers: OSError: a device"):
+        hs.Campaign(trial, FRICTION, 2, 3).run(executor=Client())
+
+
+def test_workers_read_the_trials_once() -> None:
+    """Of several blocks, though each brings their bytes: a robot that is the same is known."""
+    sending._read.cache_clear()
+    made().run(executor=Client())
+    assert (sending._read.cache_info().misses, sending._read.cache_info().hits) == (1, 2)
 
 
 def test_what_is_no_death_ends_the_campaign() -> None:

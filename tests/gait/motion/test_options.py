@@ -110,6 +110,41 @@ def test_a_constraint_of_ones_own(bravo7: hs.Robot, flat: hs.Motion) -> None:
     assert lifted.cost > flat.cost
 
 
+def test_what_a_given_state_misses_is_mended(bravo7: hs.Robot) -> None:
+    """By less than 1e-6 it is put on the ground, to rounding: else the motion could not close."""
+    from heelstrike.gait.motion.optimize import settled
+    from heelstrike.gait.motion.phases import standing
+
+    rng, along = np.random.default_rng(3), np.array([np.cos(0.1), np.sin(0.1)])
+    state = bravo7.reference_state()
+    q = state.q + 1e-7 * rng.standard_normal(bravo7.nv)
+    q[:2] -= dynamics.contact_positions(bravo7, q)[:2].mean(axis=0)
+    q[2] -= 0.1
+    q[:2] -= dynamics.contact_positions(bravo7, q)[:2].mean(axis=0)
+    foot = list(bravo7.feet[0].contacts)
+    stands = standing(bravo7, foot)
+    given = hs.State(q, 1e-7 * rng.standard_normal(bravo7.nv))
+    found = settled(bravo7, given, stands, along, {foot[0]: -0.1})
+    places = dynamics.contact_positions(bravo7, found.q)[foot]
+    np.testing.assert_allclose(places @ [-along[1], along[0]], 0.0, atol=1e-14)
+    assert places[0] @ along == pytest.approx(-0.1, abs=1e-14)
+    after = dynamics.contact_positions(bravo7, found.q + 1e-3 * found.v)[foot]
+    np.testing.assert_allclose(after, places, atol=1e-15)
+    assert np.abs(found.q - q).max() < 1e-5
+
+
+def test_a_loop_to_the_world_is_refused() -> None:
+    build = hs.RobotBuilder("tied")
+    trunk = build.floating_base("trunk", (0.0, 1.0), mass=1.0, inertia=0.1)
+    foot = build.hinge("hip", trunk, mass=1.0, inertia=0.1, torque=10.0)
+    build.contact(foot, (0.0, -1.0))
+    build.loop(foot, None, at=(0.0, -1.0))
+    with pytest.raises(GaitError, match="a closed loop ties it to the world"):
+        hs.optimize_motion(
+            build.build(), [hs.ContactPhase("hip")], repeat="same", distance=0.1, duration=0.5
+        )
+
+
 @pytest.mark.parametrize(
     ("constraint", "said"),
     [

@@ -107,11 +107,11 @@ def test_places_of_points_on_both_faces_are_those_of_the_table() -> None:
     rows = memory.rows
     assert np.isposinf(rows.gap).all()
     memory.contacts.gap[:] = 1.0, 2.0
-    memory.seconds.gap[:] = 3.0, 4.0
+    memory.second_faces.gap[:] = 3.0, 4.0
     np.testing.assert_array_equal(rows.gap[entries(POINT)], [1.0, 2.0])
     np.testing.assert_array_equal(rows.gap[entries(SECOND_FACE)], [3.0, 4.0])
     for name in ("position", "normal"):
-        first, second = getattr(memory.contacts, name), getattr(memory.seconds, name)
+        first, second = getattr(memory.contacts, name), getattr(memory.second_faces, name)
         first[:], second[:] = np.eye(2), -np.eye(2)
         np.testing.assert_array_equal(getattr(rows, name)[entries(POINT)], np.eye(2))
         np.testing.assert_array_equal(getattr(rows, name)[entries(SECOND_FACE)], -np.eye(2))

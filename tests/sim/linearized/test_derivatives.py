@@ -228,6 +228,45 @@ def test_a_law_that_answers_closes_the_loop() -> None:
         assert error <= ENOUGH
 
 
+@pytest.mark.parametrize("late", [1, 2, 3])
+def test_a_run_that_begins_between_two_calls_loses_no_answer(late: int) -> None:
+    """Derivatives of its intervals, multiplied, are those of the closed loop as differences see it.
+
+    The law is asked every third step. An interval that ended between two calls would leave what was
+    answered in it to act in the next, where nothing told of it.
+    """
+    built, gait = walking.bravo7(), walking.gait()
+    simulation = hs.Simulation(
+        built, hs.ComputedTorque(built, gait), state=gait.initial_state,
+        method=hs.TimeStepping(step=1e-3), control_period=3e-3,
+    )  # fmt: skip
+    simulation.advance(0.3 + 1e-3 * late)
+    begin, n, until = simulation.snapshot(), built.nq, 0.3 + 1e-3 * late + 0.01
+
+    def after(change: Floats) -> Floats:
+        moved = hs.State(begin.state.q, begin.state.v + change)
+        simulation.restore(begin.moved(moved))
+        simulation.advance(until)
+        return simulation.state.vector
+
+    seen = differences(after, np.eye(n), np.full(n, 1e-5), [True] * n)
+    for every in (None, 6e-3):
+        simulation.restore(begin)
+        run = hs.run_derivatives(simulation, until, every=every)
+        first = 3e-3 - 1e-3 * (late % 3)
+        second = first + (every or 3e-3)
+        if late % 3 == 0:
+            first = every or 3e-3
+            second = 2.0 * first
+        ends = [each.end - begin.time for each in run.steps]
+        assert ends[:2] == pytest.approx([first, min(second, 0.01)], abs=1e-12)
+        assert ends[-1] == pytest.approx(0.01, abs=1e-12)
+        told = np.linalg.multi_dot([each.state for each in run.steps[::-1]])[:, n:]
+        for rows in (slice(0, n), slice(n, None)):
+            error = np.linalg.norm(told[rows] - seen[rows]) / np.linalg.norm(seen[rows])
+            assert error <= ENOUGH
+
+
 def test_a_point_that_bounces_within_a_step_leaves_with_a_part_of_its_speed() -> None:
     """v⁺ = −e v, wherever it was; positions arrive on the ground, whatever the speed."""
     robot, nq = mechanisms.point(), mechanisms.point().nq

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heelstrike.analysis.actuation import actuator_power, cost_of_transport, driven
+from heelstrike.analysis.actuation import actuator_power, cost_of_transport
 from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.slip import max_slip
@@ -76,7 +76,7 @@ def motor_loads(run: AnyRun) -> tuple[MotorLoad, ...]:
     held = np.diff(run.time)
     duration = max(float(held.sum()), np.finfo(float).tiny)
     power, square = actuator_power(run), mean_over_intervals(run, run.torque**2)
-    speed = run.velocity[:, driven(run)]
+    speed = run.velocity[:, run.robot.driven]
     return tuple(
         MotorLoad(
             name,

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import enum
 
+from heelstrike.contact.modes import Coded
+
 OPEN, STICK, SLIP = range(3)
 
 LAST_MODES, NEWTON, GAUSS_SEIDEL, REGULARISED, PROXIMAL, RESTARTS = range(6)
@@ -26,7 +28,7 @@ class SpatialContactMode(enum.IntEnum):
     SLIP = SLIP
 
 
-class SpatialSolver(enum.Enum):
+class SpatialSolver(Coded):
     """The ways to solve a contact problem in space, in the order in which they are tried.
 
     ``LAST_MODES``
@@ -49,22 +51,6 @@ class SpatialSolver(enum.Enum):
     REGULARISED = "regularised"
     PROXIMAL = "proximal"
     RESTARTS = "restarts"
-
-    @classmethod
-    def from_code(cls, code: int) -> SpatialSolver:
-        """Return the way that kernels know by this integer.
-
-        Parameters
-        ----------
-        code : int
-            The integer.
-
-        Returns
-        -------
-        SpatialSolver
-            The way to solve.
-        """
-        return list(cls)[int(code)]
 
 
 class SpatialStatus(enum.IntEnum):

@@ -16,7 +16,8 @@ from heelstrike.dynamics.inverse_kinematics import leg_joints
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Footing, Gait
 from heelstrike.robot.loops import refuse_loops
-from heelstrike.robot.robot import Foot, Robot
+from heelstrike.robot.named_tree import Foot
+from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import sole
 from heelstrike.sim.controller.law import Law
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.dynamics.inverse_kinematics import MISSED, Reaching, leg_joints, reach
-from heelstrike.dynamics.queries.evaluation import joint_vector, plane_vector
+from heelstrike.dynamics.queries.evaluation import joint_vector, place_vector
 from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.coordinates import index_of
@@ -93,8 +93,9 @@ def inverse_kinematics(
     if local is None:
         local = sole(robot, robot.feet[index]).ends.mean(axis=0)
     answer = joint_vector(robot, "q", q).copy()
+    point = place_vector("local", local, "xz")
     residual = reach(
-        robot.model, np.array(joints), robot.feet[index].link, plane_vector("local", local), pose,
+        robot.model, np.array(joints), robot.feet[index].link, point, pose,
         Reaching.allocate(robot.model.extents), answer,
     )  # fmt: skip
     return LegPose(answer, float(residual))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, overload
 
@@ -109,7 +109,7 @@ def linearize(
     gamma = joint_vector(robot, "torque", torque)
     n, k = robot.nv, 2 * len(held)
     solution, by_state, by_torque = implicit_motion(
-        *_equations(robot, held), position, velocity, gamma
+        *_equations(robot, held), (position, velocity), gamma
     )
     upper = np.hstack([np.zeros((n, n)), np.eye(n)])
     return Linearization(
@@ -123,31 +123,35 @@ def linearize(
 
 
 def implicit_motion(
-    equations: casadi.Function, derivatives: casadi.Function, q: Floats, v: Floats, torque: Floats
-) -> tuple[Floats, Floats, Floats]:
+    equations: casadi.Function, derivatives: casadi.Function, state: tuple[Floats, ...],
+    torque: Floats,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
     """Solve equations of motion for accelerations and forces, and differentiate what they tell.
 
     Parameters
     ----------
     equations : casadi.Function
-        What must vanish, of (q, v, (v̇, λ), Γ).
+        What must vanish, of the state, (v̇, λ) and Γ.
     derivatives : casadi.Function
-        Its Jacobians by (v̇, λ), (q, v) and Γ.
-    q, v, torque : (nq,), (nv,) and (nu,) float
+        Its Jacobians by (v̇, λ), the state and Γ.
+    state : tuple of float arrays
+        The state, (q, v) say; its last part is the velocity.
+    torque : (nu,) float
+        Γ.
 
     Returns
     -------
     tuple of float arrays
-        (v̇, λ), and its derivatives by (q, v) and Γ.
+        (v̇, λ), and its derivatives by the state and Γ.
     """
-    nothing = np.zeros(equations.size1_in(2))
-    system = np.array(derivatives(q, v, nothing, torque)[0])
-    constant = np.array(equations(q, v, nothing, torque)).reshape(-1, 1)
-    solution = solved(system, -constant, len(v))[:, 0]
-    slopes = [np.array(part) for part in derivatives(q, v, solution, torque)]
+    n, nothing = len(state[-1]), np.zeros(equations.size1_in(len(state)))
+    system = np.array(derivatives(*state, nothing, torque)[0])
+    constant = np.array(equations(*state, nothing, torque)).reshape(-1, 1)
+    solution = solved(system, -constant, n)[:, 0]
+    slopes = [np.array(part) for part in derivatives(*state, solution, torque)]
     # Implicit differentiation: the equations stay satisfied.
-    rates = solved(system, -np.hstack(slopes[1:]), len(v))
-    by_state, by_torque = np.split(rates, [len(q) + len(v)], axis=1)
+    rates = solved(system, -np.hstack(slopes[1:]), n)
+    by_state, by_torque = np.split(rates, [slopes[1].shape[1]], axis=1)
     return solution, by_state, by_torque
 
 
@@ -180,10 +184,16 @@ def _equations(robot: Robot, contacts: tuple[int, ...]) -> tuple[casadi.Function
     equations = CasadiDynamics(robot).contact_equations(contacts)
     pull = [unknown[held:]] if loops else []
     residual = equations(q, v, unknown[: robot.nv], unknown[robot.nv : held], torque, *pull)
-    jacobians = [
-        casadi.densify(casadi.jacobian(residual, x))
-        for x in (unknown, casadi.vertcat(q, v), torque)
-    ]
+    return implicit_functions(arguments, residual, (unknown, casadi.vertcat(q, v), torque))
+
+
+def implicit_functions(
+    arguments: Sequence[casadi.SX], residual: casadi.SX, by: Sequence[casadi.SX]
+) -> tuple[casadi.Function, casadi.Function]:
+    """Return what must vanish as a function of its arguments, and its Jacobians by others."""
+    import casadi
+
+    jacobians = [casadi.densify(casadi.jacobian(residual, each)) for each in by]
     return (
         casadi.Function("equations", arguments, [residual]),
         casadi.Function("derivatives", arguments, jacobians),

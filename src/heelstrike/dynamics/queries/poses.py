@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.dynamics import kernels
-from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.dynamics.queries.evaluation import AnyEvaluation, Evaluation
 from heelstrike.dynamics.queries.query import of_position, of_state
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
@@ -61,13 +60,13 @@ def link_velocities(at: Evaluation) -> LinkVelocities:
 
 
 @of_state("(nq,) float: In m and rad.")
-def integrate(at: Evaluation, time: float) -> Floats:
+def integrate(at: AnyEvaluation, time: float) -> Floats:
     """Position after a time at a constant velocity."""
-    return at.filled(at.q.shape, kernels.integrate, at.model, at.q, at.v, time)
+    return at.filled(at.q.shape, at.kernels.integrate, at.model, at.q, at.v, float(time))
 
 
 @of_position("(nv,) float: In m and rad, in a unit of time.")
-def difference(at: Evaluation, end: ArrayLike) -> Floats:
-    """Velocity that takes a position to another, `end`, in a unit of time."""
-    to = at.vector("end", end)
-    return at.filled((at.model.nv,), kernels.difference, at.model, at.q, to)
+def difference(at: AnyEvaluation, end: ArrayLike) -> Floats:
+    """Velocity that takes a position to another, `end`, in a unit of time, the shortest way."""
+    to = at.position("end", end)
+    return at.filled((at.model.nv,), at.kernels.difference, at.model, at.q, to)

@@ -1,42 +1,43 @@
 """Queries: what can be asked of a robot in a state, each written once for numbers and symbols.
 
-A query is a function of an :class:`~heelstrike.dynamics.queries.evaluation.Evaluation`. The
-decorators here make the function of (robot, q, …) of it that people call, with its documentation,
-which hands a robot in space on to the query of that name in :mod:`heelstrike.dynamics.spatial`; its
-``at`` is the query itself, which :mod:`heelstrike.dynamics.queries.symbolic` and
+A query is a function of an :class:`~heelstrike.dynamics.queries.evaluation.AnyEvaluation`. The
+decorators here make the function of (robot, q, …) of it that people call, with its documentation.
+What its first argument is annotated with says of which robots it is asked: of all, or of those of
+the plane or of space alone. A query that is another in space gets a second function there, by
+``in_space``; as :func:`functools.singledispatch` does, the class of the evaluation chooses. Its
+``at`` is that choice, which :mod:`heelstrike.dynamics.queries.symbolic` and
 :mod:`heelstrike.dynamics.queries.casadi_functions` ask over symbols.
 """
 
 from __future__ import annotations
 
-import importlib
 import inspect
 from collections.abc import Callable, Iterable
-from functools import update_wrapper
+from functools import singledispatch, update_wrapper
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
 from numpy.typing import ArrayLike
 
-from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.dynamics.queries.evaluation import AnyEvaluation, evaluation_of
 from heelstrike.errors import RobotError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.spatial.robot import SpatialRobot
 
 P = ParamSpec("P")
+Q = ParamSpec("Q")
 Result = TypeVar("Result", covariant=True)
+Other = TypeVar("Other")
+At = TypeVar("At", bound=AnyEvaluation)
 
 VECTORS = {
     "q": "nq", "v": "nv", "end": "nq", "acceleration": "nv", "force": "nv", "torque": "nu",
 }  # fmt: skip
 """Arguments that are vectors, and how long they are."""
 
-Arguments = dict[str, tuple[str, str]]
-"""Of every argument its type and what it is."""
-
-_ARGUMENTS: Arguments = {
+_ARGUMENTS: dict[str, tuple[str, str]] = {
     "robot": ("Robot or SpatialRobot", "The robot."),
-    "q": ("(nq,) array", "Position, in m and rad, in the order of ``robot.joint_names``."),
-    "v": ("(nv,) array", "Velocity, in m/s and rad/s."),
+    "q": ("(nq,) array", "Position, in m and rad, in the order of ``robot.position_names``."),
+    "v": ("(nv,) array", "Velocity, in m/s and rad/s, in the order of ``robot.velocity_names``."),
     "time": ("float", "How long, in s."),
     "end": ("(nq,) array", "Another position."),
     "acceleration": ("(nv,) array", "Rate of the velocity, in m/s² and rad/s²."),
@@ -53,7 +54,7 @@ class Query(Protocol[P, Result]):
     """What can be asked of a robot in a state."""
 
     @property
-    def at(self) -> Callable[Concatenate[Evaluation, P], Result]:
+    def at(self) -> Callable[Concatenate[Any, P], Result]:
         """The question, asked of an evaluation."""
 
     @property
@@ -69,6 +70,9 @@ class OfPosition(Query[P, Result], Protocol[P, Result]):
     ) -> Result:
         """Answer it."""
 
+    def in_space(self, body: Callable[Concatenate[At, Q], Other]) -> OfPosition[Q, Other]:
+        """Give it another function in space; return the query as it is there."""
+
 
 class OfState(Query[P, Result], Protocol[P, Result]):
     """A query of a position and a velocity."""
@@ -83,31 +87,37 @@ class OfState(Query[P, Result], Protocol[P, Result]):
     ) -> Result:
         """Answer it."""
 
+    def in_space(self, body: Callable[Concatenate[At, Q], Other]) -> OfState[Q, Other]:
+        """Give it another function in space; return the query as it is there."""
+
 
 def of_position(
     returns: str,
-) -> Callable[[Callable[Concatenate[Evaluation, P], Result]], OfPosition[P, Result]]:
+) -> Callable[[Callable[Concatenate[At, P], Result]], OfPosition[P, Result]]:
     """Make a query of a position (and more); `returns` says in what shape, unit and frame."""
 
-    def query(body: Callable[Concatenate[Evaluation, P], Result]) -> OfPosition[P, Result]:
+    def query(body: Callable[Concatenate[At, P], Result]) -> OfPosition[P, Result]:
+        ask = _asked(body)
+
         def answer(
             robot: Robot | SpatialRobot, q: ArrayLike, *others: P.args, **named: P.kwargs
         ) -> Result:
-            if isinstance(robot, SpatialRobot):
-                return in_space(body.__name__, robot)(robot, q, *others, **named)
-            return body(Evaluation(robot, q), *others, **named)
+            found: Result = ask(evaluation_of(robot)(robot, q), *others, **named)
+            return found
 
-        return described_answer(answer, body, returns)
+        return _described(answer, ask, returns)
 
     return query
 
 
 def of_state(
     returns: str,
-) -> Callable[[Callable[Concatenate[Evaluation, P], Result]], OfState[P, Result]]:
+) -> Callable[[Callable[Concatenate[At, P], Result]], OfState[P, Result]]:
     """Make a query of a position and a velocity; see :func:`of_position`."""
 
-    def query(body: Callable[Concatenate[Evaluation, P], Result]) -> OfState[P, Result]:
+    def query(body: Callable[Concatenate[At, P], Result]) -> OfState[P, Result]:
+        ask = _asked(body)
+
         def answer(
             robot: Robot | SpatialRobot,
             q: ArrayLike,
@@ -115,59 +125,53 @@ def of_state(
             *others: P.args,
             **named: P.kwargs,
         ) -> Result:
-            if isinstance(robot, SpatialRobot):
-                return in_space(body.__name__, robot)(robot, q, v, *others, **named)
-            return body(Evaluation(robot, q, v), *others, **named)
+            found: Result = ask(evaluation_of(robot)(robot, q, v), *others, **named)
+            return found
 
-        return described_answer(answer, body, returns)
+        return _described(answer, ask, returns)
 
     return query
 
 
-def in_space(name: str, robot: SpatialRobot) -> Callable[..., Any]:
-    """Return the query of that name about robots in space, which are not imported before.
+def _asked(body: Callable[..., Any]) -> Any:
+    """Return what chooses a function by the class of the evaluation, to begin with this one."""
 
-    Raises
-    ------
-    RobotError
-        If it is one of the plane alone.
-    """
-    questions = importlib.import_module("heelstrike.dynamics.spatial")
-    if not hasattr(questions, name):
+    def refuse(at: AnyEvaluation, *_: Any, **__: Any) -> Any:
+        (known,) = {kind.where for kind in ask.registry if kind is not object}
         raise RobotError(
-            f"{name} is asked of robots of the plane; {robot.name!r} is one of space, of which "
-            "heelstrike does not know it yet."
+            f"{body.__name__} is asked of robots {known}; {at.robot.name!r} is one {at.where}, of "
+            "which heelstrike does not know it yet."
         )
-    question: Callable[..., Any] = getattr(questions, name)
-    return question
+
+    ask: Any = singledispatch(refuse)
+    ask.register(body)
+    return update_wrapper(ask, body)
 
 
-def described_answer(
-    answer: Any, body: Callable[..., Any], returns: str, arguments: Arguments = _ARGUMENTS
-) -> Any:
+def _described(answer: Any, ask: Any, returns: str) -> Any:
     """Give an answer the name, signature and documentation of its question."""
-    first, own = inspect.signature(answer), inspect.signature(body)
+
+    def in_space(body: Callable[..., Any]) -> Any:
+        ask.register(body)
+        return answer
+
+    first, own = inspect.signature(answer), inspect.signature(ask)
     names = [one for one in first.parameters.values() if one.kind == one.POSITIONAL_OR_KEYWORD]
     signature = own.replace(parameters=[*names, *list(own.parameters.values())[1:]])
-    update_wrapper(answer, body)
-    answer.__signature__, answer.at, answer.returns = signature, body, returns
+    summary = inspect.getdoc(ask) or ""
+    update_wrapper(answer, ask)
+    answer.__signature__, answer.at, answer.returns = signature, ask, returns
+    answer.in_space = in_space
     shape, _, meaning = returns.partition(": ")
-    summary = inspect.getdoc(body) or ""
-    answer.__doc__ = docstring(summary, signature.parameters, shape, meaning, arguments)
+    answer.__doc__ = docstring(summary, signature.parameters, shape, meaning)
     return answer
 
 
-def docstring(
-    summary: str,
-    names: Iterable[str],
-    returned: str,
-    meaning: str,
-    arguments: Arguments = _ARGUMENTS,
-) -> str:
+def docstring(summary: str, names: Iterable[str], returned: str, meaning: str) -> str:
     """Return the documentation of a function that takes arguments of queries."""
     text = [summary, "", "Parameters", "----------"] if names else [summary]
     for name in names:
-        kind, words = arguments[name]
+        kind, words = _ARGUMENTS[name]
         text += [f"{name} : {kind}", f"    {words}"]
     text += ["", "Returns", "-------", returned, f"    {meaning}"]
     if names:

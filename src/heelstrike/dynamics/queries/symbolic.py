@@ -18,7 +18,17 @@ from heelstrike.dynamics.queries.evaluation import Evaluation
 
 def traced(kernel: Callable[..., Any]) -> Callable[..., Any]:
     """Return a kernel that runs over object arrays of CasADi ``SX`` instead of numbers."""
-    return uncompiled(kernel, replace={math.sin: casadi.sin, math.cos: casadi.cos})
+    return uncompiled(kernel, replace=_IN_SYMBOLS)
+
+
+_IN_SYMBOLS: dict[Any, Any] = {
+    math.sin: casadi.sin,
+    math.cos: casadi.cos,
+    math.sqrt: casadi.sqrt,
+    math.atan2: casadi.atan2,
+    math.copysign: casadi.copysign,
+}
+"""What kernels call, and what it is of symbols."""
 
 
 def symbols(vector: casadi.SX) -> NDArray[np.object_]:

@@ -21,6 +21,7 @@ from heelstrike.errors import HeelstrikeError, SimulationError
 from heelstrike.experiments.campaigns.outcome import CRASHED, Outcome
 from heelstrike.experiments.campaigns.parameters import Draw, Share, planned, typical
 from heelstrike.experiments.campaigns.results import CampaignResults
+from heelstrike.experiments.campaigns.sending import Elsewhere, outcomes_of, packed
 from heelstrike.experiments.campaigns.store import (
     Store,
     as_text,
@@ -249,7 +250,7 @@ class Campaign:
             show(Progress(len(self), finished, good, found, 0.0))
             blocks = self._blocks(wanted, limit)
             with (
-                _worked(executor, workers or os.cpu_count() or 1) as work,
+                _worked(self.trials, executor, workers or os.cpu_count() or 1) as work,
                 closing(work(blocks)) as done,
             ):
                 for block, outcomes in done:
@@ -409,10 +410,12 @@ Done = tuple[Block, list[Outcome]]
 
 
 @contextmanager
-def _worked(executor: Any, workers: int) -> Iterator[Callable[[Iterable[Block]], Generator[Done]]]:
+def _worked(
+    trials: Mapping[str, Trial], executor: Any, workers: int
+) -> Iterator[Callable[[Iterable[Block]], Generator[Done]]]:
     """Make a function that has blocks worked on, and yields them in their order as they come."""
     if executor is not None:
-        yield partial(_by_others, executor)
+        yield partial(_by_others, executor, packed(trials))
         return
     stop = threading.Event()
     with ThreadPoolExecutor(workers, thread_name_prefix="heelstrike") as pool:
@@ -438,13 +441,13 @@ def _in_order(
         yield block, future.result()
 
 
-def _by_others(executor: Any, blocks: Iterable[Block]) -> Generator[Done]:
+def _by_others(executor: Any, trials: bytes, blocks: Iterable[Block]) -> Generator[Done]:
     """Have blocks worked on by an executor; where one dies of a block, find the trial.
 
     A maker of executors is asked for another then; an executor that was given is broken for good.
     """
-    again = None if hasattr(executor, "submit") else executor
-    worker = executor if again is None else again()
+    again = None if hasattr(executor, "submit") else lambda: Elsewhere(executor(), trials)
+    worker = Elsewhere(executor, trials) if again is None else again()
     waiting: deque[tuple[Block, Any]] = deque()
     source = iter(blocks)
     try:
@@ -453,14 +456,13 @@ def _by_others(executor: Any, blocks: Iterable[Block]) -> Generator[Done]:
                 for block in source:
                     waiting.append((block, None))
                     with _somebody_works():
-                        waiting[-1] = block, worker.submit(run_block, block)
+                        waiting[-1] = block, worker.submit(block)
                     if len(waiting) >= AHEAD:
                         break
                 if not waiting:
                     break
                 block, future = waiting[0]
-                with _somebody_works():
-                    outcomes = future.result()
+                outcomes = _answer(future)
                 waiting.popleft()
                 yield block, outcomes
             except BrokenExecutor:
@@ -502,7 +504,14 @@ def _somebody_works() -> Iterator[None]:
         ) from error
 
 
-def _alone(make: Callable[[], Any], block: Block) -> list[Outcome]:
+def _answer(future: Any) -> list[Outcome]:
+    """Wait for the outcomes of a block."""
+    with _somebody_works():
+        found = future.result()
+    return outcomes_of(found)
+
+
+def _alone(make: Callable[[], Elsewhere], block: Block) -> list[Outcome]:
     """Work on a block with an executor of its own; if that dies, on each half of it."""
     worker = make()
     try:
@@ -513,14 +522,12 @@ def _alone(make: Callable[[], Any], block: Block) -> list[Outcome]:
         worker.shutdown()
 
 
-def _together(worker: Any, block: Block, died: int = 0, cancelled: int = 0) -> list[Outcome]:
+def _together(worker: Elsewhere, block: Block, died: int = 0, cancelled: int = 0) -> list[Outcome]:
     """Work on a block with an executor that goes on when a worker dies, as some did before."""
     with _somebody_works():
-        future = worker.submit(run_block, block)
+        future = worker.submit(block)
     try:
-        with _somebody_works():
-            found: list[Outcome] = future.result()
-        return found
+        return _answer(future)
     except Exception as error:
         if isinstance(error, BrokenExecutor) or not is_death(error):
             raise
@@ -528,8 +535,9 @@ def _together(worker: Any, block: Block, died: int = 0, cancelled: int = 0) -> l
 
 
 def _again(
-    worker: Any, block: Block, future: Any, error: Exception, died: int = 0, cancelled: int = 0
-) -> list[Outcome]:
+    worker: Elsewhere, block: Block, future: Any, error: Exception, died: int = 0,
+    cancelled: int = 0,
+) -> list[Outcome]:  # fmt: skip
     """Work again on a block that did not complete.
 
     One that was cancelled is worked on as it was. One that workers died of is halved; a single

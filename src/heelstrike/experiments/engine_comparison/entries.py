@@ -11,7 +11,6 @@ from dataclasses import field
 from typing import Any
 
 from heelstrike.errors import SimulationError
-from heelstrike.experiments.engines.packages import PACKAGES
 from heelstrike.field_texts import dataclass
 from heelstrike.wording import meant
 
@@ -63,8 +62,8 @@ ENTRIES: dict[str, Entry] = {
             "stiction": (1e-3, 1e-5),
         },
         advice=(
-            "stiffness and dissipation of points are properties of the geometries, stiction's "
-            "tolerance one of the plant (drake.mit.edu, Contact modeling in Drake)"
+            "stiffness and dissipation are properties of the geometries, stiction's tolerance of "
+            "the plant (drake.mit.edu, Contact modeling in Drake)"
         ),
     ),
     "drake_sap": Entry(
@@ -90,8 +89,8 @@ ENTRIES: dict[str, Entry] = {
             "enableConeFriction": (0,),
         },
         advice=(
-            "iterations and ERP (Bullet User Manual; PyBullet Quickstart, "
-            "setPhysicsEngineParameter)"
+            "iterations and ERP, the share of an error that a step corrects (Bullet User Manual; "
+            "PyBullet Quickstart, setPhysicsEngineParameter)"
         ),
     ),
     "dart": Entry("DART", "dart", choices={"split": (True,), "detector": ("FCL", "BULLET", "ODE")}),
@@ -103,8 +102,8 @@ ENTRIES: dict[str, Entry] = {
             "solver": ("quick",),
         },
         advice=(
-            "ERP of 0.1 to 0.8, CFM of 1e-9 to 1, the exact step where accuracy counts (ode.org, "
-            "ODE Manual, chapter 3)"
+            "ERP of 0.1 to 0.8, CFM (softness) of 1e-9 to 1, the exact solver `dWorldStep` for "
+            "accuracy (ode.org, ODE Manual, chapter 3)"
         ),
     ),
     "simbody": Entry(
@@ -165,13 +164,13 @@ ABSENT: dict[str, str] = {
     "Vortex": "commercial, no package for this platform; no free engine is of its kind",
     "RaiSim": "needs a licence file of its maker; DART and Siconos solve the same contact problem",
     "CoppeliaSim (V-REP)": (
-        "no package for Python that carries its engines: Bullet, ODE and MuJoCo, which have rows, "
-        "Newton Dynamics and Vortex"
+        "no package for Python; of its engines Bullet, ODE and MuJoCo have rows, "
+        "Newton Dynamics and Vortex none"
     ),
     "Webots": "no package; its engine is a fork of ODE, which has a row",
     "Gazebo": (
-        "its physics library is C++ alone in Debian (libignition-physics-dev); its engines are "
-        "DART, Bullet and ODE of the rows above"
+        "its physics library is C++ alone in Debian (libignition-physics-dev); its engines DART, "
+        "Bullet and ODE have rows"
     ),
     "OpenHRP/Choreonoid": "no package for Python; its engine is its own",
     "Genesis": (
@@ -214,14 +213,3 @@ def entries_called(names: Sequence[str] | str) -> dict[str, Entry]:
             )
         found[name] = ENTRIES[name]
     return found
-
-
-def package_title(name: str) -> str:
-    """Return what the package of a row is called.
-
-    Parameters
-    ----------
-    name : str
-        Name of a row.
-    """
-    return PACKAGES[ENTRIES[name].package].title

@@ -65,12 +65,12 @@ FACTS: dict[str, Facts] = {
     "dart": Facts(
         "C++, Python", "own", "OpenSceneGraph", "BSD-2", "Linux, macOS, Windows", "yes",
         "yes",
-        "hard, boxed complementarity", "pyramid", "yes", "none",
+        "hard, complementarity with bounded forces", "pyramid", "yes", "none",
         "LICENSE and classifiers of the wheel",
     ),
     "ode": Facts(
         "C, C++, Python", "own", "drawstuff", "LGPL or BSD", "Linux, macOS, Windows", "yes", "yes",
-        "hard, boxed complementarity", "pyramid", "yes", "none",
+        "hard, complementarity with bounded forces", "pyramid", "yes", "none",
         "Debian's copyright files of python3-pyode (LGPL-2+ or BSD-3) and libode8 (LGPL-2.1+ or "
         "BSD-3)",
     ),
@@ -99,12 +99,14 @@ FACTS: dict[str, Facts] = {
         "Debian's copyright file of python3-siconos",
     ),
     "pgs": Facts(
-        "C++, Python", "none: solvers", "browser", "BSD-2", "Linux, macOS, Windows", "yes", "yes",
+        "C++, Python", "none (solvers only)", "browser", "BSD-2", "Linux, macOS, Windows",
+        "yes", "yes",
         "hard, Gauss-Seidel", "cone, as far as iterations go", "no", "residuals of the solver",
         "LICENSE of the pin wheel, whose metadata say BSD-3",
     ),
     "admm": Facts(
-        "C++, Python", "none: solvers", "browser", "BSD-2", "Linux, macOS, Windows", "yes", "yes",
+        "C++, Python", "none (solvers only)", "browser", "BSD-2", "Linux, macOS, Windows",
+        "yes", "yes",
         "hard, alternating directions", "cone, to a tolerance", "no", "residuals of the solver",
         "LICENSE of the pin wheel, whose metadata say BSD-3",
     ),

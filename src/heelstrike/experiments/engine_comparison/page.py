@@ -91,43 +91,40 @@ def _files(folder: Path, kind: str) -> list[Path]:
 
 _INTRODUCTION = """# Other engines
 
-The paper's Table 1 compares simulators by their own descriptions. On this page the same robot walks
-the same gait under the same controller in each engine. The reference is an event-driven run at a
-tolerance of 1e-9.
+Table 1 of [the paper](paper.md) compares simulators by their own descriptions. Here the same robot
+walks the same gait under the same controller in each engine. The reference is an event-driven run
+of heelstrike at a tolerance of 1e-9.
 
-Each engine gets the robot link by link, with heelstrike's contact points. It runs in its own
-process, takes torques, and returns its state and contact forces. The controller is heelstrike's
-compiled one, called with the engine's state and forces every 2 ms, or as often as the table says.
-Times cover the engine's steps and the Python calls that they need; heelstrike's include the
-controller. Other work ran at the same time: ignore differences below a factor of two.
+- Each engine gets the robot link by link, with heelstrike's contact points. It runs in its own
+  process, takes torques, and returns its state and contact forces.
+- heelstrike's compiled controller gets this state and these forces every 2 ms, or as often as the
+  table says. ComputedTorque follows the gait without balancing, so errors of the contact can make
+  the robot fall. FootstepFeedback corrects them by its footholds.
+- Times cover the engine's steps and their Python calls, without the controller; only heelstrike's
+  include it. Other work ran at the same time: ignore differences below a factor of two.
 
 `heelstrike compare bravo7 --engines all --whole` makes the tables; with `--page docs/engines.md` it
 writes this page, and `--fine` adds shorter steps. It keeps each row as it comes and goes on where
-it was interrupted. For one engine use `--engines mujoco`, for a quick trial `--quick`. `--films`
-shows the walks that fall. CONTRIBUTING says how to add an engine.
+it was interrupted. Use `--engines mujoco` for one engine, `--quick` for a trial, and `--films` to
+see the walks that fall.
 
-The columns of the walks:
+The columns of the walks follow. Differences are from the reference.
 
-- *walks*: whether the robot takes all steps and stays up; if not, how many steps it took (a robot
-  that stumbles may take more than it was asked for);
-- *tracking*: error of the joints from the gait, root mean square;
-- *error*: difference of all coordinates from the reference over the walk, root mean square. A robot
-  that is late or displaced can follow its gait well and still have a large error;
-- *touchdown*: largest difference of a touchdown's time from the reference. A delay in one step
-  lasts to the end of the walk;
-- *impulse*: mean difference of the touchdown impulses from the reference;
-- *ZMP*: difference of the stance foot's zero moment point from the reference, root mean square;
-- *slip*, *depth*: longest way that a loaded contact point slides; deepest penetration;
-- *energy*: largest energy that appears or disappears without work. A dash marks engines that do not
-  report all contact forces as means over steps;
-- *noise*: difference of the ground force from its mean over 10 ms in single support, root mean
-  square, in percent of the weight;
-- *peak*: largest force on a foot, as a mean over a step, in multiples of the weight. A touchdown is
-  an impulse within one step, so a shorter step has a larger peak;
+- *walks*: whether the robot takes all steps and stays up; if not, how many steps it took. Stumbles
+  count as steps, so there may be more;
+- *tracking*: error of the joints from the gait, rms;
+- *error*: difference of all coordinates over the walk, rms; large also if the robot is late or
+  displaced;
+- *touchdown*: largest difference of a touchdown's time. A robot that is once late stays late;
+- *impulse*: mean difference of the touchdown impulses;
+- *ZMP*: difference of the stance foot's zero moment point, rms;
+- *slip*, *depth*: longest slide of a loaded contact point; deepest penetration;
+- *energy*: largest energy that appears or disappears without work, computed from the contact
+  forces, averaged over each step; engines that do not report all of them have a dash;
+- *noise*: rms difference of the ground force in single support from its running mean over 10 ms, in
+  percent of the weight;
+- *peak*: largest force on a foot, as a mean over a step, in multiples of the weight;
 - *step*: computing time of a step.
-
-ComputedTorque follows the gait without balancing, so errors of the contact can make the robot fall.
-FootstepFeedback corrects them by its footholds.
 """
 
 
@@ -189,7 +186,9 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
         ]
         for name, f in FACTS.items()
     ]  # fmt: skip
-    absent = [[name, "", why, "", "", "", "", "", ""] for name, why in ABSENT.items()]
+    read: dict[str, list[str]] = {}
+    for name, f in FACTS.items():
+        read.setdefault(f.read, []).append(_title(name))
     ours = []
     for name, f in FACTS.items():
         row = [
@@ -206,20 +205,24 @@ def _table_1(walks: Mapping[str, Any], scenes: Mapping[str, Any]) -> str:
     headings = ["simulator", "contact", "Coulomb's law", "restitution", "certificate", "creep mm/s"]
     for law, found in walks.items():
         headings += [f"{law}, {which}" for which in _settings(found)]
+    sizes = [row["step_s"] for found in walks.values() for row in found["rows"]]
     return (
         f"## Table 1, renewed\n\nOf {date.today().isoformat()}, in the paper's columns:\n\n"
         + _table(
             ["simulator", "version", "languages", "engine", "graphics", "licence", "systems",
              "open source", "documented"],
-            [*theirs, *absent],
+            theirs,
         )
+        + "\nNot compared:\n\n"
+        + _table(["simulator", "why"], list(ABSENT.items()))
         + "\nWhere licences and systems were read:\n\n"
-        + "\n".join(f"- {_title(name)}: {f.read}." for name, f in FACTS.items())
-        + "\n\nheelstrike's columns follow. Creep is the speed of a cube on a slope 0.05 rad below "
-        "its angle of friction, at defaults and a step of 1 ms; by Coulomb's law it is zero. Each "
-        "of the last columns is for one controller and its settings. The cells have the step "
-        "sizes, in ms, at which bravo7 takes all its steps; *as defaults* means that the search "
-        "found no better settings.\n\n"
+        + "\n".join(f"- {', '.join(names)}: {where}." for where, names in read.items())
+        + "\n\nheelstrike's columns, added to the paper's, follow. Creep is the speed of a cube on "
+        "a slope 0.05 rad below its angle of friction, at defaults and a step of 1 ms; by "
+        "Coulomb's law it is zero. The last columns have the step sizes, in ms, at which bravo7 "
+        f"takes all its steps under a controller (none above {1e3 * max(sizes):g} or below "
+        f"{1e3 * min(sizes):g} was tried); *as defaults* means that the search found no better "
+        "settings.\n\n"
         + _table(headings, ours)
     )  # fmt: skip
 
@@ -276,16 +279,17 @@ def _best(walks: Mapping[str, Any]) -> str:
     }
     advice = [f"- {entry.title}: {entry.advice}." for entry in ENTRIES.values() if entry.advice]
     return (
-        "## Settings\n\nOne search finds the best settings of every engine: three steps at 1 ms; "
-        "each setting is varied in turn from its default, and kept if the error falls by 2 %. One "
-        "pass finds good settings, not proven optima. Errors are in mm and mrad. Each row is "
+        "## Settings\n\nA search walks three steps at 1 ms in every engine. It varies each setting "
+        "in turn from its default and keeps what lowers the error by 2 %. This single pass finds "
+        "good settings, not proven optima. Errors are in mm and mrad. Each row is "
         + " or ".join(f"`{command}`" for command in sorted(commands)) + ".\n\n"
         + _table(
             ["engine", "best", "error, defaults", "error, best", "walks tried", "version", "date"],
             rows,
         )
         + "".join(f"\n{each}.\n" for each in others)
-        + "\nThe settings follow the advice of the maintainers:\n\n" + "\n".join(advice) + "\n"
+        + "\nThe settings tried follow the maintainers' advice. Names are the engines' own:\n\n"
+        + "\n".join(advice) + "\n"
     )  # fmt: skip
 
 
@@ -297,8 +301,8 @@ def _figure(row: Mapping[str, Any], name: str, factor: float, walks: bool) -> st
 
 
 _WHY = (
-    'Why they did not walk (after "completed", which means that the simulation reached its end: '
-    "the steps taken, or the first cause of the fall and what followed):"
+    "The others did not walk (*completed* means only that the simulation reached its planned "
+    "time). Steps taken, or the fall's cause and consequences:"
 )
 
 
@@ -358,12 +362,11 @@ def _peaks(walks: Mapping[str, Any]) -> str:
     headings += [f"computing time (s), {1e3 * h:g} ms" for h in sizes]
     called = ",".join(f"{h:g}" for h in sizes)
     return (
-        "## Foot force over step size\n\nThe largest force on a foot (a mean over a step, in "
-        f"multiples of the weight) and the computing time of the same walk under {law}. With hard "
-        "contact a touchdown is an impulse within one step, so its force grows as the step "
-        "shrinks. With soft contact the force is that of the spring. Walks that fall are "
-        f"included. Each row is `heelstrike compare {found['robot']} --controller "
-        f"{law.partition(' ')[0]} --engines NAME --settings SETTINGS --sizes {called} "
+        "## Foot force over step size\n\nThe peak force on a foot, as above, and the computing "
+        f"time of the same walk under {law}, falls included. With hard contact a touchdown is an "
+        "impulse within one step, so its force grows as the step shrinks. With soft contact the "
+        f"force is that of the spring. Each row is `heelstrike compare {found['robot']} "
+        f"--controller {law.partition(' ')[0]} --engines NAME --settings SETTINGS --sizes {called} "
         f"--steps {found['steps']}`.\n\n"
         + _table(headings, rows)
     )  # fmt: skip
@@ -383,11 +386,11 @@ def _pushes(file: Path) -> str:
     return (
         f"## Largest push under {law}{called}\n\n"
         "A push acts on the trunk for 0.1 s, in the middle of the third step. The table has the "
-        "largest impulse (N s) that the robot survives; it survives all smaller ones that were "
-        "tried, too. In brackets is the smallest impulse that it does not survive. heelstrike "
-        "simulates the walk to the end of the push, event-driven. From there each engine continues "
-        "with this state and the controller's memory, at steps of 1 ms. If an engine fails, its "
-        "message appears, with the time since the end of the push. Each row is "
+        "largest impulse (N s) up to which the robot survives every push tried. In brackets is the "
+        "smallest not survived. heelstrike simulates the walk event-driven to the end of the push. "
+        "From there each engine continues with this state and the "
+        "controller's memory, at steps of 1 ms. Times in messages of engines that fail are from "
+        "the end of the push. Each row is "
         f"`heelstrike compare {found['robot']} --controller {law} --engines NAME "
         f"--settings {settings}{period} --largest-push`.\n\n"
         + _table(
@@ -409,11 +412,11 @@ def _largest(found: Mapping[str, Any]) -> str:
 
 
 _SYMBOLS = (
-    "In these formulas β is the slope, μ the friction, v the speed at the start and ω a rate of "
-    "rotation. R is the distance of the body's centre from the corner, φ the angle of the line "
-    "between them from the vertical, α this angle when the block stands flat. I is the moment "
-    "of inertia, about the corner in 5 and 6, about the centre of the disc in 11 and 12. The "
-    "wheel has spokes of length r at angles of 2α on a slope γ."
+    "β is the slope, μ the friction, v the speed at the start and ω a rate of rotation. R is "
+    "the distance of the body's centre from the corner, φ the angle of the line between them "
+    "from the vertical, α this angle when the block stands flat. I is the moment of inertia, "
+    "about the corner in 5 and 6, about the disc's centre in 11 and 12. The wheel has spokes of "
+    "length r at angles of 2α on a slope γ."
 )
 
 
@@ -427,21 +430,27 @@ def _scenes(found: Mapping[str, Any]) -> str:
             row = next(r for r in found["rows"] if (r["engine"], r["scene"]) == (engine, name))
             told.append("–" if row["error"] is None else short(row["error"]))
         rows.append(told)
-    listed = [
-        f"{k + 1}. {name}: {f'{exact:.6g} {unit}'.rstrip()}; {words}."
-        for k, (name, exact, unit, words) in enumerate(found["scenes"])
+    listed = []
+    last = ""
+    for k, (name, exact, unit, words) in enumerate(found["scenes"]):
+        told_of = "likewise" if words == last else words
+        listed.append(f"{k + 1}. {name}: {f'{exact:.6g} {unit}'.rstrip()}; {told_of}.")
+        last = words
+    numbers = {name: str(k + 1) for k, (name, *_) in enumerate(found["scenes"])}
+    failed: dict[tuple[str, str], list[str]] = {}
+    for row in found["rows"]:
+        if row["error"] is None and "restitution" not in row["reason"]:
+            failed.setdefault((row["title"], row["reason"]), []).append(numbers[row["scene"]])
+    why = [
+        f"- {title}, scene{'s' if len(where) > 1 else ''} {', '.join(where)}: {said}."
+        for (title, said), where in failed.items()
     ]
-    why = dict.fromkeys(
-        f"- {row['title']}, {row['scene']}: {row['reason']}."
-        for row in found["rows"]
-        if row["error"] is None and "restitution" not in row["reason"]
-    )
-    why |= dict.fromkeys(f"- {each}." for each in why_not_at_steps(found))
+    why += dict.fromkeys(f"- {each}." for each in why_not_at_steps(found))
     return (
         "## Scenes with closed forms\n\nThe exact result of each scene:\n\n" + "\n".join(listed)
-        + f"\n\n{_SYMBOLS}\n\nThe table has the errors (simulated minus exact value, in the units "
-        f"above) at a step of {1e3 * found['step_s']:g} ms and {found['settings']}. Each row is "
-        "`heelstrike compare bravo7 --engines NAME --scenes`:\n\n"
+        + f"\n\n{_SYMBOLS}\n\nErrors (simulated minus exact value, in the units above) at a step "
+        f"of {1e3 * found['step_s']:g} ms and {found['settings']}. Each row is `heelstrike compare "
+        "bravo7 --engines NAME --scenes`:\n\n"
         + _table(headings, rows)
         + "\nA dash for a bouncing ball marks an engine without a coefficient of restitution. An "
         "error of many times the exact value means that the simulation diverged."
@@ -455,20 +464,20 @@ def _compass(found: Mapping[str, Any]) -> str:
         "## The compass gait\n\nThe passive walker of Goswami, Thuilot and Espiau (1998) starts on "
         f"its cycle down a slope of 3 degrees and takes up to {found['strides']} steps, at "
         f"{found['settings']}. Its legs are of one length, so the swing foot passes through the "
-        "ground at mid-stance: an engine gets contact points on the stance foot only until the "
-        "stance leg is perpendicular to the slope. From then on it gets those of both feet, until "
-        "after the landing the rear foot is highest. The cycle is the mean of the last five "
-        "steps; *spread* is how far they still differ. The Floquet multipliers come from a fit to "
-        "one step after each of 32 random disturbances, with the standard error (±) of the "
-        "largest one's modulus. An engine that "
-        "resolves a landing within its steps takes it early or late by up to one step, and the "
-        "next step differs. Where this difference exceeds the disturbances, the standard error is "
-        "large and the multipliers are not resolved. Each row is `heelstrike compare bravo7 "
-        "--engines NAME --scenes`. Published: "
-        "0.734346391 s, 0.535445415 m, −0.199726 ± 0.544476i and 0.131573. If an engine falls in a "
-        "disturbed step, the multipliers' column has the reason. *best* marks rows at the best "
-        "settings, of engines in which it falls at defaults. "
-        f"{_not_run(found)}\n\n" + _table(COMPASS, [compass_cells(row) for row in found["rows"]])
+        "ground at mid-stance. Therefore the swing foot loses its contact points when, lifted off, "
+        "it begins to sink, and regains them when the stance leg is perpendicular to the slope. "
+        "Published: period 0.734346391 s, step 0.535445415 m, "
+        "multipliers −0.199726 ± 0.544476i and 0.131573."
+        "\n\nThe cycle is the mean of the last five steps; *spread* is how far they still differ "
+        "from it. The Floquet multipliers are fitted to one step after each of 32 random "
+        "disturbances; ± is the standard error of the largest one's modulus. An engine that puts "
+        "landings at the ends of time steps is early or late by up to one time step, which changes "
+        "the walker's next step. Where this change exceeds the disturbances, ± is large and the "
+        "multipliers are not resolved. If the walker falls after a disturbance, the column "
+        "*multipliers* has the reason. *best* marks rows at the best settings, of engines in which "
+        "it falls at defaults.\n\nEach row is `heelstrike compare bravo7 --engines NAME "
+        f"--scenes`.{_not_run(found)}\n\n"
+        + _table(COMPASS, [compass_cells(row) for row in found["rows"]])
     )
 
 
@@ -498,13 +507,13 @@ def _guards(found: Mapping[str, Any]) -> str:
             ]
         )  # fmt: skip
     return (
-        "## Guards\n\nTwo checks confirm that an engine has the same robot. The first is a flight "
-        "of 0.1 s with all joints turning, at steps of 1, 0.5 and 0.25 ms. *flight* is the largest "
-        "difference of a coordinate from heelstrike (m, rad), and *order* the order of its "
-        "convergence. *extrapolated* is this difference extrapolated to step zero; it must be at "
-        "most 1e-6, or 1e-3 in single precision. The second is *weight*, the sum of the normal "
-        "forces on the robot at rest over its weight; it must be 1, within 1 %. Each row is "
-        "`heelstrike compare bravo7 --engines NAME --scenes`.\n\n"
+        "## Guards\n\nTwo checks confirm that an engine has the same robot:\n\n- a flight of 0.1 s "
+        "with all joints turning, at steps of 1, 0.5 and 0.25 ms. *flight* is the largest "
+        "difference of a coordinate from heelstrike (m, rad), *order* its order of convergence. "
+        "*extrapolated* is *flight* extrapolated to a step of zero, and must be at most 1e-6, or "
+        "1e-3 in single precision;\n- *weight*, the sum of the normal forces at rest over the "
+        "robot's weight. It must be 1, within 1 %.\n\nEach row is `heelstrike compare bravo7 "
+        "--engines NAME --scenes`.\n\n"
         + _table(
             ["engine", "precision", "flight, 0.25 ms", "order", "extrapolated", "weight",
              "holds"],

@@ -227,7 +227,7 @@ def _bouncing(restitution: float) -> Scene:
             restitution=restitution,
         ),
         lambda q, _: float(q[1]) - RADIUS, _height(height, restitution, duration), "m",
-        "parabola after parabola, each with e times the speed",
+        f"height after {duration:g} s; every bounce leaves e times the speed",
     )  # fmt: skip
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from heelstrike.errors import SimulationError
 from heelstrike.experiments.identification.equations import Equations
 from heelstrike.experiments.identification.standing import PRESSED
 from heelstrike.field_texts import dataclass
@@ -15,13 +15,18 @@ from heelstrike.gait.recordings.robot_log import RobotLog
 from heelstrike.robot.model import Floats
 
 AROUND, FEWEST_AROUND = 0.02, 3
-"""Time (s) before and after a sample that its velocity is taken from, and least samples of that."""
-SURELY = 6.0
-"""Standard deviations of noise above which a point slides."""
-ALL_BUT = 0.9
-"""Part of its friction from which on a foot may slide: noise and slow sliding hide the rest."""
+"""Time (s) before and after a sample within which a slide must show, and least samples of that."""
+SURELY = 4.0
+"""Standard deviations of noise by which a point must move before a sample, and again after it, so
+that it slides there: noise of that sample moves the two to opposite sides, never both beyond."""
 SLOWEST = 0.02
 """Speed (m/s) below which nothing is taken for sliding: feet of files stand still to less."""
+AGREES = 4.0
+"""Standard deviations of a ratio of forces beyond which its sample is not of one that slides."""
+AGAIN = 5
+"""How often samples that do not agree are left out: one is left out or not after two."""
+ALL_BUT = 0.9
+"""Part of its friction from which on a foot may slide: noise and slow sliding hide the rest."""
 
 
 @dataclass(frozen=True)
@@ -70,14 +75,24 @@ def sliding(
     if log.force is None or log.trunk is None:
         return None
     q = np.hstack([log.trunk, log.joints])
-    v, spread = velocities(log.time, q)
     noise = np.concatenate([np.full(log.trunk.shape[1], encoder.max()), encoder])
     tangent = equations.jacobians(q)[:, 1::2]
-    speed = (tangent @ np.nan_to_num(v)[:, :, None])[:, :, 0]  # none at the ends
-    least = np.maximum(SURELY * spread * np.sqrt(tangent**2 @ noise**2), SLOWEST)
-    presses = (log.force[:, :, 0] > PRESSED * force_noise).astype(np.float64)
-    slides = (np.abs(speed) > least) & (_all_around(presses, around(log.time)) > 0.0)
-    return np.where(slides, np.sign(speed), 0.0)
+    spread = np.sqrt(2.0 * (tangent**2 @ noise**2))  # of the way from one sample to another
+    ways = 0.5 * (tangent[1:] + tangent[:-1]) @ np.diff(q, axis=0)[:, :, None]
+    path = np.vstack([np.zeros(tangent.shape[1]), np.cumsum(ways[:, :, 0], axis=0)])
+    presses = log.force[:, :, 0] > PRESSED * force_noise
+    found = np.zeros_like(path)
+    for reach in range(1, min(around(log.time), (len(path) - 1) // 2) + 1):
+        # The shortest time in which it shows: a slide may be over soon.
+        here, sooner, later = slice(reach, -reach), slice(0, -2 * reach), slice(2 * reach, None)
+        held = sliding_window_view(presses, 2 * reach + 1, axis=0).all(axis=-1)
+        before, after = path[here] - path[sooner], path[later] - path[here]
+        slides = held & (before * after > 0.0) & (found[here] == 0.0)
+        for way, end in ((before, sooner), (after, later)):
+            slowly = SLOWEST * np.abs(log.time[end] - log.time[here])[:, None]
+            slides &= np.abs(way) > np.maximum(SURELY * spread[here], slowly)
+        found[here] += slides * np.sign(after)
+    return found
 
 
 def ground_friction(
@@ -99,15 +114,33 @@ def ground_friction(
     if senses is None or log.force is None:
         missing = "forces of the contact points" if log.force is None else "where the trunk is"
         return GroundFriction(math.nan, math.nan, 0, f"for {missing} is not in the recording")
-    surely = _all_around(senses, around(log.time) // 2)
     scale = equations.robot.model.friction_scale
-    pressing = float(np.sum(np.abs(surely) * scale * log.force[:, :, 0]))
-    count = int(np.count_nonzero(surely))
-    if not count:
-        return GroundFriction(math.nan, math.nan, 0, "for no foot slides for long")
-    value = -float(np.sum(surely * log.force[:, :, 1])) / pressing
-    deviation = force_noise * math.sqrt(count * (1.0 + value**2)) / pressing
+    pressing = (scale * log.force[:, :, 0])[senses != 0.0]
+    rubbing = -(senses * log.force[:, :, 1])[senses != 0.0]
+    if not len(pressing):
+        return GroundFriction(math.nan, math.nan, 0, _at_least(log.force, scale, force_noise))
+    value = float(np.median(rubbing / pressing))
+    for _ in range(AGAIN):  # of a point that sticks meanwhile the force is less than friction
+        noise = force_noise * np.hypot(1.0, scale.max() * value)
+        agree = np.abs(rubbing - value * pressing) < AGREES * noise
+        if 2 * np.count_nonzero(agree) < len(agree):
+            return GroundFriction(
+                math.nan, math.nan, 0,
+                "for forces of the points that slide do not agree on one coefficient",
+            )  # fmt: skip
+        value = float(rubbing[agree].sum() / pressing[agree].sum())
+    count, weight = int(np.count_nonzero(agree)), float(pressing[agree].sum())
+    deviation = force_noise * math.sqrt(count * (1.0 + value**2)) / weight
     return GroundFriction(value, deviation, count)
+
+
+def _at_least(force: Floats, scale: Floats, force_noise: float) -> str:
+    """Say why friction is not visible, and what it is at least: what forces have used of it."""
+    normal, tangent = scale * force[:, :, 0], np.abs(force[:, :, 1])
+    presses = (force[:, :, 0] > PRESSED * force_noise) & (scale > 0.0)
+    least = (tangent - AGREES * force_noise) / np.where(presses, normal, np.inf)
+    used = max(float(least.max(initial=0.0)), 0.0)
+    return f"for no foot slides; it is {used:.2g} at least, which forces have used"
 
 
 def may_slide(
@@ -133,7 +166,9 @@ def may_slide(
     """
     if senses is None or log.force is None:
         return None
-    found: NDArray[np.bool_] = senses != 0.0
+    near = around(log.time)  # slides begin before they surely show
+    padded = np.pad(senses != 0.0, ((near, near), (0, 0)))
+    found = np.asarray(sliding_window_view(padded, 2 * near + 1, axis=0).any(axis=-1))
     if friction.samples:
         for foot in equations.robot.feet:
             normal, tangent = np.moveaxis(log.force[:, list(foot.contacts)].sum(axis=1), 1, 0)
@@ -144,37 +179,5 @@ def may_slide(
 
 
 def around(time: Floats) -> int:
-    """How many samples before and after one its velocity is taken from."""
+    """How many samples before and after one a slide is looked for in."""
     return max(round(AROUND / float(np.median(np.diff(time)))), FEWEST_AROUND)
-
-
-def velocities(time: Floats, q: Floats) -> tuple[Floats, float]:
-    """Velocities (n, nq) by lines through the samples around each, and their noise for that of one.
-
-    Those of the first and last samples are NaN.
-
-    Raises
-    ------
-    SimulationError
-        If samples are too few.
-    """
-    count = around(time)
-    if len(time) <= 2 * count:
-        raise SimulationError(f"more than {2 * count} samples are wanted, got {len(time)}")
-    inner = slice(count, len(time) - count)
-    near = np.lib.stride_tricks.sliding_window_view(time, 2 * count + 1)
-    away = near - near.mean(axis=1, keepdims=True)
-    weight = away / np.sum(away**2, axis=1, keepdims=True)
-    found = np.full(q.shape, np.nan)
-    windows = np.lib.stride_tricks.sliding_window_view(q, 2 * count + 1, axis=0)
-    found[inner] = np.einsum("iw,ijw->ij", weight, windows)
-    return found, float(np.linalg.norm(weight, axis=1).max())
-
-
-def _all_around(senses: Floats, count: int) -> Floats:
-    """Keep what is the same at all samples around; elsewhere it is zero: none that only begins."""
-    found = senses.copy()
-    for shift in range(1, count + 1):
-        for rolled in (np.roll(senses, shift, axis=0), np.roll(senses, -shift, axis=0)):
-            found[rolled != senses] = 0.0
-    return found

@@ -136,7 +136,7 @@ def _trunk_mass(trial: Trial, _: Chance, effort: Effort) -> Largest:
 
 
 def _price(trial: Trial, _: Chance, __: Effort) -> Largest:
-    """Measure the mean of the sum of torques squared, undisturbed, over whole steps."""
+    """Measure the mean over time of the sum of squared torques, undisturbed, over whole steps."""
     run = trial.run(trial.begins, record_every=1)
     end = trial.begins + int(trial.settling / trial.step_duration) * trial.step_duration
     mean = torque_cost(run, start=trial.begins, end=end) / (end - trial.begins)
@@ -145,7 +145,7 @@ def _price(trial: Trial, _: Chance, __: Effort) -> Largest:
 
 DISTURBANCES: tuple[Disturbance, ...] = (
     Disturbance(
-        "push-forwards", "push →", "N s", "a push forwards of 0.1 s on the trunk, at any phase",
+        "push-forwards", "push →", "N s", "a push forwards of 0.1 s on the trunk",
         partial(_push, 1.0), by_chance=True, standing=True,
     ),
     Disturbance(
@@ -153,11 +153,11 @@ DISTURBANCES: tuple[Disturbance, ...] = (
         partial(_push, -1.0), by_chance=True, standing=True,
     ),
     Disturbance(
-        "slope-up", "slope ↑", "°", "level ground turns into a slope that climbs",
+        "slope-up", "slope ↑", "°", "level ground turns into a climbing slope",
         partial(_slope, True),
     ),
     Disturbance(
-        "slope-down", "slope ↓", "°", "level ground turns into a slope that descends",
+        "slope-down", "slope ↓", "°", "level ground turns into a descending slope",
         partial(_slope, False),
     ),
     Disturbance(
@@ -180,8 +180,8 @@ DISTURBANCES: tuple[Disturbance, ...] = (
         _trunk_mass, standing=True,
     ),
     Disturbance(
-        "price", "price", "N²m²", "mean of the sum of torques squared, undisturbed", _price,
-        less=True,
+        "price", "price", "N²m²", "mean over time of the sum of squared torques, undisturbed",
+        _price, less=True,
     ),
 )  # fmt: skip
 """Disturbances, in the order of the table."""

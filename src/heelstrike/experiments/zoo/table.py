@@ -154,15 +154,16 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         "# Zoo of controllers",
         "",
         "The tables give the largest disturbance that each controller withstands on each robot. "
-        "Each robot has one gait. Each controller has one set of gains, tuned on one robot and "
-        "scaled with weight and height. This command makes the page, its figure and its numbers:",
+        "Each robot has one gait, each controller one set of gains, tuned on one robot and "
+        "scaled with weight and height. The page *Command line* describes the controllers. The "
+        "command:",
         "",
         "```sh",
         command,
         "```",
         "",
-        f"It ran with heelstrike {settings.version}, {settings.method}, seed {settings.seed}, and "
-        "controllers called once a millisecond, or once a time step where that is longer.",
+        f"It used heelstrike {settings.version}, {settings.method}, seed {settings.seed}, and "
+        "called controllers every millisecond (once per step if steps are longer).",
         "",
         f"![Largest disturbance by robot and controller, one panel for each disturbance]({link})",
         "",
@@ -188,7 +189,8 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
 
 
 def _explained(there: Sequence[Disturbance]) -> list[str]:
-    rows = [_line("disturbance", "name", "unit", "what it is"), _line("---", "---", "---", "---")]
+    heads = ("disturbance", "name for `--disturbances`", "unit", "what it is")
+    rows = [_line(*heads), _line(*["---"] * len(heads))]
     return rows + [_line(each.heading, f"`{each.name}`", each.unit, each.told) for each in there]
 
 
@@ -196,19 +198,19 @@ def _measure(results: Results, share: float) -> list[str]:
     settings = results.settings
     return [
         "A size is withstood if the walk recovers (`heelstrike.analysis.recovery`) from it and "
-        f"from every smaller size tried. Up to {settings.strides} growing sizes are tried until "
-        f"the walk fails, then {settings.halvings} bisections follow. ≥ means that the largest "
-        "size tried was withstood, < that the smallest was not. Pushes begin at "
-        f"{counted(settings.trials, 'phase', 'phases')} of a step, and rough ground has "
+        f"all smaller ones tried. Up to {settings.strides} growing sizes are tried until "
+        f"the walk fails, then {settings.halvings} bisections follow. ≥ (for friction ≤) means "
+        "that the hardest size tried was withstood, < that the easiest was not. Pushes begin at "
+        f"{counted(settings.trials, 'phase', 'phases')} of a step, rough ground has "
         f"{counted(settings.trials, 'shape', 'shapes')}, drawn from the seed, the same for all. "
-        "The tables give the size withstood at all of these "
-        f"phases or shapes. From this follows, with {SURE:.0%} confidence, that at least "
-        f"{share:.0%} of all phases or shapes are withstood. "
+        "A size in the tables was withstood at each of these. So, "
+        f"with {SURE:.0%} confidence, at least {share:.0%} of all phases or shapes allow recovery: "
+        f"if fewer did, the chance that all {settings.trials} do would be below "
+        f"{share:.2f}^{settings.trials} = {1.0 - SURE:.2f}. "
         "Everything else has one trial.",
         "",
-        "A controller is not tested further if its undisturbed walk falls, leans by more than "
-        "0.6 rad, or changes its speed. Standing controllers meet pushes and masses only, and have "
-        "no price.",
+        "Controllers under which the undisturbed walk falls, leans by more than 0.6 rad, or "
+        f"changes its speed are not tested. Rows with {NOTHING}: controllers that only stand.",
     ]
 
 

@@ -23,6 +23,7 @@ from heelstrike.gait.motion.program import (
     looked_at,
     phases_of,
 )
+from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import sole
@@ -152,6 +153,7 @@ def _check_numbers(
 
 
 def _check_robot(robot: Robot) -> None:
+    refuse_loops(robot, "a planned walk", GaitError)
     legs = leg_joints(robot) if len(robot.feet) == 2 else ()
     flat = all(sole(robot, foot).toe > sole(robot, foot).heel for foot in robot.feet)
     if not (flat and [len(leg) for leg in legs] == [3, 3] and robot.nv == 9 and robot.floating):

@@ -48,6 +48,7 @@ def save_motion(motion: Motion, path: str | PathLike[str]) -> None:
         "repeat": motion.repeat.value,
         "optimal": motion.optimal,
         "rise_m": motion.rise,
+        **({} if not np.isfinite(motion.closes_to) else {"closes_to": motion.closes_to}),
         "initial_position": motion.initial_state.q.tolist(),
         "initial_velocity": motion.initial_state.v.tolist(),
         "margins": {name: float(value) for name, value in motion.margins.items()},
@@ -58,6 +59,7 @@ def save_motion(motion: Motion, path: str | PathLike[str]) -> None:
                 "pieces": phase.pieces.tolist(),
                 "force_N": phase.force.tolist(),
                 "impulse_Ns": phase.impulse.tolist(),
+                **_of_loops(phase),
             }
             for phase in motion.phases
         ],
@@ -66,6 +68,15 @@ def save_motion(motion: Motion, path: str | PathLike[str]) -> None:
         write_whole(path, json_text("motion", VERSION, entries))
     except WriteError as error:
         raise GaitError(str(error)) from error
+
+
+def _of_loops(phase: MotionPhase) -> dict[str, Any]:
+    """What only robots with loops have."""
+    if not phase.loop_force.size:
+        return {}
+    return {
+        "loop_force_N": phase.loop_force.tolist(), "loop_impulse_Ns": phase.loop_impulse.tolist()
+    }  # fmt: skip
 
 
 @takes(GaitError)
@@ -121,6 +132,7 @@ def _motion_of(entries: Entries) -> Motion:
         initial_state=State(position, entries.numbers("initial_velocity", nv)),
         optimal=entries.data.get("optimal") is True,
         rise=entries.number("rise_m") if "rise_m" in entries.data else 0.0,
+        closes_to=entries.number("closes_to") if "closes_to" in entries.data else np.nan,
         margins={name: margins.number(name) for name in margins.data},
     )
 
@@ -132,10 +144,16 @@ def _phase_of(entries: Entries, nv: int, nc: int) -> MotionPhase:
         raise GaitError('"breakpoints_s" must rise from 0')
     contacts = entries.data.get("contacts")
     names = entries.names("contacts") if contacts else ()
+    loops: dict[str, Any] = {}
+    if "loop_force_N" in entries.data:
+        loops["loop_force"] = entries.numbers("loop_force_N", ends.size - 1, None, None)
+        rows = loops["loop_force"].shape[2]
+        loops["loop_impulse"] = entries.numbers("loop_impulse_Ns", rows)
     return MotionPhase(
         contacts=names,
         breakpoints=ends,
         pieces=pieces,
         force=entries.numbers("force_N", ends.size - 1, None, nc, 2),
         impulse=entries.numbers("impulse_Ns", nc, 2),
+        **loops,
     )

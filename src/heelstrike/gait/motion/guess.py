@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.dynamics import contact_positions, inverse_kinematics
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.errors import GaitError, RobotError
 from heelstrike.gait.motion.instant import size_of
 from heelstrike.gait.motion.program import (
@@ -17,6 +18,7 @@ from heelstrike.gait.motion.program import (
 )
 from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.robot.model import Floats
+from heelstrike.robot.state import State
 
 LOWERED = 0.95
 """Height of the trunk, as a share of that on straight legs."""
@@ -67,9 +69,10 @@ def _distance(request: MotionRequest, durations: Floats) -> float:
 
 
 def _forces(request: MotionRequest, p: int, durations: Floats) -> Floats:
-    """The weight, shared evenly; more of it where flight goes before, (2 nc, N)."""
+    """The weight, shared evenly; more of it where flight goes before, (forces, N)."""
     stands, robot = request.standing[p], request.robot
-    force = np.zeros((2 * robot.nc, STAGES * request.phases[p].pieces))
+    rows = 2 * robot.nc + count_rows(robot.model)
+    force = np.zeros((rows, STAGES * request.phases[p].pieces))
     if stands.normal:
         supported = sum(
             d for d, each in zip(durations, request.standing, strict=True) if each.normal
@@ -207,8 +210,29 @@ class _Walking(_Drawing):
                 q = inverse_kinematics(request.robot, q, foot, flat, local=local).q
             except RobotError:
                 continue
-        self._q = q
+        self._q = q = self._with_loops_closed(q)
         return q.copy()
+
+    def _with_loops_closed(self, q: Floats) -> Floats:
+        """Close what inverse kinematics opened; trunk and joints above the feet stay, if they can.
+
+        Where they cannot, the legs move a little, and the optimiser brings the feet back.
+        """
+        robot = self._request.robot
+        if not count_rows(robot.model):
+            return q
+        kept = {0, 1, 2}
+        for foot in robot.feet:
+            link = foot.link
+            while link >= 0:
+                kept.add(link)
+                link = int(robot.model.parent[link])
+        for keep in (sorted(kept), [0, 1, 2]):
+            try:
+                return robot.closed(State(q, np.zeros(robot.nv)), keep=keep).q
+            except RobotError:
+                continue
+        return q
 
     def _pivot(self, foot: int, phase: int) -> tuple[Floats, bool]:
         """Point of a foot that is put in its place, and whether it has no other."""

@@ -12,11 +12,18 @@ import casadi
 import numpy as np
 
 from heelstrike.dynamics import center_of_mass, contact_positions
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.places import write_point_rows
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
 from heelstrike.gait.blocks import Block
 from heelstrike.gait.cost import Instant, OwnConstraint
-from heelstrike.gait.cost_rate import heat_of, own_expression, rate_of
+from heelstrike.gait.cost_rate import (
+    heat_of,
+    own_expression,
+    powers_of,
+    rate_of,
+    smooth_rate_of,
+)
 from heelstrike.gait.motion.rows import Kind
 from heelstrike.gait.rows import Limit, Rows, joint_limits
 from heelstrike.robot.robot import Robot
@@ -28,7 +35,8 @@ class MotionFunctions:
     """Functions of a robot whose contact points stand, or not, on level or sloping ground.
 
     The parameters of both blocks are the slope of the ground (rad) and the coefficient of friction.
-    Forces of points are (away from the ground, along it), point by point.
+    Forces of points are (away from the ground, along it), point by point; those of closed loops and
+    coupled joints come after them, row by row.
 
     Parameters
     ----------
@@ -45,16 +53,26 @@ class MotionFunctions:
     ----------
     path : Block
         Variables are positions and two of their derivatives by the share of a piece, (nv,) each,
-        forces of all contact points, (2 nc,), places where they stand, (nc,), duration of a piece
-        (s), distance (m), time since the beginning of the motion (s). The cost is its rate times
-        the duration of a piece.
+        forces of all contact points and loops, (forces,), places where the points stand, (nc,),
+        duration of a piece (s), distance (m), time since the beginning of the motion (s). The cost
+        is its rate times the duration of a piece.
     path_rows : list of Row
         What its constraints mean.
+    spending : Block or None
+        For costs with corners, as |P| has one: variables are those of the path and, for each of the
+        powers, a bound of what every motor spends, in units of `power`. The cost is theirs, and its
+        constraints keep each above both powers of which the greater is spent. So nothing is
+        rounded off, and derivatives are exact. It is None if no cost has corners.
+    spending_rows : list of Row
+        What its constraints mean.
+    rounded : Block or None
+        Likewise without such bounds: of the variables of the path, with corners rounded off. It
+        leads near an optimum where the other one finds none.
     effort : casadi.Function
         The same variables and parameters to ΓᵀΓ times the duration of a piece.
     landing : Block
         Variables are positions, (nq,), velocities before in shares of the last piece and after it
-        in shares of the next, (nv,) each, impulses, (2 nc,), durations of both pieces (s).
+        in shares of the next, (nv,) each, impulses, (forces,), durations of both pieces (s).
     landing_rows : list of Row
         What its constraints mean.
     """
@@ -70,25 +88,10 @@ class MotionFunctions:
         self.gravity = float(np.hypot(*robot.model.gravity))
         self.length = size_of(robot)
         self.second = float(np.sqrt(self.length / self.gravity))
+        self.loops = count_rows(robot.model)
+        self.forces = 2 * robot.nc + self.loops
         self._build_path()
         self._build_landing()
-
-    def _points(self, dynamics: TracedDynamics) -> tuple[Symbols, Symbols, Symbols]:
-        """Heights, (nc,), rows (normal, tangent), (2 nc, nv), and their J̇v, (2 nc,)."""
-        model = self.robot.model
-        heights, rows, bias = [], dynamics.zeros(2 * model.nc, model.nv), []
-        for i, link, center in dynamics.contact_centers(None):
-            radius = model.contact_radius[i]
-            heights.append(self.up @ center - radius)
-            lowest = center - radius * self.up
-            dynamics.run(
-                write_point_rows, model, dynamics.work, link, lowest, self.up, 0,
-                rows[2 * i : 2 * i + 2],
-            )  # fmt: skip
-            # The gap and the sliding velocity of a disc that rolls are those of its centre.
-            moved = dynamics.bias_acceleration(link, center)[:2]
-            bias += [self.up @ moved, self.along @ moved]
-        return np.array(heights, dtype=object), rows, np.array(bias, dtype=object)
 
     def place(self, dynamics: TracedDynamics, contact: int) -> Any:
         """Where a point stands along the ground (m): a disc rolls, and where it began to counts."""
@@ -99,17 +102,19 @@ class MotionFunctions:
     def _build_path(self) -> None:
         robot, model = self.robot, self.robot.model
         n, weight = robot.nv, robot.weight
-        y = casadi.SX.sym("y", 3 * (n + robot.nc) + 3)
+        y = casadi.SX.sym("y", 3 * n + self.forces + robot.nc + 3)
         places = y[-3 - robot.nc : -3]
         q, first, second, force = casadi.vertsplit(
-            y[: -3 - robot.nc], [0, n, 2 * n, 3 * n, 3 * n + 2 * robot.nc]
+            y[: -3 - robot.nc], [0, n, 2 * n, 3 * n, 3 * n + self.forces]
         )
         duration, distance, time = y[-3], y[-2], y[-1]
         v, a = first / duration, symbols(second / duration**2)
         dynamics = TracedDynamics(robot, symbols(q), symbols(v))
-        heights, jacobian, bias = self._points(dynamics)
-        pushes = symbols(force)
-        needed = dynamics.inverse_dynamics(a) - dynamics.passive_force() - jacobian.T @ pushes
+        heights, jacobian, bias = point_rows(dynamics, self.up, self.along)
+        tied, tied_bias = dynamics.loop_jacobian(), dynamics.loop_bias_acceleration()
+        pushes, pulls = np.split(symbols(force), [2 * robot.nc])
+        needed = dynamics.inverse_dynamics(a) - dynamics.passive_force()
+        needed = needed - jacobian.T @ pushes - tied.T @ pulls
         speeds, accelerations = jacobian @ dynamics.v, jacobian @ a + bias
         actuated = model.actuator_joint
         torque = needed[actuated]
@@ -125,6 +130,13 @@ class MotionFunctions:
                 rows.add(kind, speeds[2 * i + k], subject=name, upper=0.0, of=i)
             away = self.place(dynamics, i) - places[i]
             rows.add(Kind.PLACE, away, subject=name, upper=0.0, of=i)
+        for kind, values, unit in (
+            (Kind.LOOP_REST, tied @ a + tied_bias, self.gravity),
+            (Kind.LOOP_STILL, tied @ dynamics.v, 1.0),
+            (Kind.LOOP_CLOSED, dynamics.loop_displacement(), 1.0),
+        ):
+            for name, value in zip(loop_rows(robot), values, strict=True):
+                rows.add(kind, value, subject=name, upper=0.0, unit=unit)
         self._add_cones(rows, pushes, (Kind.PUSH, Kind.FRICTION), weight)
         for i, name in enumerate(robot.contact_names):
             rows.add(Kind.HEIGHT, heights[i], subject=name, of=i)
@@ -145,12 +157,35 @@ class MotionFunctions:
             for k, value in enumerate(casadi.vertsplit(casadi.vec(own)), start=1):
                 rows.add(Kind.OWN, value, subject=f"number {k}")
         self.path_rows = rows.rows
-        rate = rate_of(self.cost, now, heat_of(model), weight * self.length / self.second)
-        cost = duration * rate / (casadi.fabs(distance) if self.per_metre else 1.0)
+        by = duration / (casadi.fabs(distance) if self.per_metre else 1.0)
         parameters = casadi.vertcat(self.slope, self.friction)
+        cost = by * smooth_rate_of(self.cost, now)
         self.path = Block("path", y, parameters, cost, casadi.vertcat(*rows.expressions))
+        self._build_spending(y, parameters, by, now)
         effort = duration * casadi.sumsqr(now.torque)
         self.effort = casadi.Function("effort", [y, parameters], [effort])
+
+    def _build_spending(self, y: Any, parameters: Any, by: Any, now: Instant) -> None:
+        """Bound what motors spend; `by` is what a rate counts."""
+        unit = self.robot.weight * self.length / self.second
+        found = powers_of(self.cost, now, heat_of(self.robot.model))
+        self.powers = len(found) * self.robot.nu
+        bounds = casadi.SX.sym("spent", self.powers)
+        rows, cost = Rows(), casadi.SX(0)
+        for k, (weight, *powers) in enumerate(found):
+            spent = bounds[k * self.robot.nu : (k + 1) * self.robot.nu]
+            cost += by * weight * unit * casadi.sum1(spent)
+            for power in powers:
+                for i, name in enumerate(self.robot.actuator_names):
+                    value = spent[i] * unit - power[i]
+                    rows.add(Kind.POWER, value, subject=name, unit=unit)
+        self.spending, self.spending_rows, self.rounded = None, rows.rows, None
+        if found:
+            given, limits = casadi.vertcat(y, bounds), casadi.vertcat(*rows.expressions)
+            self.spending = Block("spending", given, parameters, cost, limits)
+            rate = rate_of(self.cost, now, heat_of(self.robot.model), unit)
+            rate -= smooth_rate_of(self.cost, now)
+            self.rounded = Block("rounded", y, parameters, by * rate, casadi.SX(0))
 
     def _add_cones(
         self, rows: Rows, pushes: Symbols, kinds: tuple[Kind, Kind], unit: float
@@ -179,12 +214,14 @@ class MotionFunctions:
     def _build_landing(self) -> None:
         robot = self.robot
         n, weight = robot.nv, robot.weight
-        y = casadi.SX.sym("y", 3 * n + 2 * robot.nc + 2)
+        y = casadi.SX.sym("y", 3 * n + self.forces + 2)
         q, before, after, impulse = casadi.vertsplit(y[:-2], [0, n, 2 * n, 3 * n, y.numel() - 2])
-        before, after, pushes = symbols(before / y[-2]), symbols(after / y[-1]), symbols(impulse)
+        before, after = symbols(before / y[-2]), symbols(after / y[-1])
+        pushes, pulls = np.split(symbols(impulse), [2 * robot.nc])
         dynamics = TracedDynamics(robot, symbols(q), before)
-        heights, jacobian, _ = self._points(dynamics)
-        momentum = dynamics.mass_matrix() @ (after - before) - jacobian.T @ pushes
+        heights, jacobian, _ = point_rows(dynamics, self.up, self.along)
+        tied = dynamics.loop_jacobian()
+        momentum = dynamics.mass_matrix() @ (after - before) - jacobian.T @ pushes - tied.T @ pulls
         arriving, leaving = jacobian @ before, jacobian @ after
         rows = Rows()
         for j, name in enumerate(robot.joint_names):
@@ -195,6 +232,8 @@ class MotionFunctions:
             rows.add(Kind.NORMAL_STOP, leaving[2 * i], subject=name, upper=0.0, of=i)
             rows.add(Kind.TANGENT_STOP, leaving[2 * i + 1], subject=name, upper=0.0, of=i)
             rows.add(Kind.LEAVE, leaving[2 * i], subject=name, lower=-LEAVING, of=i)
+        for name, value in zip(loop_rows(robot), tied @ after, strict=True):
+            rows.add(Kind.LOOP_STOP, value, subject=name, upper=0.0)
         self._add_cones(rows, pushes, (Kind.IMPULSE, Kind.IMPULSE_FRICTION), weight * self.second)
         self.landing_rows = rows.rows
         parameters = casadi.vertcat(self.slope, self.friction)
@@ -207,6 +246,38 @@ def size_of(robot: Robot) -> float:
     q = robot.reference_state().q
     lowest = contact_positions(robot, q)[:, 1] - robot.model.contact_radius
     return float(center_of_mass(robot, q)[1] - lowest.min())
+
+
+def point_rows(
+    dynamics: TracedDynamics, up: Symbols, along: Symbols
+) -> tuple[Symbols, Symbols, Symbols]:
+    """Heights of contact points, (nc,), rows (normal, tangent), (2 nc, nv), their J̇v, (2 nc,).
+
+    Parameters
+    ----------
+    dynamics : TracedDynamics
+        The robot.
+    up, along : (2,) array
+        Directions away from the ground and along it.
+    """
+    model = dynamics.model
+    heights, rows, bias = [], dynamics.zeros(2 * model.nc, model.nv), []
+    for i, link, center in dynamics.contact_centers(None):
+        radius = model.contact_radius[i]
+        heights.append(up @ center - radius)
+        lowest = center - radius * up
+        dynamics.run(
+            write_point_rows, model, dynamics.work, link, lowest, up, 0, rows[2 * i : 2 * i + 2]
+        )
+        # The gap and the sliding velocity of a disc that rolls are those of its centre.
+        moved = dynamics.bias_acceleration(link, center)[:2]
+        bias += [up @ moved, along @ moved]
+    return np.array(heights, dtype=object), rows, np.array(bias, dtype=object)
+
+
+def loop_rows(robot: Robot) -> list[str]:
+    """Name of every row of closed loops, along x and z, and of coupled joints."""
+    return [name for name in robot.loop_names for _ in range(2)] + [*robot.coupling_names]
 
 
 LEAVING = 1e-6

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import field
 from functools import cached_property
 from os import PathLike
 
@@ -38,6 +39,11 @@ class MotionPhase:
     the first alone exerts what is along the ground: how points share that does not matter."""
     impulse: Floats
     """(nc, 2) Impulses (N s) at the end of the phase, likewise; zero where no point comes down."""
+    loop_force: Floats = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    """(K, s, rows) Forces of closed loops and coupled joints at the Gauss points (N, N m), row by
+    row of :func:`~heelstrike.dynamics.loop_jacobian`; of no size where the robot has none."""
+    loop_impulse: Floats = field(default_factory=lambda: np.zeros(0))
+    """(rows,) Their impulses at the end of the phase (N s, N m s)."""
 
     @property
     def duration(self) -> float:
@@ -83,11 +89,35 @@ class MotionPhase:
     @cached_property
     def force_pieces(self) -> Floats:
         """Coefficients of the forces, lowest first, in the time of each piece, (K, s, 2 nc)."""
+        return self._through(self.force)
+
+    def loop_forces(self, t: ArrayLike) -> Floats:
+        """Forces of closed loops and coupled joints at times in the phase, (..., rows).
+
+        Parameters
+        ----------
+        t : array_like
+            Times since the beginning of the phase (s).
+
+        Returns
+        -------
+        (..., rows) float
+            In N and N m, of the polynomial through those at the Gauss points.
+        """
+        return evaluated(self.loop_force_pieces, self.breakpoints, np.asarray(t, np.float64), 0)
+
+    @cached_property
+    def loop_force_pieces(self) -> Floats:
+        """Coefficients of the forces of loops, lowest first, likewise, (K, s, rows)."""
+        return self._through(self.loop_force)
+
+    def _through(self, values: Floats) -> Floats:
+        """Coefficients of polynomials through values at the Gauss points of pieces, (K, s, n)."""
         count, stages = self.force.shape[:2]
         nodes, _ = gauss(stages)
         times = np.diff(self.breakpoints)[:, None] * nodes
         powers = times[..., None] ** np.arange(stages)
-        given = self.force.reshape(count, stages, -1)
+        given = values.reshape(count, stages, values.size // (count * stages))
         return np.asarray(np.linalg.solve(powers, given), np.float64)
 
 
@@ -128,6 +158,10 @@ class Motion(ShownInNotebooks):
     margins: Mapping[str, float]
     """Smallest distance from every kind of limit along the phases, in its unit; those of landings
     are not among them."""
+    closes_to: float = np.nan
+    """Largest difference (m, rad, m/s, rad/s) between the state in which the motion goes on and
+    that to which the robot comes, integrated from the first state on under computed torque; NaN
+    where nobody looked."""
     rise: float = 0.0
     """By how much (m) the ground is higher from one repetition to the next, on level stairs."""
 

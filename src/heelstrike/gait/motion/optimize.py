@@ -12,15 +12,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.arguments import are_numbers, shown, takes
-from heelstrike.dynamics import contact_jacobian, contact_positions
+from heelstrike.dynamics import (
+    contact_positions,
+    link_poses,
+    loop_displacement,
+    loop_jacobian,
+    point_jacobian,
+)
 from heelstrike.errors import GaitError, GaitNotFoundError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.cost import Cost, OwnConstraint, OwnCost, costs_of
 from heelstrike.gait.gait import fingerprint
+from heelstrike.gait.motion.closing import Follower
 from heelstrike.gait.motion.guess import guess_of
-from heelstrike.gait.motion.instant import MotionFunctions
+from heelstrike.gait.motion.instant import MotionFunctions, loop_rows
 from heelstrike.gait.motion.motion import Motion, MotionPhase
-from heelstrike.gait.motion.phases import ContactPhase
+from heelstrike.gait.motion.phases import ContactPhase, Standing
 from heelstrike.gait.motion.program import (
     EQUATIONS,
     STAGES,
@@ -86,7 +93,8 @@ def optimize_motion(
     Parameters
     ----------
     robot : Robot
-        A floating robot without closed loops.
+        A floating robot. Closed loops and coupled joints hold, by forces that are unknowns, too;
+        joints may lack motors.
     phases : sequence of ContactPhase
         What stands in each phase, and its least and greatest duration.
     repeat : Repeat or its value
@@ -177,14 +185,16 @@ def optimize_motion(
         request, functions, tuple(looked_at(phase.pieces) for phase in request.phases)
     )
     report(0.1)
-    found = _solved(program, _known(program, warm_start), starts, report)
+    found = _solved_to_corners(program, warm_start, starts, report)
     if refine:
         found = _refined(found)
         report(0.9)
         found = _held_between(found)
+    motion = motion_of(found.program, found.program.polished(found.unknowns), found.optimal)
+    if refine:
+        motion = _closed(found, motion)
     report(1.0)
-    program = found.program
-    return motion_of(program, program.polished(found.unknowns), found.optimal)
+    return motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,8 +205,8 @@ class _Found:
     """The program."""
     unknowns: Floats
     """Its unknowns."""
-    multipliers: Floats
-    """Its multipliers."""
+    multipliers: Floats | None
+    """Its multipliers, if it was solved and not only polished."""
     optimal: bool
     """Whether it is an optimum."""
 
@@ -206,7 +216,11 @@ def checked_request(
     speed: Any, cost: Any, **others: Any,
 ) -> MotionRequest:  # fmt: skip
     """Check what is asked; raise a `GaitError` that says what cannot be."""
-    refuse_loops(robot, "motion design", GaitError)
+    refuse_loops(robot, "motion design", GaitError, loops=False)
+    if np.any(robot.model.loop_link < 0):
+        raise GaitError(
+            f"robot {robot.name!r}: a closed loop ties it to the world, so that it cannot walk"
+        )
     if robot.constraints:
         raise GaitError(
             "motion design does not support constraints from outside: use the robot without them"
@@ -261,17 +275,22 @@ def checked_request(
         robot=robot, phases=tuple(phases), repeat=goes_on, cost=costs_of(cost), speed=speed,
         total=duration, distance=(low, high), **others,
     )  # fmt: skip
-    _check_states(request)
+    request = _check_states(request)
     if goes_on is not Repeat.NEVER and not any(each.points for each in request.standing):
         raise GaitError("a motion that repeats needs a phase in which something stands")
     return request
 
 
-def _check_states(request: MotionRequest) -> None:
-    """Refuse given states in which what stands is not on the ground, or not where it was."""
-    robot, told = request.robot, {}
+def _check_states(request: MotionRequest) -> MotionRequest:
+    """Refuse given states in which what stands is not on the ground, or not where it was.
+
+    Returned is the request for states in which all of that holds to rounding: by what a given state
+    misses a contact or a loop, the motion could not close.
+    """
+    robot, told, given = request.robot, dict[str, Floats](), dict[str, Any]()
     along = np.array([np.cos(request.slope), np.sin(request.slope)])
     up = np.array([-along[1], along[0]])
+    names = robot.contact_names
     for name, state, stands in (
         ("start", request.start, request.standing[0]),
         ("end", request.end, request.standing[-1]),
@@ -283,27 +302,82 @@ def _check_states(request: MotionRequest) -> None:
         for i in sorted(stands.points):
             if abs(heights[i]) > ON_THE_GROUND:
                 raise GaitError(
-                    f"{robot.contact_names[i]!r} stands, but at the {name} it is "
+                    f"{names[i]!r} stands, but at the {name} it is "
                     f"{heights[i]:.3g} m away from the ground. Give a state in which it touches."
                 )
-        rows = contact_jacobian(robot, state.q) @ state.v
+        rows = _ground_rows(robot, state.q, along) @ state.v
         for i in sorted(stands.points):
             if np.abs(rows[i]).max() > ON_THE_GROUND:
                 raise GaitError(
-                    f"{robot.contact_names[i]!r} stands, but at the {name} it moves at "
+                    f"{names[i]!r} stands, but at the {name} it moves at "
                     f"{np.abs(rows[i]).max():.3g} m/s. Give a state in which it rests."
                 )
-        told[name] = centers @ along
-    if len(told) == 2:
-        for i in frozenset.intersection(*(each.points for each in request.standing)):
-            moved = told["end"][i] - told["start"][i]
+        for loop, away in zip(loop_rows(robot), loop_displacement(robot, state.q), strict=True):
+            if abs(away) > ON_THE_GROUND:
+                raise GaitError(
+                    f"at the {name} loop {loop} is open by {abs(away):.3g}. Close the state with "
+                    "robot.closed."
+                )
+        places = {i: told["start"][i] for i in request.never_lifted} if told else {}
+        for i, place in places.items():
+            moved = float(centers[i] @ along) - place
             if robot.model.contact_radius[i] == 0.0 and abs(moved) > ON_THE_GROUND:
                 raise GaitError(
-                    f"{robot.contact_names[i]!r} stands all the time, but from start to end it "
+                    f"{names[i]!r} stands all the time, but from start to end it "
                     f"would have to move by {moved:.3g} m. Move one of the states."
                 )
+        given[name] = settled(robot, state, stands, along, places)
+        told[name] = contact_positions(robot, given[name].q) @ along
+    return replace(request, **given)
 
 
+def settled(
+    robot: Robot, state: State, stands: Standing, along: Floats, places: Mapping[int, float]
+) -> State:
+    """Return the nearest state in which points rest on the ground and loops are closed.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    state : State
+        The state, nearly that already.
+    stands : Standing
+        What holds it.
+    along : (2,) array
+        Direction along the ground.
+    places : mapping of int to float
+        Where points are along the ground (m), of those of which this is known.
+    """
+    up = np.array([-along[1], along[0]])
+    known = [i for i in stands.tangent if i in places and not robot.model.contact_radius[i]]
+    normal, q = list(stands.normal), state.q.copy()
+    for _ in range(SETTLING):
+        centers, rows = contact_positions(robot, q), _ground_rows(robot, q, along)
+        away = [centers[normal] @ up - robot.model.contact_radius[normal]]
+        away += [centers[known] @ along - [places[i] for i in known], loop_displacement(robot, q)]
+        slopes = np.vstack([rows[normal, 0], rows[known, 1], loop_jacobian(robot, q)])
+        q -= np.linalg.pinv(slopes) @ np.concatenate(away)
+    rows = _ground_rows(robot, q, along).reshape(-1, robot.nv)[stands.forces]
+    held = np.vstack([rows, loop_jacobian(robot, q)])
+    return State(q, state.v - np.linalg.pinv(held) @ (held @ state.v))
+
+
+def _ground_rows(robot: Robot, q: Floats, along: Floats) -> Floats:
+    """Jacobian of the points next to the ground, away from it and along it, (nc, 2, nv)."""
+    model, angles = robot.model, link_poses(robot, q).angle
+    frame = np.array([[-along[1], along[0]], along])
+    rows = np.zeros((robot.nc, 2, robot.nv))
+    for i, link in enumerate(model.contact_link.tolist()):
+        cosine, sine = np.cos(angles[link]), np.sin(angles[link])
+        down = -model.contact_radius[i] * frame[0]
+        local = np.array([[cosine, -sine], [sine, cosine]]) @ down + model.contact_position[i]
+        rows[i] = frame @ point_jacobian(robot, q, link, local)[:2]
+    return rows
+
+
+SETTLING = 3
+"""Steps of Newton's method that put a state on the ground."""
 ON_THE_GROUND = 1e-6
 """Distance (m) within which a point touches, or is where it was."""
 STEEPEST = 1.0
@@ -377,6 +451,24 @@ def _solved(
     raise GaitNotFoundError(_not_found(program, nearest))
 
 
+def _solved_to_corners(
+    program: MotionProgram, motion: Motion | None, starts: int, report: Callable[[float], None]
+) -> _Found:
+    """Unknowns of an optimum likewise; where costs have corners, first with these rounded off."""
+    if program.functions.spending is None:
+        return _solved(program, _known(program, motion), starts, report)
+    sketch = replace(program, rounded=True)
+    try:
+        found = _solved(sketch, _known(sketch, motion), starts, report)
+    except GaitNotFoundError:
+        return _solved(program, _known(program, motion), starts, report)
+    start = _resampled(sketch, found.unknowns, program)
+    try:
+        return _again(replace(program, near=CLOSE), start, None)
+    except GaitNotFoundError:
+        return _Found(program, start, None, False)
+
+
 def _not_found(program: MotionProgram, unknowns: Floats) -> str:
     """Say which constraints are violated most where the optimiser came nearest."""
     missing = np.abs(program.violations(unknowns))[program.linear :]
@@ -425,7 +517,49 @@ def _refined(found: _Found) -> _Found:
             program, request=replace(request, phases=tuple(phases)),
             grids=tuple(looked_at(phase.pieces) for phase in phases), near=CLOSE,
         )  # fmt: skip
-        found = _again(finer, _resampled(program, unknowns, finer), None)
+        found = _again(finer, finer.polished(_resampled(program, unknowns, finer)), None)
+
+
+def _closed(found: _Found, motion: Motion) -> Motion:
+    """Halve pieces of the phases that are off most, until the motion closes.
+
+    Where pieces are halved, both halves go on along the polynomial of the whole, and equations are
+    satisfied by the least change. So nothing has corners within a piece, as optima on other meshes
+    have wherever a limit begins to hold, and errors fall fast. Another optimum is sought only if a
+    limit fails by more than it may between instants.
+    """
+    while True:
+        follower = Follower(found.program.request.robot, motion)
+        motion = replace(motion, closes_to=follower.missed())
+        if motion.closes_to <= CLOSED or not np.isfinite(motion.closes_to):
+            return motion
+        finer = _halved(found.program, follower.missed_by_phases())
+        if finer is None:
+            return motion
+        unknowns = finer.polished(_packed(motion.phases, motion.distance, finer))
+        found = _held_between(_Found(finer, unknowns, None, found.optimal))
+        if found.program is not finer:
+            unknowns = found.program.polished(found.unknowns)
+        motion = motion_of(found.program, unknowns, found.optimal)
+
+
+def _halved(program: MotionProgram, missed: Floats) -> MotionProgram | None:
+    """Return the program with twice the pieces in phases that are off most, if these may be."""
+    request = program.request
+    pieces = [
+        2 * phase.pieces if off >= OFF_MOST * missed.max() else phase.pieces
+        for phase, off in zip(request.phases, missed.tolist(), strict=True)
+    ]
+    if max(pieces) > SMALLEST_PIECES:
+        return None
+    phases = tuple(
+        ContactPhase(*phase.contacts, duration=phase.duration, pieces=count)
+        for phase, count in zip(request.phases, pieces, strict=True)
+    )
+    return replace(
+        program, request=replace(request, phases=phases),
+        grids=tuple(map(looked_at, pieces)), near=CLOSE,
+    )  # fmt: skip
 
 
 def _slip(program: MotionProgram, unknowns: Floats, p: int) -> float:
@@ -459,14 +593,22 @@ def _packed(motion: Sequence[MotionPhase], distance: float, finer: MotionProgram
         velocities.append(own.coordinates(at[1], order=1).T)
         bend = own.coordinates(at[2], order=2).T
         accelerations.append(bend.reshape(-1, phase.pieces, STAGES))
-        forces.append(own.forces(at[2]).reshape(at[2].size, -1).T)
+        exerted = own.forces(at[2]).reshape(at[2].size, -1)
+        forces.append(np.hstack([exerted, own.loop_forces(at[2])]).T)
     durations = np.array([own.duration for own in motion])
     return finer.packed(
         positions, velocities, accelerations, forces, durations, distance,
-        [each.impulse.ravel() for each in motion[: len(finer.landings)]],
+        [np.append(own.impulse, own.loop_impulse) for own in motion[: len(finer.landings)]],
     )  # fmt: skip
 
 
+CLOSED = 3e-9
+"""Difference (m, rad, m/s, rad/s) within which a motion goes on where it should: a third of what is
+promised, since others integrate otherwise."""
+OFF_MOST = 0.1
+"""Share of the largest error of a phase from which on the pieces of another are halved, too."""
+SMALLEST_PIECES = 192
+"""Pieces of a phase beyond which they are not halved."""
 STILL = 3e-4
 """Velocity (m/s) that a point that stands may have between the ends of pieces."""
 MOST_PIECES = 48
@@ -508,8 +650,9 @@ def _held_between(found: _Found) -> _Found:
         if not any(each.share.size for each in more):
             break
         grids = tuple(grid.joined(new) for grid, new in zip(program.grids, more, strict=True))
-        finer = replace(program, grids=grids, near=CLOSER)
-        priced = finer.multipliers_of(program, found.multipliers)
+        prices = found.multipliers
+        finer = replace(program, grids=grids, near=CLOSE if prices is None else CLOSER)
+        priced = None if prices is None else finer.multipliers_of(program, prices)
         found = _again(finer, found.unknowns, priced)
     return found
 
@@ -539,7 +682,7 @@ def motion_of(program: MotionProgram, unknowns: Floats, optimal: bool) -> Motion
     """Return the motion with the given unknowns, its cost and its margins."""
     request, robot = program.request, program.request.robot
     _, _, distance = program.parts(casadi.DM(unknowns))
-    effort, spent = 0.0, float(program.value(unknowns)[0])
+    effort, spent = 0.0, float(program.value(program.counted(unknowns))[0])
     if program.functions.per_metre:
         spent *= abs(float(distance))
     margins = dict[str, float]()
@@ -586,16 +729,20 @@ def _phases(program: MotionProgram, unknowns: Floats) -> list[MotionPhase]:
     _, impulses, _ = program.parts(casadi.DM(unknowns))
     phases = []
     for p, (pieces, force, ends) in enumerate(program.pieces(unknowns)):
-        impulse = np.zeros((robot.nc, 2))
+        struck = np.zeros(program.functions.forces)
         if p < len(impulses):
-            impulse = np.array(impulses[p]).reshape(robot.nc, 2)
+            struck = np.array(impulses[p]).ravel()
+        points = 2 * robot.nc
+        exerted = force.reshape(len(pieces), STAGES, -1)
         phases.append(
             MotionPhase(
                 contacts=tuple(robot.contact_names[i] for i in sorted(request.standing[p].points)),
                 breakpoints=ends,
                 pieces=pieces,
-                force=force.reshape(len(pieces), STAGES, robot.nc, 2),
-                impulse=impulse,
+                force=exerted[..., :points].reshape(len(pieces), STAGES, robot.nc, 2),
+                impulse=struck[:points].reshape(robot.nc, 2),
+                loop_force=exerted[..., points:],
+                loop_impulse=struck[points:],
             )
         )
     return phases

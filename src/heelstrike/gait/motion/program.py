@@ -28,7 +28,7 @@ DEGREE = STAGES + 1
 """Degree of the polynomials."""
 EQUATIONS = {
     Kind.MOTION, Kind.NORMAL_REST, Kind.TANGENT_REST, Kind.NORMAL_STILL, Kind.TANGENT_STILL,
-    Kind.PLACE,
+    Kind.PLACE, Kind.LOOP_REST, Kind.LOOP_STILL, Kind.LOOP_CLOSED,
 }  # fmt: skip
 """Kinds of constraint along the path that are equations."""
 MORE_ITERATIONS = {"max_iter": 300}
@@ -38,8 +38,11 @@ follows the problem, least energies are found, too; one that only falls misses t
 FROM_STOPS = 1e-3
 """Distance (rad, m) that joints keep from their stops: a robot that follows a motion nearly is not
 to hit them."""
-PARTS = 6
+PARTS = 7
 """Kinds of unknowns of a phase."""
+COUNTED = 2 * STAGES
+"""Gauss points of a piece at which costs with corners are summed up. Were they those of the
+equations of motion, forces would swing between them, unseen by the cost."""
 FROM_LIMITS = 1e-6
 """Scaled distance kept from the bounds of inequalities along the path, for the time between."""
 
@@ -67,9 +70,11 @@ class PhaseUnknowns:
     a: Any
     """(nv, (STAGES) K) Parts of the accelerations, all first parts first."""
     force: Any
-    """(2 nc, STAGES K) Forces at the Gauss points."""
+    """(forces, STAGES K) Forces of contact points and loops at the Gauss points."""
     places: Any
     """(nc,) Where the points stand along the ground (m); of the others nothing is meant."""
+    spent: Any
+    """(powers, COUNTED K) Bounds of what the motors spend; none if no cost has corners."""
     duration: Any
     """Duration of the phase (s)."""
 
@@ -87,7 +92,7 @@ class PhaseUnknowns:
         return first, second, third
 
     def forces(self, grid: Instants) -> Any:
-        """Forces at instants, (2 nc, N)."""
+        """Forces at instants, (forces, N)."""
         values = np.zeros((self.force.shape[1], grid.share.size))
         shares = lagrange(grid.share)
         for k in range(STAGES):
@@ -120,11 +125,11 @@ def phases_of(grid: Instants) -> Floats:
     return shares
 
 
-def gauss_points(pieces: int) -> Instants:
+def gauss_points(pieces: int, stages: int = STAGES) -> Instants:
     """Gauss points of all pieces of a phase."""
-    nodes, weights = gauss(STAGES)
+    nodes, weights = gauss(stages)
     return Instants(
-        pieces, np.repeat(np.arange(pieces), STAGES), np.tile(nodes, pieces),
+        pieces, np.repeat(np.arange(pieces), stages), np.tile(nodes, pieces),
         np.tile(weights, pieces) / pieces,
     )  # fmt: skip
 
@@ -151,8 +156,9 @@ class MotionProgram:
 
     Unknowns are, phase by phase: positions at the ends of the pieces, velocities at their
     beginnings and parts of the accelerations (as they are in a phase of its usual duration), the
-    forces that the contact points may exert at the Gauss points, in units of the weight, the places
-    where they stand, and the duration; then the impulses of every landing; then the distance.
+    forces that contact points and loops may exert at the Gauss points, in units of the weight, the
+    places where points stand, bounds of what motors spend, if a cost has corners, and the duration;
+    then the impulses of every landing; then the distance.
     """
 
     request: MotionRequest
@@ -163,6 +169,8 @@ class MotionProgram:
     """When the constraints of each phase hold; equations where there is a weight."""
     near: float = 0.0
     """Barrier parameter with which IPOPT begins where guesses are nearly optima; zero elsewhere."""
+    rounded: bool = False
+    """Whether corners of costs are rounded off, instead of bounds of what the motors spend."""
 
     def __post_init__(self) -> None:
         request = self.request
@@ -171,8 +179,9 @@ class MotionProgram:
         for phase, stands in zip(request.phases, request.standing, strict=True):
             pieces = phase.pieces
             sizes += [n * pieces, n * pieces, STAGES * n * pieces]
-            sizes += [len(stands.forces) * STAGES * pieces, len(stands.tangent), 1]
-        sizes += [len(each.forces) for each in self.landings]
+            sizes += [len(self._exerted(stands)) * STAGES * pieces, len(stands.tangent)]
+            sizes += [self.powers * COUNTED * pieces, 1]
+        sizes += [len(self._struck(each)) for each in self.landings]
         self._ends = [0, *np.cumsum([*sizes, 1]).tolist()]
         self._build()
 
@@ -197,8 +206,13 @@ class MotionProgram:
         """Number of unknowns."""
         return int(self._ends[-1])
 
+    @property
+    def powers(self) -> int:
+        """How many powers of motors have bounds."""
+        return 0 if self.rounded else self.functions.powers
+
     def parts(self, x: Any) -> tuple[list[PhaseUnknowns], list[Any], Any]:
-        """Return phases, impulses (2 nc,) and distance, of all unknowns."""
+        """Return phases, impulses (forces,) and distance, of all unknowns."""
         request, robot = self.request, self.request.robot
         n = robot.nv
         pieces_of = [x[k:end] for k, end in pairwise(self._ends)]
@@ -214,29 +228,39 @@ class MotionProgram:
             pieces, piece = phase.pieces, usual * np.diff(breakpoints(phase.pieces))
             rate, bend = (np.diag(x) for x in (piece, np.tile(piece**2, STAGES)))
             q = casadi.horzcat(start, casadi.reshape(mine[0], n, pieces))
-            force = casadi.reshape(mine[3], len(stands.forces), STAGES * pieces)
+            exerted = self._exerted(stands)
+            force = casadi.reshape(mine[3], len(exerted), STAGES * pieces)
             phases.append(
                 PhaseUnknowns(
                     q=q,
                     v=casadi.reshape(mine[1], n, pieces) @ casadi.sparsify(casadi.DM(rate)),
                     a=casadi.reshape(mine[2], n, STAGES * pieces)
                     @ casadi.sparsify(casadi.DM(bend)),
-                    force=self._spread(stands) @ force,
+                    force=self._spread(exerted) @ force,
                     places=self._placed(stands) @ mine[4],
-                    duration=mine[5],
+                    spent=casadi.reshape(mine[5], self.powers, COUNTED * pieces),
+                    duration=mine[6],
                 )
             )
             start = q[:, -1]
         impulses = [
-            self.functions.second * (self._spread(each) @ part)
+            self.functions.second * (self._spread(self._struck(each)) @ part)
             for each, part in zip(self.landings, pieces_of[PARTS * count : -1], strict=True)
         ]
         return phases, impulses, distance
 
-    def _spread(self, stands: Standing) -> Any:
+    def _exerted(self, stands: Standing) -> list[int]:
+        """Places of the unknown forces among those of points and loops: loops always pull."""
+        return [*stands.forces, *range(2 * self.request.robot.nc, self.functions.forces)]
+
+    def _struck(self, landing: Standing) -> list[int]:
+        """Places of the unknown impulses likewise; none where no point comes down."""
+        return self._exerted(landing) if landing.points else []
+
+    def _spread(self, places: list[int]) -> Any:
         """Matrix that puts unknown forces in units of the weight where they belong."""
-        spread = np.zeros((2 * self.request.robot.nc, len(stands.forces)))
-        spread[stands.forces, np.arange(len(stands.forces))] = self.request.robot.weight
+        spread = np.zeros((self.functions.forces, len(places)))
+        spread[places, np.arange(len(places))] = self.request.robot.weight
         return casadi.sparsify(casadi.DM(spread))
 
     def _placed(self, stands: Standing) -> Any:
@@ -279,22 +303,39 @@ class MotionProgram:
             upper.append(high[used])
             kept.append(used)
             self.labels += [(functions.landing_rows[k], p, 1.0) for k in np.flatnonzero(used)]
+        spending = functions.rounded if self.rounded else functions.spending
+        if spending is not None:
+            for p, phase in enumerate(request.phases):
+                grid = gauss_points(phase.pieces, COUNTED)
+                weight = grid.weight * grid.pieces
+                y = casadi.vertcat(path_variables(phases, p, grid, distance), phases[p].spent)
+                copies.append(Copies.of(spending, weight, x, y, numbers))
+                rows = [] if self.rounded else functions.spending_rows * grid.share.size
+                lower.append(np.zeros(len(rows)))
+                upper.append(np.full(len(rows), np.inf))
+                kept.append(np.full(spending.count * grid.share.size, not self.rounded))
+                self.labels += [(row, p, 1.0) for row in rows]
         blocks = BlockProgram(x, casadi.vertcat(*linear), copies)
         count = sum(each.numel() for each in linear)
         self.linear = count
         self._lower = np.concatenate([np.zeros(count), *lower])
         self._upper = np.concatenate([np.zeros(count), *upper])
-        rows = np.flatnonzero(np.concatenate([np.ones(count, bool), *kept])).tolist()
-        total = count + sum(each.size for each in kept)
+        places = np.flatnonzero(np.concatenate([np.ones(count, bool), *kept])).tolist()
         f, g = blocks.value(x)
-        price, prices = casadi.MX.sym("price"), casadi.MX.sym("prices", len(rows))
-        all_prices = casadi.MX(total, 1)
-        all_prices[rows] = prices
-        self.value = casadi.Function("value", [x], [f, g[rows]])
-        slopes = blocks.jacobian(x)[rows, :]
-        self.slopes = casadi.Function("slopes", [x], [slopes])
-        self._solver = Ipopt(
-            x, f, g[rows], gradient=blocks.gradient(x), jacobian=slopes,
+        self.value = casadi.Function("value", [x], [f, g[places]])
+        self.slopes = casadi.Function("slopes", [x], [blocks.jacobian(x)[places, :]])
+        self._blocks, self._places = blocks, places
+
+    @cached_property
+    def _solver(self) -> Ipopt:
+        """IPOPT with the derivatives of the program: no need of it to satisfy equations only."""
+        x, blocks, places = casadi.MX.sym("x", self.size), self._blocks, self._places
+        f, g = blocks.value(x)
+        price, prices = casadi.MX.sym("price"), casadi.MX.sym("prices", len(places))
+        all_prices = casadi.MX(g.numel(), 1)
+        all_prices[places] = prices
+        return Ipopt(
+            x, f, g[places], gradient=blocks.gradient(x), jacobian=blocks.jacobian(x)[places, :],
             hessian=(price, prices, blocks.hessian(x, price, all_prices)),
             settings=(NEAR | {"mu_init": self.near} if self.near else SETTINGS | ADAPTIVE)
             | MORE_ITERATIONS,
@@ -361,14 +402,20 @@ class MotionProgram:
             elif row.kind is Kind.TANGENT_REST:
                 used = ((stage == 1) | (stage == 2)) & (row.of[0] in stands.tangent)
             elif row.kind is Kind.PLACE:
+                # A given state at the end says where a point is, not that this is its place.
                 begins = (grid.piece == 0) & (grid.share == 0.0)
-                used = (begins | (ends & free)) & (row.of[0] in stands.tangent)
+                told = free | (row.of[0] not in request.never_lifted)
+                used = (begins | (ends & told)) & (row.of[0] in stands.tangent)
             elif row.kind is Kind.NORMAL_STILL:
                 used = ends & free & (row.of[0] in stands.normal)
             elif row.kind is Kind.TANGENT_STILL:
                 used = ends & free & (row.of[0] in stands.tangent)
             elif row.kind is Kind.MOTION:
                 used = weighed
+            elif row.kind is Kind.LOOP_REST:
+                used = (stage == 1) | (stage == 2)
+            elif row.kind in {Kind.LOOP_STILL, Kind.LOOP_CLOSED}:
+                used = ends & free
             elif row.kind is Kind.PUSH:
                 used = row.of[0] in stands.normal
                 lower[k] = request.force_margin_of(p, row.of[0]) / request.robot.weight
@@ -411,6 +458,7 @@ class MotionProgram:
                 Kind.ARRIVE: point in fresh,
                 Kind.NORMAL_STOP: point in landing.normal,
                 Kind.TANGENT_STOP: point in landing.tangent,
+                Kind.LOOP_STOP: bool(landing.points),
                 Kind.LEAVE: bool(fresh) and point in gone,
                 Kind.IMPULSE: point in landing.normal,
                 Kind.IMPULSE_FRICTION: not landing.points.isdisjoint(row.of),
@@ -477,13 +525,13 @@ class MotionProgram:
             At the ends of the pieces, and at their beginnings.
         accelerations : list of (nv, K, STAGES) array
             At the Gauss points.
-        forces : list of (2 nc, STAGES K) array
-            At the Gauss points (N).
+        forces : list of (forces, STAGES K) array
+            Of contact points and loops, at the Gauss points (N).
         durations : (phases,) array
             Durations (s).
         distance : float
             Distance (m).
-        impulses : list of (2 nc,) array, optional
+        impulses : list of (forces,) array, optional
             Impulses of every landing (N s).
         """
         nodes, _ = gauss(STAGES)
@@ -497,16 +545,34 @@ class MotionProgram:
             found += [
                 positions[p].ravel(order="F"), rate * velocities[p].ravel(order="F"),
                 rate**2 * parts.transpose(0, 2, 1).ravel(),
-                (forces[p][request.standing[p].forces] / request.robot.weight).ravel(order="F"),
-                self._places_at(positions[p][:, 0], request.standing[p]), durations[p : p + 1],
+                (forces[p][self._exerted(request.standing[p])] / request.robot.weight).ravel("F"),
+                self._places_at(positions[p][:, 0], request.standing[p]),
+                np.zeros(self.powers * COUNTED * pieces), durations[p : p + 1],
             ]  # fmt: skip
         unit = request.robot.weight * self.functions.second
-        given = impulses or [np.zeros(2 * request.robot.nc)] * len(self.landings)
+        given = impulses or [np.zeros(self.functions.forces)] * len(self.landings)
         found += [
-            np.asarray(impulse)[each.forces] / unit
+            np.asarray(impulse)[self._struck(each)] / unit
             for each, impulse in zip(self.landings, given, strict=True)
         ]
-        return np.concatenate([*found, [distance]])
+        return self.counted(np.concatenate([*found, [distance]]))
+
+    def counted(self, unknowns: Floats) -> Floats:
+        """Return unknowns whose bounds of what motors spend are what they spend."""
+        if self.functions.spending is None or self.rounded:
+            return unknowns
+        found, (phases, _, distance) = unknowns.copy(), self.parts(casadi.DM(unknowns))
+        request = self.request
+        for p, phase in enumerate(request.phases):
+            grid = gauss_points(phase.pieces, COUNTED)
+            y = path_variables(phases, p, grid, distance)
+            y = casadi.vertcat(y, casadi.DM.zeros(self.powers, grid.share.size))
+            numbers = casadi.repmat(casadi.DM([request.slope, request.friction]), 1, y.shape[1])
+            _, missing = self.functions.spending.value.map(y.shape[1])(y, numbers)
+            # Rows are those of one power and then those of the other, for every cost.
+            spent = -np.array(missing).T.reshape(y.shape[1], -1, 2, request.robot.nu).min(axis=2)
+            found[self._ends[PARTS * p + 5] : self._ends[PARTS * p + 6]] = spent.ravel()
+        return found
 
     def _places_at(self, q: Floats, stands: Standing) -> Floats:
         """Where the points that stand are along the ground."""
@@ -518,7 +584,7 @@ class MotionProgram:
         return places
 
     def pieces(self, unknowns: Floats) -> list[tuple[Floats, Floats, Floats]]:
-        """Coefficients (K, DEGREE + 1, nv), forces (STAGES K, nc, 2) and breakpoints (s)."""
+        """Coefficients (K, DEGREE + 1, nv), forces (STAGES K, forces) and breakpoints (s)."""
         phases, _, _ = self.parts(casadi.DM(unknowns))
         n, found = self.request.robot.nv, []
         for unknown in phases:
@@ -529,6 +595,5 @@ class MotionProgram:
             values = np.concatenate([q, v / own, a / np.tile(own, STAGES) ** 2], axis=1)
             values = values.reshape(n, DEGREE + 1, pieces).transpose(2, 1, 0)
             terms = [coefficients(each, length) for each, length in zip(values, own, strict=True)]
-            force = np.array(unknown.force).T.reshape(STAGES * pieces, -1, 2)
-            found.append((np.array(terms), force, ends))
+            found.append((np.array(terms), np.array(unknown.force).T, ends))
         return found

@@ -72,6 +72,11 @@ class MotionRequest:
         return [standing(self.robot, points_of(self.robot, phase)) for phase in self.phases]
 
     @cached_property
+    def never_lifted(self) -> frozenset[int]:
+        """Points that stand in all phases: where they are at the beginning, they stay."""
+        return frozenset.intersection(*(each.points for each in self.standing))
+
+    @cached_property
     def standing_after(self) -> Standing:
         """What holds it after the last phase, as it goes on."""
         first = self.standing[0]

@@ -17,8 +17,6 @@ PARTS: dict[str, tuple[str, ...]] = {
 """Landmarks of a side, and their names; of several in a file the first that is found counts."""
 MIDDLE: dict[str, tuple[str, ...]] = {"trunk": ("rib_cage", "ribcage", "trunk", "c7", "sternum")}
 """Landmarks of the trunk, above the hips."""
-LANDMARKS = (*(f"{side}_{part}" for side in ("right", "left") for part in PARTS), *MIDDLE)
-"""All landmarks."""
 
 
 def landmark_of(name: str) -> str | None:

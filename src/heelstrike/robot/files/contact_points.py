@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,6 +20,8 @@ from heelstrike.tolerances import LEVEL_GROUND, ONE_POINT
 SMALLEST_RADIUS = 1e-9  # metres; a smaller sphere is a point, which MJCF cannot say otherwise
 
 MOST_POINTS = 2000
+
+Point = TypeVar("Point")
 
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)  # MuJoCo's mjtGeom
 
@@ -83,7 +86,11 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
             f"(ellipsoid, tilted cylinder …) has no contact points: {', '.join(skipped)}. Add "
             "spheres, capsules or boxes where the robot meets the ground."
         )
-    points = in_order(_without_idle(points, of_meshes))
+    return not_too_many(file, in_order(_without_idle(points, of_meshes)))
+
+
+def not_too_many(file: MujocoFile, points: list[Point]) -> list[Point]:
+    """Return the contact points of a robot, or refuse more than it may have."""
     if len(points) > MOST_POINTS:
         raise file.error(
             f"the robot has {len(points)} contact points, and heelstrike takes up to "

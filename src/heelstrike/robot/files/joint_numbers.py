@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from heelstrike.robot.files.mujoco_file import MujocoFile
-from heelstrike.robot.model import PROPERTIES, Floats
+from heelstrike.robot.model import PROPERTIES, Floats, Number
 from heelstrike.robot.warning import warn
 
 ATTRIBUTES = {
@@ -73,15 +73,20 @@ def _custom(file: MujocoFile, name: str) -> Floats:
             if not file.is_urdf and joint not in known:  # fixed joints may have limits too
                 warn(f"{file.source}: {name}:{joint}: there is no joint of that name.")
             continue
-        if not value >= number.least:
-            words = name.replace("_", " ")
-            raise file.error(
-                f"the {words} of joint {joint!r} is {value}, not a number >= {number.least:g}."
-            )
-        # Exporters write 0 for the limit that nobody told them.
-        none = number.infinite and not 0.0 < value < LARGEST_NUMBER
-        values[index[joint]] = math.inf if none else value
+        values[index[joint]] = told_number(file, name, number, joint, value)
     return values
+
+
+def told_number(file: MujocoFile, name: str, number: Number, joint: str, value: float) -> float:
+    """Return a number of a joint as its file means it, or refuse what it cannot be."""
+    if not value >= number.least:
+        words = name.replace("_", " ")
+        raise file.error(
+            f"the {words} of joint {joint!r} is {value}, not a number >= {number.least:g}."
+        )
+    # Exporters write 0 for the limit that nobody told them.
+    none = number.infinite and not 0.0 < value < LARGEST_NUMBER
+    return math.inf if none else value
 
 
 def written_numbers(file: MujocoFile, name: str) -> Iterator[tuple[str, float]]:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from heelstrike.robot.model import Model
-from heelstrike.robot.robot import Foot, LockedJoint, Robot
+from heelstrike.robot.named_tree import Foot
+from heelstrike.robot.robot import LockedJoint, Robot
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.robot.spatial.model import SpatialModel
-from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.spatial.solids import Solid
 
 _PLAIN = (
@@ -57,7 +58,7 @@ def robot_of_entries(entries: dict[str, Any]) -> Robot | SpatialRobot:
         return SpatialRobot(
             **{name: _tuples(entries[name]) for name in _IN_SPACE},
             model=SpatialModel(**_arrays(entries["model"])),
-            feet=tuple(SpatialFoot(**_each_tuple(foot)) for foot in entries["feet"]),
+            feet=tuple(Foot(**_each_tuple(foot)) for foot in entries["feet"]),
             solids=tuple(Solid(**_arrays(solid)) for solid in entries["solids"]),
         )
     plain = {name: _tuples(entries[name]) for name in _PLAIN}

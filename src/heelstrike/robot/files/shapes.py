@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
+from typing import TypeVar
+
 import numpy as np
 
 from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
+from heelstrike.robot.model import Integers
 from heelstrike.robot.shapes.convex import Floats, convex_hull, with_fewer_corners
 from heelstrike.robot.shapes.outlines import Outline, without_hidden
 from heelstrike.robot.warning import warn
@@ -20,6 +24,8 @@ COUNT = "outlines"
 
 MOST_SHAPES = 200
 """Bodies of more shapes than this are drawn as bones."""
+
+Shape = TypeVar("Shape")
 
 FARTHEST = 1e6
 """Metres within which a shape is drawn."""
@@ -37,25 +43,46 @@ def read_outlines(file: MujocoFile, links: Links) -> tuple[Outline, ...]:
     saved = _saved(file)
     if saved is not None:
         return saved
+
+    def outline(geom: int, link: int) -> Outline | None:
+        shape = _drawable(file, geom, links.origin[link])
+        return None if shape is None else Outline(link, *shape)
+
+    return without_hidden(shapes_to_see(file, links.of_body, outline, without_hidden))
+
+
+def shapes_to_see(
+    file: MujocoFile, of_body: Integers, shape_of: Callable[[int, int], Shape | None],
+    seen: Callable[[list[Shape]], Collection[Shape]],
+) -> list[Shape]:  # fmt: skip
+    """Return what bodies look like: of each the shapes that do not collide, or else the others.
+
+    Parameters
+    ----------
+    file : MujocoFile
+        The file.
+    of_body : (bodies,) int
+        Link of each body, -1 for none.
+    shape_of : callable
+        Takes a geom and its link, returns the shape, None if it has none.
+    seen : callable
+        Takes the shapes of a body, returns those that are seen of them.
+    """
     model = file.model
-    shown = (model.geom_contype | model.geom_conaffinity) == 0
-    found: list[Outline] = []
+    idle = (model.geom_contype | model.geom_conaffinity) == 0
+    found: list[Shape] = []
     for body in range(1, model.nbody):
-        link = int(links.of_body[body])
+        link = int(of_body[body])
         geoms = np.flatnonzero(np.asarray(model.geom_bodyid) == body)
-        if len(geoms) > MOST_SHAPES:
+        if link < 0 or len(geoms) > MOST_SHAPES:
             continue
-        shapes = [_drawable(file, int(geom), links.origin[link]) for geom in geoms]
         for only_seen in (True, False):
-            outlines = [
-                Outline(link, *shape)
-                for geom, shape in zip(geoms, shapes, strict=True)
-                if shape is not None and shown[geom] == only_seen
-            ]
-            if link >= 0 and without_hidden(outlines):
-                found += outlines
+            shapes = [shape_of(int(geom), link) for geom in geoms if idle[geom] == only_seen]
+            there = [shape for shape in shapes if shape is not None]
+            if seen(there):
+                found += there
                 break
-    return without_hidden(found)
+    return found
 
 
 def _drawable(file: MujocoFile, geom: int, origin: Floats) -> tuple[Floats, float] | None:

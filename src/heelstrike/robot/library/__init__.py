@@ -9,7 +9,7 @@ from typing import Literal, Unpack, overload
 
 from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
-from heelstrike.robot.files.options import LoadOptions
+from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.reading import read_own, read_robot
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.spatial.robot import SpatialRobot
@@ -152,6 +152,11 @@ def _loaded(
         )
     name = os.fspath(name_or_path)
     if isinstance(name_or_path, str) and name in builtin_robots():
+        if Options(**how).packages:
+            raise RobotError(
+                f"robot {name!r} is built in, and no file of it lies in a package: leave out "
+                f"package_path. A file is loaded by its path, as in ./{name}.urdf."
+            )
         return read_own(_HERE / f"{name}.xml", dimension or 2, **how)
     path = Path(name)
     if path.suffix.lower() in _FILE_TYPES:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.robot.model import NUMBERS, SCALES, Floats, Integers, Model, label
-from heelstrike.robot.robot import Foot
+from heelstrike.robot.named_tree import Foot
 from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.tolerances import MIRRORED_PLACE
 

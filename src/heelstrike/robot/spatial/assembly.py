@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.errors import RobotError
-from heelstrike.robot.assembly import LARGEST_NUMBER
+from heelstrike.robot.assembly import LARGEST_NUMBER, low_leaves
 from heelstrike.robot.model import Floats
+from heelstrike.robot.named_tree import Foot
 from heelstrike.robot.spatial.model import BALL, FREE, HINGE, SPATIAL_NUMBERS, SpatialModel
-from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot
+from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.spatial.solids import Solid
 
 LEAST = 1e-30
@@ -78,12 +79,8 @@ def _name_contacts(model: SpatialModel, names: tuple[str, ...]) -> tuple[str, ..
 
 def _find_feet(
     model: SpatialModel, names: tuple[str, ...], origin: Floats, axes: Floats
-) -> tuple[SpatialFoot, ...]:
-    """Find the links that end a leg: leaves of the tree with contact points, low on the robot.
-
-    Low means that, in the reference configuration, the lowest contact point of the link is below
-    the middle between the lowest one of the robot and the robot's centre of mass.
-    """
+) -> tuple[Foot, ...]:
+    """Find the links that end a leg, as :func:`heelstrike.robot.assembly.find_feet` does."""
     if not model.nc:
         return ()
     center = origin + np.einsum("lij,lj->li", axes, model.center_of_mass)
@@ -92,14 +89,7 @@ def _find_feet(
     along = np.einsum("cij,cj->ci", axes[model.contact_link], model.contact_axis)[:, 2]
     drop = model.contact_radius + model.contact_rim * np.sqrt(np.maximum(0.0, 1.0 - along**2))
     bottom = origin[model.contact_link, 2] + place[:, 2] - drop
-    low = bottom.min() + 0.5 * max(0.0, height - float(bottom.min()))
-    leaves = np.setdiff1d(model.contact_link, model.parent).tolist()
-    contacts = {link: np.flatnonzero(model.contact_link == link) for link in leaves}
-    return tuple(
-        SpatialFoot(names[link], link, tuple(contacts[link].tolist()))
-        for link in leaves
-        if bottom[contacts[link]].min() <= low
-    )
+    return low_leaves(model, names, bottom, height)
 
 
 def _refuse_impossible_numbers(model: SpatialModel, source: str) -> None:

@@ -13,11 +13,11 @@ from heelstrike.robot.files.contact_points import (
     CAPSULE,
     CYLINDER,
     MESH,
-    MOST_POINTS,
     SMALLEST_RADIUS,
     SPHERE,
     contact_scales,
     geoms_that_touch,
+    not_too_many,
 )
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.shapes import mesh_corners
@@ -137,14 +137,7 @@ def read_spatial_points(file: MujocoFile, links: SpatialLinks, most: int) -> lis
             f"{1e3 * beyond[worst]:.2g} mm on {name!r}. Whoever wants less gives the link spheres, "
             "capsules or boxes."
         )
-    points = sorted(_merged(points), key=lambda point: point.link)
-    if len(points) > MOST_POINTS:
-        raise file.error(
-            f"the robot has {len(points)} contact points, and heelstrike takes up to "
-            f'{MOST_POINTS}. Let fewer of its geoms collide: give the others contype="0" and '
-            'conaffinity="0".'
-        )
-    return points
+    return not_too_many(file, sorted(_merged(points), key=lambda point: point.link))
 
 
 def _tell_of_self_collision(file: MujocoFile, geoms: list[int]) -> None:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.robot.inspection import aligned, span, tree
-from heelstrike.robot.model import SCALES, Floats
+from heelstrike.robot.inspection import aligned, facts_of_joints, facts_of_parts, span, tree
+from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import FREE, HINGE, SLIDE, SPATIAL_NUMBERS, JointKind
 from heelstrike.robot.spatial.robot import SpatialRobot
 
@@ -123,12 +123,6 @@ def _point_words(robot: SpatialRobot, link: int) -> str:
 def spatial_facts(robot: SpatialRobot) -> dict[str, Any]:
     """Return a robot as plain numbers and words, for JSON. Infinity becomes None."""
     model = robot.model
-    sizes = (("nq",), ("nv",), ("nu",), ("nj",))
-    numbers = {
-        name: [value if math.isfinite(value) else None for value in getattr(model, name).tolist()]
-        for name, number in SPATIAL_NUMBERS.items()
-        if number.shape in sizes and number.kind is float
-    }
     return {
         "name": robot.name,
         "dimension": 3,
@@ -139,14 +133,6 @@ def spatial_facts(robot: SpatialRobot) -> dict[str, Any]:
         "joint_axes": model.axis.tolist(),
         "positions": list(robot.position_names),
         "velocities": list(robot.velocity_names),
-        "links": list(robot.link_names),
-        "parent": model.parent.tolist(),
-        "link_mass_kg": model.mass.tolist(),
-        "link_inertia_kg_m2": model.inertia.tolist(),
-        "link_center_of_mass_m": model.center_of_mass.tolist(),
-        "actuators": list(robot.actuator_names),
-        "contact_points": list(robot.contact_names),
-        **{name: getattr(model, name).tolist() for name in SCALES},
-        "feet": [foot.name for foot in robot.feet],
-        **numbers,
+        **facts_of_parts(robot),
+        **facts_of_joints(robot, SPATIAL_NUMBERS),
     }

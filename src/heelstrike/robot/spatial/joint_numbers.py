@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.robot.files.joint_numbers import LARGEST_NUMBER, written_numbers
+from heelstrike.robot.files.joint_numbers import LARGEST_NUMBER, told_number, written_numbers
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.posture import joint_name
 from heelstrike.robot.model import Floats
@@ -92,13 +92,7 @@ def _custom(file: MujocoFile, name: str) -> Floats:
     number = SPATIAL_NUMBERS[name]
     values = np.full(model.nv, _DEFAULTS.get(name, math.inf))
     for joint, value in written_numbers(file, name):
-        if joint not in places:
-            continue
-        if not value >= number.least:
-            words = name.replace("_", " ")
-            raise file.error(
-                f"the {words} of joint {joint!r} is {value}, not a number >= {number.least:g}."
-            )
-        none = number.infinite and not 0.0 < value < LARGEST_NUMBER
-        values[np.asarray(model.dof_jntid) == places[joint]] = math.inf if none else value
+        if joint in places:
+            mine = np.asarray(model.dof_jntid) == places[joint]
+            values[mine] = told_number(file, name, number, joint, value)
     return values

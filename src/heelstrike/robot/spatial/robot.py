@@ -7,12 +7,12 @@ from dataclasses import field
 
 import numpy as np
 
-from heelstrike.arguments import refusal, takes
+from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.coordinates import index_of
-from heelstrike.robot.counted import Counted
-from heelstrike.robot.model import Floats
+from heelstrike.robot.coordinates import checked, index_of
+from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.named_tree import Foot, NamedTree
 from heelstrike.robot.spatial.model import BALL, FREE, JointKind, SpatialModel
 from heelstrike.robot.spatial.solids import Solid
 from heelstrike.robot.state import State
@@ -24,20 +24,12 @@ PLACE, QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 LINEAR, ANGULAR = ("vx", "vy", "vz"), ("wx", "wy", "wz")
 
 
-@dataclass(frozen=True)
-class SpatialFoot:
-    """A link in space that ends a leg and carries contact points."""
-
-    name: str
-    """Name of the foot's body in the robot file."""
-    link: int
-    """Index of the foot's link."""
-    contacts: tuple[int, ...]
-    """Indices of its contact points."""
+SpatialFoot = Foot
+"""Its earlier name for feet in space, which are described as those of the plane are."""
 
 
 @dataclass(frozen=True, eq=False)
-class SpatialRobot(Counted):
+class SpatialRobot(NamedTree):
     """A robot in three dimensions.
 
     Positions and velocities are those of MuJoCo for the same file: of a free joint the place of its
@@ -45,20 +37,8 @@ class SpatialRobot(Counted):
     in body axes. A ball joint has a quaternion and an angular velocity in the axes of its body.
     """
 
-    name: str
-    """Name of the robot."""
     model: SpatialModel
     """The arrays that the kernels use."""
-    joint_names: tuple[str, ...]
-    link_names: tuple[str, ...]
-    """joint_names, link_names: Names of the nj joints and of the links they move. A body with
-    several joints gives several links that share its name."""
-    actuator_names: tuple[str, ...]
-    """Names of the nu actuators."""
-    contact_names: tuple[str, ...]
-    """Names of the nc contact points."""
-    feet: tuple[SpatialFoot, ...]
-    """Links that end a leg and carry contact points, in file order."""
     contact_friction: tuple[float, ...] = ()
     """Friction of the nc contact points according to the robot's file. A simulation takes friction
     from its `Ground`."""
@@ -95,26 +75,13 @@ class SpatialRobot(Counted):
         """Total mass times gravity, in N."""
         return self.total_mass * float(np.linalg.norm(self.model.gravity))
 
-    def joint_index(self, joint: str | int) -> int:
-        """Index of a joint, given by its name (or by an index, which is checked).
+    @property
+    def driven(self) -> Integers:
+        """Index of the velocity that each actuator drives, (nu,)."""
+        return self.model.actuator_velocity
 
-        Parameters
-        ----------
-        joint : str or int
-            Name of the joint, or an index.
-
-        Returns
-        -------
-        int
-            Its place among the joints; ``model.first_position`` and ``model.first_velocity`` tell
-            those in q and v.
-
-        Raises
-        ------
-        RobotError
-            If there is no such joint; the message lists those there are.
-        """
-        return index_of(self, "joint", self.joint_names, joint)
+    def _checked(self, state: State) -> State:
+        return checked_state(self, state)
 
     @takes(RobotError)
     def state(
@@ -157,36 +124,6 @@ class SpatialRobot(Counted):
         for first in quaternion_places(self.model):
             q[first : first + 4] /= np.linalg.norm(q[first : first + 4])
         return checked_state(self, State(q, v))
-
-    def positions(self, state: State) -> dict[str, float]:
-        """Positions of a state by `position_names`, in rad and m.
-
-        Parameters
-        ----------
-        state : State
-            The state.
-
-        Returns
-        -------
-        dict
-            Position by name.
-        """
-        return dict(zip(self.position_names, checked_state(self, state).q.tolist(), strict=True))
-
-    def velocities(self, state: State) -> dict[str, float]:
-        """Velocities of a state by `velocity_names`, in rad/s and m/s.
-
-        Parameters
-        ----------
-        state : State
-            The state.
-
-        Returns
-        -------
-        dict
-            Velocity by name.
-        """
-        return dict(zip(self.velocity_names, checked_state(self, state).v.tolist(), strict=True))
 
     def __repr__(self) -> str:
         kinds = [JointKind(kind) for kind in self.model.joint_kind.tolist()]
@@ -243,11 +180,5 @@ def checked_state(robot: SpatialRobot, state: State) -> State:
         If it is none, has not nq positions and nv velocities, all finite, or a quaternion is far
         from length one.
     """
-    if not isinstance(state, State):
-        raise RobotError(refusal("state", state, ["State"]))
-    if state.v.shape != (robot.nv,) or not np.all(np.isfinite(state.v)):
-        raise RobotError(
-            f"v of a state of robot {robot.name!r} must be {robot.nv} finite numbers "
-            f"({', '.join(robot.velocity_names)}), got {state.v!r}."
-        )
-    return State(checked_position(robot, state.q), state.v)
+    sound = checked(robot, state)
+    return State(checked_position(robot, sound.q), sound.v)

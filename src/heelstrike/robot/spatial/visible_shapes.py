@@ -12,9 +12,9 @@ from heelstrike.robot.files.shapes import (
     ELLIPSOID,
     FARTHEST,
     MESH,
-    MOST_SHAPES,
     SPHERE,
     mesh_corners,
+    shapes_to_see,
 )
 from heelstrike.robot.shapes.solids import few_corners
 from heelstrike.robot.spatial.links import SpatialLinks
@@ -36,25 +36,11 @@ def read_solids(file: MujocoFile, links: SpatialLinks) -> tuple[Solid, ...]:
     Of every body of the file the shapes that do not collide, which are there to be seen, or the
     others if there are none. A mesh is the hull of some of its corners.
     """
-    model = file.model
-    shown = (model.geom_contype | model.geom_conaffinity) == 0
-    found: list[Solid] = []
-    for body in range(1, model.nbody):
-        link = int(links.of_body[body])
-        geoms = np.flatnonzero(np.asarray(model.geom_bodyid) == body)
-        if link < 0 or len(geoms) > MOST_SHAPES:
-            continue
-        for only_seen in (True, False):
-            solids = [
-                solid
-                for geom in geoms.tolist()
-                if shown[geom] == only_seen
-                and (solid := _solid(file, geom, link, links)) is not None
-            ]
-            if solids:
-                found += solids
-                break
-    return tuple(found)
+
+    def solid(geom: int, link: int) -> Solid | None:
+        return _solid(file, geom, link, links)
+
+    return tuple(shapes_to_see(file, links.of_body, solid, list))
 
 
 def _solid(file: MujocoFile, geom: int, link: int, links: SpatialLinks) -> Solid | None:

@@ -10,18 +10,17 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from dataclasses import field, replace
+from dataclasses import replace
 from time import perf_counter, thread_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
-from heelstrike.field_texts import dataclass
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.spatial.robot import SpatialRobot
@@ -35,7 +34,6 @@ from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.controller.raised import tell
 from heelstrike.sim.dimension import dimension_of
 from heelstrike.sim.method import Method
-from heelstrike.sim.plane import PLANE
 from heelstrike.sim.push import Push
 from heelstrike.sim.record.size import check_runs
 from heelstrike.sim.run import Timing
@@ -47,125 +45,11 @@ if TYPE_CHECKING:
     from heelstrike.contact.spatial.ground import SpatialGround
 
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-
 LANES_AT_ONCE = 64
 """Runs of each thread that are in memory at once."""
 
 SHOWN = 10
 """Runs that a warning of errors names at most, beside the first."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class AnyBatchResult:
-    """How many simulations ended, with their records if they were kept."""
-
-    position: Floats
-    """(n, nq)"""
-    velocity: Floats
-    """(n, nv) State of each run when it ended (m, rad; m/s, rad/s)."""
-    time: Floats
-    """(n,) When that was, in s."""
-    status: tuple[RunStatus, ...]
-    """How each run ended."""
-    message: tuple[str, ...]
-    """The same in a person's words."""
-    steps: Integers
-    saturations: Integers
-    """steps, saturations: (n,) Steps taken; times that a torque was clipped to its limit."""
-    events: Integers
-    """(n, kinds) Events of each kind, in the order of
-    :class:`~heelstrike.sim.closed_sets.EventKind`."""
-    penetration: Floats
-    """(n,) Deepest penetration of a contact point, in m."""
-    energy_gain: Floats
-    """(n,) Kinetic energy that restitution made (J)."""
-    solves: Integers
-    shortcuts: Integers
-    fallbacks: Integers
-    failures: Integers
-    relaxed: Integers
-    """solves, shortcuts, fallbacks, failures, relaxed: (n,) Contact problems of each run, and how
-    they were solved; see :class:`~heelstrike.sim.run.SolverCount`."""
-    threads: int
-    """Threads that worked on it."""
-    timing: Timing
-    """Seconds spent compiling, or loading compiled code, and simulating."""
-    _runs: tuple[Any, ...] | None = field(default=None, repr=False)
-
-    def __len__(self) -> int:
-        return len(self.status)
-
-    @property
-    def completed(self) -> NDArray[np.bool_]:
-        """Which runs lasted as long as they were asked to, (n,)."""
-        return np.array([status is RunStatus.COMPLETED for status in self.status], dtype=bool)
-
-    def run(self, index: int) -> Any:
-        """Return the record of one run, as :func:`~heelstrike.simulate` would have.
-
-        Parameters
-        ----------
-        index : int
-            Which run.
-
-        Returns
-        -------
-        Run or SpatialRun
-            Its record.
-
-        Raises
-        ------
-        SimulationError
-            If the batch was not recorded, or was interrupted before this run began.
-        IndexError
-            If there is no such run.
-        """
-        if not -len(self) <= index < len(self):
-            raise IndexError(f"there is no run {index} in a batch of {len(self)}")
-        run = None if self._runs is None else self._runs[index]
-        if run is not None:
-            return run
-        if self._runs is None:
-            raise SimulationError(
-                "this batch kept final states only; call simulate_batch with record_every=1, or "
-                "another number of steps between two rows, to have its runs"
-            )
-        raise SimulationError(f"the batch was interrupted before run {index} began")
-
-    def __str__(self) -> str:
-        counts = [
-            f"{count} {status.value}"
-            for status in RunStatus
-            if (count := sum(each is status for each in self.status))
-        ]
-        return f"{len(self)} runs: {', '.join(counts)}"
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class BatchResult(AnyBatchResult):
-    """What many simulations came to."""
-
-    complementarity: Floats
-    cone: Floats
-    non_penetration: Floats
-    """complementarity, cone, non_penetration: (n,) Largest relative residuals of the contact
-    problems."""
-    combinations: Integers
-    """(n,) Contact problems that came to the last resort, combinations of contact modes."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class SpatialBatchResult(AnyBatchResult):
-    """What many simulations in space came to."""
-
-    residual: Floats
-    """(n,) Largest relative residual of the contact problems."""
-    uncertified: Integers
-    halved: Integers
-    """uncertified, halved: (n,) Steps that went on with a residual above 1e-9; that were taken in
-    parts."""
 
 
 @takes(SimulationError)
@@ -432,8 +316,7 @@ class _Work:
             name: np.array([ending.counts[name] for ending in endings])
             for name in endings[0].counts
         }
-        kind: Any = BatchResult if self._dimension is PLANE else SpatialBatchResult
-        return kind(
+        return self._dimension.batch_result(
             position=np.array([ending.state.q for ending in endings]).reshape(count, -1),
             velocity=np.array([ending.state.v for ending in endings]).reshape(count, -1),
             time=np.array([ending.time for ending in endings]),

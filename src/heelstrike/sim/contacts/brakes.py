@@ -18,12 +18,11 @@ import numpy as np
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.latches import several
+from heelstrike.sim.contacts.latches import joints_with, several
 from heelstrike.sim.contacts.loops import (
     BEGINS_TO_RUB,
     HOLDS,
@@ -126,13 +125,7 @@ def brakes_of(robot: Robot, joints: Iterable[str | int] | str | int) -> tuple[bo
     SimulationError
         If a joint has no brake.
     """
-    chosen = [robot.joint_index(joint) for joint in several("braked", joints)]
-    for joint in chosen:
-        if joint not in robot.model.brake_joint:
-            raise SimulationError(
-                f"joint {robot.joint_names[joint]!r} of robot {robot.name!r} has no brake; "
-                f"{', '.join(robot.brake_names) or 'no joint'} has"
-            )
+    chosen = joints_with(robot, "brake", robot.brake_names, several("braked", joints))
     return tuple(joint in chosen for joint in robot.model.brake_joint.tolist())
 
 

@@ -206,7 +206,7 @@ def note_answer(span: float, memory: Memory) -> None:
     keep_stops(span, rows.owner, rows.side, assembly, reaction.stop_torque, reaction.mode)
     keep_constraints(span, rows, assembly, loops.constraint_force, reaction.mode)
     keep_dry_joints(span, rows.owner, assembly, reaction.friction_torque, reaction.mode)
-    keep_second_faces(span, rows.owner, assembly, memory.seconds.force, reaction.mode)
+    keep_second_faces(span, rows.owner, assembly, memory.second_faces.force, reaction.mode)
     first, impulse = assembly.problem.first, assembly.answer.impulse
     note_loops(rows, assembly.until[LOOP], span, first, impulse, loops)
 

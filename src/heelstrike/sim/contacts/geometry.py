@@ -49,7 +49,7 @@ def locate_contacts(
         surface.restitution[i] = model.restitution_scale[i] * restitution
         if ground.curved == 1:
             distance = contacts.gap[i] + radius
-            surface.bend[i] = path_curvature(ground, point[0], distance, normal)
+            surface.curvature[i] = path_curvature(ground, point[0], distance, normal)
         point[0] -= radius * normal[0]
         point[1] -= radius * normal[1]
 
@@ -65,8 +65,8 @@ def contact_velocity(
 
 
 @kernel
-def bend_acceleration(
-    model: Model, tree: Workspace, contacts: Contacts, contact: int, bend: float
+def curvature_acceleration(
+    model: Model, tree: Workspace, contacts: Contacts, contact: int, curvature: float
 ) -> float:
     """Acceleration of a gap because its point goes along ground that is curved (m/s²)."""
     radius, center = model.contact_radius[contact], contacts.position[contact]
@@ -75,7 +75,7 @@ def bend_acceleration(
     above = x + radius * normal[0], z + radius * normal[1]
     velocity = velocity_at(tree.velocity, model.contact_link[contact], above)
     _, along = into_frame(normal, velocity)
-    return bend * along * along
+    return curvature * along * along
 
 
 @kernel

@@ -99,12 +99,19 @@ def latches_of(robot: Robot, latched: Iterable[str | int]) -> list[int]:
     SimulationError
         If a joint has none.
     """
-    chosen = [robot.joint_index(joint) for joint in several("latched", latched)]
+    return joints_with(robot, "latch", robot.latch_names, several("latched", latched))
+
+
+def joints_with(
+    robot: Robot, part: str, having: tuple[str, ...], joints: Iterable[str | int]
+) -> list[int]:
+    """Return the indices of joints, or refuse one that is not among those having a part."""
+    chosen = [robot.joint_index(joint) for joint in joints]
     for joint in chosen:
-        if joint not in robot.model.latch_joint:
+        if robot.joint_names[joint] not in having:
             raise SimulationError(
-                f"joint {robot.joint_names[joint]!r} of robot {robot.name!r} has no latch; "
-                f"{', '.join(robot.latch_names) or 'no joint'} has"
+                f"joint {robot.joint_names[joint]!r} of robot {robot.name!r} has no {part}; "
+                f"{', '.join(having) or 'no joint'} has"
             )
     return chosen
 

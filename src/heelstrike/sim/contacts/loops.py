@@ -103,7 +103,7 @@ def leave_one(loop: int, loops: Loops) -> None:
     next to nothing, and would ask for more than there are digits.
     """
     jacobian = loops.rows.jacobian
-    loops.lean[loop, 0] = loops.lean[loop, 1] = 0.0
+    loops.multiple[loop, 0] = loops.multiple[loop, 1] = 0.0
     along_x, along_z, product = 0.0, 0.0, 0.0
     for j in range(jacobian.shape[1]):
         x, z = jacobian[2 * loop, j], jacobian[2 * loop + 1, j]
@@ -117,7 +117,7 @@ def leave_one(loop: int, loops: Loops) -> None:
     for j in range(jacobian.shape[1]):
         away = max(away, abs(jacobian[row, j] - part * jacobian[other, j]))
     if away * away <= SAME * SAME * square:
-        loops.lean[loop, shorter] = part
+        loops.multiple[loop, shorter] = part
         loops.rows.displacement[row] = 0.0
         loops.rows.bias[row] = 0.0
         for j in range(jacobian.shape[1]):
@@ -192,12 +192,13 @@ def note_loop(table: Rows, row: int, force: float, loops: Loops) -> None:
     entry = loops.entry[row]
     owner, kind = table.owner[entry], table.kind[entry]
     if kind == LOOP:
-        force_now, lean, last = loops.loop_force[owner], loops.lean[owner], table.axis[entry]
+        force_now, multiple = loops.loop_force[owner], loops.multiple[owner]
+        last = table.axis[entry]
         force_now[last] = force
         for axis in range(2 if last == 1 else 0):  # of forces that do the same the least
-            if lean[axis] != 0.0:
-                force_now[1 - axis] /= 1.0 + lean[axis] * lean[axis]
-                force_now[axis] = lean[axis] * force_now[1 - axis]
+            if multiple[axis] != 0.0:
+                force_now[1 - axis] /= 1.0 + multiple[axis] * multiple[axis]
+                force_now[axis] = multiple[axis] * force_now[1 - axis]
     elif kind == COUPLING:
         loops.coupling_force[owner] = force
     elif kind == TIE:

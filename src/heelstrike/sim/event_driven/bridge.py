@@ -112,7 +112,7 @@ def gather_near(
         if not is_dry and gap > length * max(CLOSING_SPEED, -2.0 * normal):
             continue
         free_gap_acceleration(
-            contact, count, model, tree, rows, modes.face, modes.bend, rate, jacobian, free
+            contact, count, model, tree, rows, modes.face, modes.curvature, rate, jacobian, free
         )
         for row in range(2 * count, 2 * count + 2):
             free[row] = row_product(jacobian, row, v) + length * free[row]

@@ -88,7 +88,7 @@ def insist(fired: Integers, force: Floats, modes: Modes) -> None:
 def is_unclear(ahead: float, watch: Watch) -> bool:
     """Whether a force that reached its limit is not clearly beyond it in a moment."""
     for i in range(watch.fired.shape[0]):
-        if watch.fired[i] == 1 and watch.value[i] > -CLEARLY * watch.weight:
+        if watch.fired[i] == 1 and watch.value[i] > -CLEARLY * watch.force_scale:
             return ahead < LAST_LOOK
     return False
 
@@ -134,8 +134,8 @@ def leave_if_possible(
         if problem.set[place] == INTERVAL:
             continue
         apart = apart and free[row] >= 0.0
-        lean = -slide[contact] * friction[contact]
-        if delassus[row, row] + lean * delassus[row, row + 1] <= 0.0:
+        ratio = -slide[contact] * friction[contact]
+        if delassus[row, row] + ratio * delassus[row, row + 1] <= 0.0:
             # Pressing it harder would push it into the ground: there are other solutions.
             several = True
             log_event(time, PAINLEVE, owner[contact], 0.0, 0.0, record.told)
@@ -256,7 +256,7 @@ def contradicts_itself(modes: Modes, watch: Watch, deficient: int) -> bool:
     """
     if deficient == 1:
         return False
-    least = -CONTRADICTION * watch.weight
+    least = -CONTRADICTION * watch.force_scale
     for contact in range(modes.watched):
         if modes.carrier[contact] == 1 and watch.value[2 * contact] < least:
             return True

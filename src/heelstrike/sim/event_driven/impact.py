@@ -178,7 +178,7 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
     equations, assembly = memory.equations, memory.assembly
     candidate, problem, directions = assembly.candidate, assembly.problem, assembly.directions
     jacobian, free, first = directions.jacobian, problem.free, problem.first
-    tree, rate, face, bend = equations.tree, equations.rate, modes.face, modes.bend
+    tree, rate, face, curvature = equations.tree, equations.rate, modes.face, modes.curvature
     evaluate_equations(model, q, v, equations)
     locate(q, v, model, ground, tree, rows, modes, memory.surface)
     free_acceleration(
@@ -190,7 +190,9 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
     write_candidates(count, candidate, model, tree, rows, first, directions.leaf, jacobian)
     for place in range(count):
         contact = candidate[place]
-        free_gap_acceleration(contact, place, model, tree, rows, face, bend, rate, jacobian, free)
+        free_gap_acceleration(
+            contact, place, model, tree, rows, face, curvature, rate, jacobian, free
+        )
     total = append_loops(count, 2, loops, assembly)
     free_loops(total, loops, rate, 1.0, assembly)
     if total > 0:  # the forces of what is closed act on the rest
@@ -206,7 +208,9 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
         if modes.closed[contact] == 1 or not touched:
             continue
         gap_rows(contact, total, model, tree, rows, first, directions.leaf, jacobian)
-        free_gap_acceleration(contact, total, model, tree, rows, face, bend, rate, jacobian, free)
+        free_gap_acceleration(
+            contact, total, model, tree, rows, face, curvature, rate, jacobian, free
+        )
         normal, _ = gap_velocity(contact, model, tree, rows, v)
         pull = -free[2 * total]
         if not (pull > 0.0 and 0.0 < 2.0 * normal <= SHORTEST_BOUNCE * pull):

@@ -247,7 +247,7 @@ def crossing(function: int, low: float, high: float, length: float, within: Inte
         bracket = low, -rate, high, -later_rate
         end = find_root(function, -1.0, bracket, length, within)
         value = watch.value[function]
-    least = noise(function, modes, watch.weight, samples)
+    least = noise(function, modes, watch.force_scale, samples)
     if is_gap and rate >= 0.0 and later_rate >= 0.0 and before <= least:
         # It rises: it is no nearer than before, but for the error of the dense output.
         least = step.absolute + step.relative

@@ -62,7 +62,7 @@ class Modes(Bundle):
     face: Integers = array("contacts", of=int)
     """Face of the ground that each closed contact point is on, -1 for none; the second that it is
     on, or could meet (:mod:`heelstrike.sim.event_driven.smooth.faces`)."""
-    bend: Floats = array("contacts")
+    curvature: Floats = array("contacts")
     """Curvature (1/m) of the way of the centre of each disc along smooth ground."""
 
 
@@ -78,9 +78,9 @@ class Watch(Bundle):
     """value, rate: Event functions and their rates at the last evaluation."""
     fired: Integers = array("functions", of=int)
     """Event functions that ended the step."""
-    weight: float = cell(float)
-    """Of the robot, or its mass where there is no gravity: what forces are small or large
-    beside."""
+    force_scale: float = cell(float)
+    """What forces are small or large beside (N): the weight of the robot, or its mass times 1 m/s²
+    where there is no gravity."""
 
 
 class Samples(Bundle):
@@ -118,9 +118,10 @@ class HeldRows(Bundle):
 
     row: Integers = array("rows", of=int)
     """Row of the Jacobian that each unknown force acts along."""
-    lean: Floats = array("rows")
+    friction_ratio: Floats = array("rows")
+    """Tangential force per normal force of a point that slides, of either sign; zero of others."""
     scale: Floats = array("rows")
-    """lean, scale: Tangential force that it brings along; its unit."""
+    """Unit of the force."""
     system: Floats = array("rows", "rows + 1")
     unknown: Floats = array("rows")
     column: Integers = array("rows", of=int)
@@ -353,7 +354,7 @@ def allocate_motion(robot: Robot) -> Motion:
     }  # fmt: skip
     phase = Phase.allocate(extents)
     mass, gravity = float(sum(model.mass)), np.sqrt(np.sum(model.gravity**2))
-    phase.watch.weight = mass * gravity if gravity > 0.0 else mass
+    phase.watch.force_scale = mass * gravity if gravity > 0.0 else mass
     phase.watch.value[:] = 1.0
     phase.modes.face[:] = NO_FACE
     motion = Motion.allocate(extents, phase=phase)

@@ -143,7 +143,7 @@ def end_at_event(length: float, taken: Integration) -> tuple[float, bool, bool]:
         change = 0.0
         for i in range(fired.shape[0]):
             passes = fired[i] == 1 and is_geometric(i, modes) and rate[i] < 0.0
-            least = NEAR_ENOUGH * noise(i, modes, watch.weight, step.samples)
+            least = NEAR_ENOUGH * noise(i, modes, watch.force_scale, step.samples)
             if passes and abs(value[i]) > least:
                 change = -value[i] / rate[i]
         # Where it turns round rather than passes zero, its rate does not tell where zero is.

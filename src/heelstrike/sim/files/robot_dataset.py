@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.robot.model import NUMBERS, SCALES, SELDOM, Model, bounds
-from heelstrike.robot.robot import Foot, Robot
+from heelstrike.robot.model import NUMBERS, SCALES, Model, bounds
+from heelstrike.robot.robot import Robot
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
-from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot
+from heelstrike.sim.files.tree_variables import TreeVariables
 from heelstrike.sim.files.variables import DamageError, Stored, Variable
 
 if TYPE_CHECKING:
     import xarray
-
-_SomeFoot = TypeVar("_SomeFoot", Foot, SpatialFoot)
 
 _DIMS: dict[str | int, str] = {
     "nl": "coordinate", "nj": "coordinate", "nq": "coordinate", "nv": "coordinate",
@@ -29,29 +27,7 @@ _DIMS: dict[str | int, str] = {
 }  # fmt: skip
 """Dimensions of the file. In the plane links, joints and coordinates share one."""
 _SIZES = {"xz": 2, "motion": 3, "end": 2, "power": 5}
-_NUMBERS = {
-    name: Variable(
-        tuple(_DIMS[size] for size in number.shape),
-        number.unit,
-        kind=number.kind,
-        allowed="infinite" if number.infinite else "",
-        default=number.default if number.later else None,
-    )
-    for name, number in NUMBERS.items()
-    if number.shape
-}
-_NAMES = {
-    "joint_names": Variable(("coordinate",), kind=str),
-    "link_names": Variable(("coordinate",), kind=str),
-    "actuator_names": Variable(("actuator",), kind=str),
-    "contact_names": Variable(("contact",), kind=str),
-}
-FEET = {
-    "foot_link": Variable(("foot",), kind=int),
-    "foot_name": Variable(("foot",), kind=str),
-    "contact_foot": Variable(("contact",), kind=int),
-}
-_FRICTION = {"contact_friction": Variable(("contact",))}
+_TREE = TreeVariables(NUMBERS, _DIMS)
 _MIRROR = {
     "mirror_joint": Variable(("coordinate",), kind=int),
     "mirror_sign": Variable(("coordinate",)),
@@ -68,19 +44,7 @@ _OUTLINES = {
 
 def robot_to_dataset(robot: Robot) -> xarray.Dataset:
     """Return the numbers and names of a robot as a dataset."""
-    import xarray
-
-    values: dict[str, Any] = {
-        **{
-            name: each
-            for name in _NUMBERS
-            if (each := getattr(robot.model, name)).size or NUMBERS[name].shape[0] not in SELDOM
-        },
-        **{name: getattr(robot, name) for name in _NAMES},
-        **told_feet(robot),
-    }
-    if robot.contact_friction:
-        values["contact_friction"] = robot.contact_friction
+    values: dict[str, Any] = {}
     if robot.mirror is not None:
         values |= {name: getattr(robot.mirror, name.removeprefix("mirror_")) for name in _MIRROR}
     if robot.outlines:
@@ -90,54 +54,8 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
             "outline_corners": [len(each.corners) for each in robot.outlines],
             "outline_corner": np.concatenate([each.corners for each in robot.outlines]),
         }
-    declared = _NUMBERS | _OUTLINES | _NAMES | FEET | _FRICTION | _MIRROR
-    # NetCDF has no lists of no text: names of nothing are left out.
-    variables = {
-        name: declared[name].written(each)
-        for name, each in values.items()
-        if declared[name].kind is not str or len(each)
-    }
-    attributes = {
-        "name": robot.name,
-        "source": robot.source,
-        "floating": int(robot.floating),
-        "symmetric": int(robot.mirror is not None),
-        "pivot": int(robot.model.pivot),
-    }
-    return xarray.Dataset(variables, attrs=attributes)
-
-
-def told_feet(robot: Robot | SpatialRobot) -> dict[str, Any]:
-    """Return the feet of a robot as columns."""
-    foot_of = np.full(robot.nc, -1)
-    feet: tuple[Foot | SpatialFoot, ...] = robot.feet
-    for index, foot in enumerate(feet):
-        foot_of[list(foot.contacts)] = index
-    return {
-        "foot_link": [foot.link for foot in feet],
-        "foot_name": [foot.name for foot in feet],
-        "contact_foot": foot_of,
-    }
-
-
-def feet_of(stored: Stored, sizes: dict[str, int], kind: type[_SomeFoot]) -> tuple[_SomeFoot, ...]:
-    """Return the feet of some columns.
-
-    Raises
-    ------
-    DamageError
-        If a contact point is of no foot that is there.
-    """
-    foot_link, foot_name, contact_foot = stored.arrays(FEET, sizes).values()
-    if np.any(contact_foot < -1) or np.any(contact_foot >= len(foot_link)):
-        raise DamageError("contact_foot points outside the robot")
-    make: Any = kind
-    return tuple(
-        make(name, link, tuple(np.flatnonzero(contact_foot == index).tolist()))
-        for index, (name, link) in enumerate(
-            zip(foot_name.tolist(), foot_link.tolist(), strict=True)
-        )
-    )
+    attributes = {"floating": int(robot.floating), "symmetric": int(robot.mirror is not None)}
+    return _TREE.to_dataset(robot, _OUTLINES | _MIRROR, values, attributes)
 
 
 def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
@@ -155,25 +73,17 @@ def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
         If anything is missing, of the wrong shape, or points outside the robot.
     """
     stored, sizes = Stored(contents), _SIZES.copy()
-    model = Model(**stored.arrays(_NUMBERS, sizes), pivot=stored.count("pivot"))
-    names = stored.arrays(_NAMES, sizes)
-    feet = feet_of(stored, sizes, Foot)
+    model = Model(**stored.arrays(_TREE.numbers, sizes), pivot=stored.count("pivot"))
+    parts = _TREE.parts(stored, sizes)
     mirror = None
     if stored.count("symmetric"):
         arrays = stored.arrays(_MIRROR, sizes)
         mirror = Mirror(**{name.removeprefix("mirror_"): each for name, each in arrays.items()})
-    friction: list[float] = []
-    if "contact_friction" in contents:
-        friction = stored.arrays(_FRICTION, sizes)["contact_friction"].tolist()
     robot = Robot(
-        name=stored.text("name"),
+        **parts,
         model=model,
-        **{name: tuple(each.tolist()) for name, each in names.items()},
-        feet=feet,
         mirror=mirror,
         floating=bool(stored.count("floating")),
-        contact_friction=tuple(friction),
-        source=stored.text("source"),
         outlines=_outlines(stored.arrays(_OUTLINES, sizes)) if "outline_link" in contents else (),
     )
     _check(robot)
@@ -209,8 +119,6 @@ def _check(robot: Robot) -> None:
     for name, whether in astray.items():
         if whether:
             raise DamageError(f"{name} points outside the robot")
-    if any(friction < 0.0 for friction in robot.contact_friction):
-        raise DamageError("contact_friction must not be negative")
     if any(not foot.contacts for foot in robot.feet):
         raise DamageError("a foot has no contact points")
     if not math.isfinite(robot.total_mass) or np.any(model.mass < 0.0):

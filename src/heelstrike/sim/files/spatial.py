@@ -17,12 +17,12 @@ from heelstrike.robot.spatial.model import (
     JointKind,
     SpatialModel,
 )
-from heelstrike.robot.spatial.robot import SpatialFoot, SpatialRobot, quaternion_places
+from heelstrike.robot.spatial.robot import SpatialRobot, quaternion_places
 from heelstrike.robot.spatial.solids import Solid
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.files.layout import SPATIAL, Layout
 from heelstrike.sim.files.logs import Extents
-from heelstrike.sim.files.robot_dataset import FEET, feet_of, told_feet
+from heelstrike.sim.files.tree_variables import TreeVariables
 from heelstrike.sim.files.variables import DamageError, Stored, Variable
 from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.sim.spatial.space import SPACE, SpatialLook
@@ -42,23 +42,7 @@ _DIMS: Extents = {
 }  # fmt: skip
 """Dimensions of the robot's part of a file: every link has a joint."""
 _SIZES = {"axis": 3, "quaternion": 4, "tensor": 6}
-_NUMBERS = {
-    name: Variable(
-        tuple(_DIMS[size] for size in number.shape),
-        number.unit,
-        kind=number.kind,
-        allowed="infinite" if number.infinite else "",
-    )
-    for name, number in SPATIAL_NUMBERS.items()
-    if number.shape and name not in FOLLOWING
-}
-_NAMES = {
-    "joint_names": Variable(("joint",), kind=str),
-    "link_names": Variable(("joint",), kind=str),
-    "actuator_names": Variable(("actuator",), kind=str),
-    "contact_names": Variable(("contact",), kind=str),
-}
-_FRICTION = {"contact_friction": Variable(("contact",))}
+_TREE = TreeVariables(SPATIAL_NUMBERS, _DIMS, FOLLOWING)
 _SOLIDS = {
     "solid_link": Variable(("solid",), kind=int),
     "solid_radius": Variable(("solid",), "m"),
@@ -176,54 +160,26 @@ class _Space(Layout):
         return kind in (BALL, HINGE)
 
     def robot_to_dataset(self, robot: SpatialRobot) -> xarray.Dataset:
-        import xarray
-
         solids = robot.solids
         corners = [each.corners for each in solids]
-        values: dict[str, Any] = {
-            **{name: getattr(robot.model, name) for name in _NUMBERS},
-            **{name: getattr(robot, name) for name in _NAMES},
-            **told_feet(robot),
+        values = {
             "solid_link": [each.link for each in solids],
             "solid_radius": [each.radius for each in solids],
             "solid_corners": [len(each) for each in corners],
             "solid_corner": np.concatenate([np.zeros((0, 3)), *corners]),
         }
-        if robot.contact_friction:
-            values["contact_friction"] = robot.contact_friction
-        declared = _NUMBERS | _NAMES | FEET | _SOLIDS | _FRICTION
-        variables = {
-            name: declared[name].written(each)
-            for name, each in values.items()
-            if declared[name].kind is not str or len(each)
-        }
-        told = {"name": robot.name, "source": robot.source, "pivot": int(robot.model.pivot)}
-        return xarray.Dataset(variables, attrs=told)
+        return _TREE.to_dataset(robot, _SOLIDS, values, {})
 
     def stored_robot(self, contents: Mapping[str, NDArray[Any]]) -> SpatialRobot:
         stored, sizes = Stored(contents), _SIZES.copy()
-        numbers = stored.arrays(_NUMBERS, sizes)
-        names = stored.arrays(_NAMES, sizes)
+        numbers = stored.arrays(_TREE.numbers, sizes)
         model = _model(numbers, stored.count("pivot"), sizes)
-        feet = feet_of(stored, sizes, SpatialFoot)
+        parts = _TREE.parts(stored, sizes)
         solids = _solids(stored.arrays(_SOLIDS, sizes))
-        friction: list[float] = []
-        if "contact_friction" in contents:
-            friction = stored.arrays(_FRICTION, sizes)["contact_friction"].tolist()
-        links = [*(foot.link for foot in feet), *(solid.link for solid in solids)]
+        links = [*(foot.link for foot in parts["feet"]), *(solid.link for solid in solids)]
         if any(not 0 <= link < model.nl for link in links):
             raise DamageError("a foot or a solid points outside the robot")
-        if any(each < 0.0 for each in friction):
-            raise DamageError("contact_friction must not be negative")
-        return SpatialRobot(
-            name=stored.text("name"),
-            model=model,
-            **{name: tuple(each.tolist()) for name, each in names.items()},
-            feet=feet,
-            contact_friction=tuple(friction),
-            source=stored.text("source"),
-            solids=solids,
-        )
+        return SpatialRobot(**parts, model=model, solids=solids)
 
 
 def _model(numbers: dict[str, Any], pivot: int, sizes: Mapping[str, int]) -> SpatialModel:

@@ -218,7 +218,7 @@ def step_derivatives(
         It goes on to the end.
     until : float, optional
         End in s, rounded as by :meth:`~heelstrike.Simulation.advance`; one step of the method by
-        default.
+        default. What a sampled controller answered before the beginning is held as it is.
     numbers : sequence of str
         ``"friction"`` of the ground; ``"mass"``, ``"inertia"``, ``"center_of_mass"``,
         ``"armature"``, ``"damping"``, ``"stiffness"``, ``"rest"`` or ``"gravity"`` of the robot,
@@ -277,7 +277,9 @@ def run_derivatives(
     every : float, optional
         Seconds from one state to the next; by default one step of time stepping, or the period of a
         sampled controller, of which it must be a multiple; and the whole time of an event-driven
-        motion, and on compliant ground, where bristles keep errors between two states.
+        motion, and on compliant ground, where bristles keep errors between two states. If a sampled
+        controller is between two calls, the first of several ends at the next call: what it
+        answered to one state then never acts after the next.
 
     Returns
     -------
@@ -307,9 +309,20 @@ def run_derivatives(
     own = 0.0 if isinstance(simulation.method, Compliant) else own
     span = every or own or end - begin
     stepper = _stepper(simulation, numbers, gains, answers)
-    count = max(1, ceil((end - begin) / span - AT_ONCE)) if span > 0.0 else 1
-    ends = begin + span * np.arange(1, count + 1)
+    first = begin + span
+    if first < end - AT_ONCE * span:
+        first = begin + (_to_the_next_call(simulation) or span)
+    count = ceil(max(end - first, 0.0) / span - AT_ONCE) if span > 0.0 else 0
+    ends = first + span * np.arange(count + 1)
     return RunDerivatives(tuple(stepper.until(min(each, end)) for each in ends.tolist()))
+
+
+def _to_the_next_call(simulation: Simulation) -> float:
+    """Seconds to the next call of a controller that is sampled in steps; zero at a call."""
+    every = simulation._clock.control_every
+    if every <= 1:
+        return 0.0
+    return -simulation._clock.index % every * (simulation.method.step_length or 0.0)
 
 
 def _stepper(

@@ -1,6 +1,6 @@
 """Time stepping of robots in space, and the run it leaves behind."""
 
-from heelstrike.sim.batch.runs import SpatialBatchResult
+from heelstrike.sim.batch.result import SpatialBatchResult
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.spatial.controlled import SpatialControlledRobot, SpatialControlState
 from heelstrike.sim.spatial.record import SpatialEventKind

@@ -21,6 +21,7 @@ from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot, checked_state, quaternion_places
 from heelstrike.robot.state import State
 from heelstrike.robot.warning import warn
+from heelstrike.sim.batch.result import SpatialBatchResult
 from heelstrike.sim.contacts.latches import several
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law
@@ -65,6 +66,7 @@ class Space(Dimension):
     flat = SpatialGround()
     run = SpatialRun
     quantities = RECORDED
+    batch_result = SpatialBatchResult
     record = SpatialRecord
     certificates = SpatialCertificates
     compiles_meanwhile = False  # what it would compile is for the plane

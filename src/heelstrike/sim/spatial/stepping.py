@@ -69,7 +69,7 @@ from heelstrike.tolerances import CLOSED_GAP
 HALVINGS_OF_A_STEP = 3
 """How often an uncertified step is halved."""
 
-BEARABLE = 1e-6
+MARKED_RESIDUAL = 1e-6
 """Residual up to which an uncertified step goes on, marked."""
 
 LAST_EFFORT = 20000
@@ -173,7 +173,10 @@ def call_what_is_missed(
 
 @kernel
 def forgive_depth(step: float, table: BlockTable, assembly: SpatialAssembly) -> bool:
-    """Ask nothing to come out of the ground; return if that changes anything bearable."""
+    """Ask nothing to come out of the ground; return whether that changes anything.
+
+    Points deeper than `LEFT_IN_THE_GROUND` are not left there: nothing changes then.
+    """
     changed = False
     for place in range(assembly.count):
         gap = table.gap[assembly.candidate[place]]
@@ -433,7 +436,7 @@ def take_step(
                 worst = solve_step_of(model, time + done * step, step, number, False, memory)
                 left = 1
             memory.solver.settings.effort = MOST_ITERATIONS
-        if not worst <= BEARABLE:
+        if not worst <= MARKED_RESIDUAL:
             tally.unsolved = reaction.residual = worst
             return False
         if worst > 0.0:

@@ -56,20 +56,20 @@ def locate_corners(
 
 
 @kernel
-def join_forces(model: Model, seconds: Contacts, contacts: Contacts) -> None:
+def join_forces(model: Model, second_faces: Contacts, contacts: Contacts) -> None:
     """Put the forces of both faces of every point into one, and that where it acts.
 
     About the centre of the disc only friction has a moment, r λ_t of either face. The resultant of
     forces that nearly cancel each other, as those of a wedge, may act off the disc.
     """
     for i in range(model.nc):
-        other = seconds.force[i]
+        other = second_faces.force[i]
         if other[0] == 0.0 and other[1] == 0.0:
             continue
         normal, force, point = contacts.normal[i], contacts.force[i], contacts.position[i]
         radius = model.contact_radius[i]
         own_x, own_z = out_of_frame(normal, (force[0], force[1]))
-        x, z = out_of_frame(seconds.normal[i], (other[0], other[1]))
+        x, z = out_of_frame(second_faces.normal[i], (other[0], other[1]))
         x, z = own_x + x, own_z + z
         moment = radius * (force[1] + other[1])
         size = math.sqrt(x * x + z * z)

@@ -314,7 +314,7 @@ def find_members(
 @kernel
 def speed_before(
     model: Model, entry: int, v: Floats, rows: Rows, tree: Workspace, contacts: Contacts,
-    seconds: Contacts,
+    second_faces: Contacts,
 ) -> float:  # fmt: skip
     """Normal velocity of a contact point, on either face, or a constraint, as the step begins."""
     if rows.kind[entry] == CONSTRAINT:
@@ -323,7 +323,7 @@ def speed_before(
     if rows.kind[entry] == POINT:
         normal, _ = contact_velocity(model, tree, contacts, point)
     else:
-        normal, _ = contact_velocity(model, tree, seconds, point)
+        normal, _ = contact_velocity(model, tree, second_faces, point)
     return normal
 
 

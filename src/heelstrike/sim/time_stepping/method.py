@@ -66,9 +66,9 @@ from heelstrike.sim.contacts.candidates import (
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
-    bend_acceleration,
     contact_rows,
     contact_velocity,
+    curvature_acceleration,
     evaluate_equations,
     locate_contacts,
     row_product,
@@ -373,7 +373,7 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
         find_constraints(model, memory.q, memory.v, equations.tree, memory.rows)
     if ground.concave == 1:
         locate_corners(
-            model, ground, equations.tree, memory.rows.first[SECOND_FACE], memory.seconds,
+            model, ground, equations.tree, memory.rows.first[SECOND_FACE], memory.second_faces,
             memory.surface, work.impact.corner,
         )  # fmt: skip
 
@@ -469,8 +469,8 @@ def select_candidates(
         gap = contacts.gap[contact]
         normal = velocity[contact, 0]
         if curved and linearised:
-            bend = surface.bend[contact]
-            normal += 0.5 * step * bend_acceleration(model, tree, contacts, contact, bend)
+            curvature = surface.curvature[contact]
+            normal += 0.5 * step * curvature_acceleration(model, tree, contacts, contact, curvature)
         if linearised:
             far = gap > step * max(CLOSING_SPEED, -2.0 * normal)
             if far and (rule.calls == 0 or called[contact] == 0):
@@ -531,8 +531,8 @@ def select_stops(
 @kernel
 def select_corners(
     model: Model, rule: Rule, count: int, first: int, v: Floats, next_v: Floats, tree: Workspace,
-    seconds: Contacts, gaps: Floats, restitution: Floats, directions: Directions, bounce: Floats,
-    listing: Listing,
+    second_faces: Contacts, gaps: Floats, restitution: Floats, directions: Directions,
+    bounce: Floats, listing: Listing,
 ) -> int:  # fmt: skip
     """Append the second faces of corners that could act in this step.
 
@@ -544,7 +544,7 @@ def select_corners(
         gap = gaps[second]
         if gap > FAR_STEPS * CLOSING_SPEED * step:
             continue
-        contact_rows(model, tree, seconds, point, count, problem.first, directions)
+        contact_rows(model, tree, second_faces, point, count, problem.first, directions)
         row = problem.first[count]
         normal = row_product(jacobian, row, next_v)
         if is_linearised(rule.scheme):
@@ -724,8 +724,8 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     Points are the first `near` of `count`.
     """
     assembly, contacts, rows, loops = memory.assembly, memory.contacts, memory.rows, memory.loops
-    equations, usual, problem, seconds = (
-        memory.equations, memory.usual, memory.assembly.problem, memory.seconds,
+    equations, usual, problem, second_faces = (
+        memory.equations, memory.usual, memory.assembly.problem, memory.second_faces,
     )  # fmt: skip
     directions, candidate, first = assembly.directions, assembly.candidate, problem.first
     answer, tree, points = assembly.answer, equations.tree, usual.usual_points
@@ -760,7 +760,7 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     else:
         write_contact_rows(POINT, model, tree, contacts, rows.owner, assembly)
         write_joint_rows(rows, assembly)
-        write_contact_rows(SECOND_FACE, model, tree, seconds, rows.owner, assembly)
+        write_contact_rows(SECOND_FACE, model, tree, second_faces, rows.owner, assembly)
         assemble_delassus(model, count, equations, directions, problem)
     problem.count = count
     if work.scheme == MOREAU_JEAN:
@@ -791,7 +791,7 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
             impact.bounce[place] = 0.0
             if impact.relaxed == 0 and restitution > 0.0:
                 impact.bounce[place] = restitution * speed_before(
-                    model, entry, memory.v, rows, tree, contacts, seconds
+                    model, entry, memory.v, rows, tree, contacts, second_faces
                 )
         pose_impact(step, members, candidate, gap, answer.mode, problem, impact)
         solved = solve_impact(work.order, members, problem, memory.solver, impact, assembly)
@@ -964,8 +964,8 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
         first = note_group(DRY_JOINT, first, count, assembly)
         if impact.corner.near > 0:
             count = select_corners(
-                model, rule, count, rows.first[SECOND_FACE], v, next_v, tree, memory.seconds, gap,
-                restitution, assembly.directions, impact.bounce, listing,
+                model, rule, count, rows.first[SECOND_FACE], v, next_v, tree, memory.second_faces,
+                gap, restitution, assembly.directions, impact.bounce, listing,
             )  # fmt: skip
         first = note_group(SECOND_FACE, first, count, assembly)
         count = append_loops(count, 1, loops, assembly)
@@ -1000,7 +1000,7 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
         note_touching(step, count, steps, assembly, impact.touching)
     note_answer(step, memory)
     if are_there(SECOND_FACE, assembly):
-        join_forces(model, memory.seconds, contacts)
+        join_forces(model, memory.second_faces, contacts)
     return solved
 
 

@@ -17,11 +17,11 @@ from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.dynamics import center_of_mass, contact_positions, link_poses
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.named_tree import legs
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import QUANTITIES, Run
-from heelstrike.view.drawing import legs
 from heelstrike.view.live.layout import (
     MOST_PUSHES,
     FrameLayout,

@@ -16,9 +16,9 @@ from heelstrike.analysis.zero_moment_point import ZeroMomentPoint, zero_moment_p
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.named_tree import legs
 from heelstrike.sim.run import Run
 from heelstrike.view.contact_figures import ROOM_ABOUT_POINTS
-from heelstrike.view.drawing import legs
 from heelstrike.view.energy_figure import ALWAYS
 from heelstrike.view.page.rows import Rows, means
 from heelstrike.view.panels import impact_rows

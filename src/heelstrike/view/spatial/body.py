@@ -13,6 +13,7 @@ import numpy as np
 from heelstrike.dynamics import spatial
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.named_tree import legs
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.spatial.solids import Solid
 from heelstrike.tolerances import NO_BONE
@@ -63,7 +64,7 @@ def body_in_space(robot: SpatialRobot) -> SpatialBody:
     bare -= {solid.link for solid in robot.solids}
     rods = [rod for link in sorted(bare) for rod in _rods(robot, link, poses, ROD * size)]
     solids = [*robot.solids, *rods]
-    foot = legs_in_space(robot)
+    foot = legs(robot)
     corners, links, faces, feet = [], [], [], []
     count = 0
     for solid in solids:
@@ -121,18 +122,3 @@ def _rods(
         if np.linalg.norm(end) > NO_BONE
     ]
     return rods or [Solid(link, np.zeros((1, 3)), 2.0 * radius)]
-
-
-def legs_in_space(robot: SpatialRobot) -> Integers:
-    """Index of the foot whose leg each link belongs to, −1 if it carries none or several."""
-    carried: list[set[int]] = [set() for _ in range(robot.nl)]
-    for index, foot in enumerate(robot.feet):
-        link = foot.link
-        while link >= 0:
-            carried[link].add(index)
-            link = int(robot.model.parent[link])
-    several = len(robot.feet) > 1
-    return np.array(
-        [next(iter(feet)) if several and len(feet) == 1 else -1 for feet in carried],
-        dtype=np.int64,
-    )

@@ -5,9 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from heelstrike.analysis.spatial.links import link_motion
@@ -16,14 +13,14 @@ from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.view.arrows import draw_scale
-from heelstrike.view.film import DPI, evened
+from heelstrike.view.canvas import Canvas
+from heelstrike.view.film import evened
 from heelstrike.view.spatial.body import SpatialBody
 from heelstrike.view.spatial.camera import FAR_AWAY, Camera
 from heelstrike.view.spatial.forces import middle_of_pressure, shown_forces
 from heelstrike.view.spatial.stage import Instant, Stage
 from heelstrike.view.style import (
     FORCE_COLOR,
-    INK,
     ORANGE,
     ZERO_MOMENT_POINT_COLOR,
     foot_color,
@@ -55,11 +52,8 @@ class SpatialFilm:
         self.size = size
         interval = speed / fps
         self._time, rows = _instants(run, interval)
-        figure = Figure(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI)
-        self._canvas = FigureCanvasAgg(figure)
-        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        axes.set_axis_off()
-        scale = min(size) / 540.0
+        self._canvas = canvas = Canvas(size, speed)
+        axes, scale, font = canvas.axes, canvas.scale, canvas.font
         self._stage = Stage(axes, run.robot, run.ground, width=scale)
         self._motion = link_motion(run, rows)
         self._support = spatial_zero_moment_point(run, rows).polygon
@@ -67,7 +61,6 @@ class SpatialFilm:
         self._pressure = middle_of_pressure(self._forces, run.robot.weight)
         self._cameras = self._follow(interval)
         self._frame_view(axes, size)
-        font = 11.0 * scale
         before = set(axes.get_children())
         if run.robot.nc:
             (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
@@ -77,34 +70,19 @@ class SpatialFilm:
                 fontsize=0.85 * font,
             )  # fmt: skip
         scale_of_forces = [each for each in axes.get_children() if each not in before]
-        self._clock = axes.text(
-            0.02, 0.97, "", transform=axes.transAxes, va="top", fontsize=1.3 * font, color=INK
-        )
-        self._speed = "" if speed == 1.0 else f"   (speed × {speed:g})"
-        figure.legend(
+        canvas.figure.legend(
             handles=legend_of(run.robot, forces=bool(run.robot.nc)), loc="upper right",
             fontsize=0.85 * font, labelspacing=0.35, frameon=False,
         )  # fmt: skip
-        self._moving: list[Artist] = [*self._stage.artists, *scale_of_forces, self._clock]
-        for artist in self._moving:
-            artist.set_animated(True)
-        canvas: Any = self._canvas  # matplotlib leaves these without types
-        canvas.draw()
-        self._background = canvas.copy_from_bbox(figure.bbox)
+        canvas.begin([*self._stage.artists, *scale_of_forces])
 
     def __len__(self) -> int:
         return len(self._time)
 
     def draw(self, index: int) -> memoryview:
         """Draw a frame; return its pixels, four bytes each, valid until the next one."""
-        canvas: Any = self._canvas
-        canvas.restore_region(self._background)
         self._stage.show(self._instant(index), self._cameras[index])
-        self._clock.set_text(f"t = {self._time[index]:.2f} s{self._speed}")
-        renderer = canvas.get_renderer()
-        for artist in self._moving:
-            artist.draw(renderer)
-        return memoryview(canvas.buffer_rgba())
+        return self._canvas.drawn(self._time[index])
 
     def _instant(self, index: int) -> Instant:
         motion = self._motion

@@ -12,13 +12,14 @@ from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
 from heelstrike.contact.spatial.ground import SpatialGround
 from heelstrike.robot.model import Floats
+from heelstrike.robot.named_tree import legs
 from heelstrike.robot.spatial.model import HINGE, SLIDE
 from heelstrike.robot.spatial.robot import SpatialRobot, quaternion_places
 from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.view.page.curves import DASHED, Plot, Trace, alike, limits_in_words, side_of
 from heelstrike.view.page.rows import Rows
 from heelstrike.view.page.scene import DIGITS
-from heelstrike.view.spatial.body import SpatialBody, body_in_space, legs_in_space
+from heelstrike.view.spatial.body import SpatialBody, body_in_space
 from heelstrike.view.spatial.forces import (
     force_groups,
     group_names,
@@ -231,7 +232,7 @@ def joint_plots(
     if not robot.nu:
         return []
     joint = model.velocity_joint[model.actuator_velocity]
-    leg = legs_in_space(robot)[joint]
+    leg = legs(robot)[joint]
     names = [
         in_words(robot.velocity_names[k]).removesuffix(" joint")
         for k in model.actuator_velocity.tolist()

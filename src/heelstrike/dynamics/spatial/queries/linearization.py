@@ -9,15 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.dynamics.queries.linearization import solved
+from heelstrike.dynamics.queries import equations_of_motion
+from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
+from heelstrike.dynamics.queries.linearization import implicit_functions, implicit_motion
 from heelstrike.dynamics.spatial import configurations
-from heelstrike.dynamics.spatial.queries import equations_of_motion, points
-from heelstrike.dynamics.spatial.queries.evaluation import (
-    SpatialEvaluation,
-    position_vector,
-    spatial_contacts,
-    velocity_vector,
-)
+from heelstrike.dynamics.spatial.queries import points
+from heelstrike.dynamics.spatial.queries.evaluation import SpatialEvaluation, position_vector
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import BALL, FREE
@@ -58,20 +55,13 @@ def linearize_in_space(
     contacts: Iterable[int | str] = (),
 ) -> SpatialLinearization:
     """Linearise the equations of motion; see :func:`heelstrike.dynamics.linearize`."""
-    held = spatial_contacts(robot, contacts)
-    position, velocity = position_vector(robot, "q", q), velocity_vector(robot, "v", v)
-    gamma = velocity_vector(robot, "torque", torque)
+    held = contact_indices(robot, contacts)
+    position, velocity = position_vector(robot, "q", q), joint_vector(robot, "v", v)
+    gamma = joint_vector(robot, "torque", torque)
     n, k = robot.nv, len(held)
-    equations, derivatives = _equations(robot, held)
-    here = position, np.zeros(n), velocity
-    nothing = np.zeros(n + 3 * k)
-    system = np.array(derivatives(*here, nothing, gamma)[0])
-    constant = np.array(equations(*here, nothing, gamma)).reshape(-1, 1)
-    solution = solved(system, -constant, n)[:, 0]
-    slopes = [np.array(part) for part in derivatives(*here, solution, gamma)]
-    # Implicit differentiation: the equations stay satisfied.
-    rates = solved(system, -np.hstack(slopes[1:]), n)
-    by_state, by_torque = np.split(rates, [2 * n], axis=1)
+    solution, by_state, by_torque = implicit_motion(
+        *_equations(robot, held), (position, np.zeros(n), velocity), gamma
+    )
     upper = np.hstack([-_turning(robot, velocity), np.eye(n)])
     return SpatialLinearization(
         A=np.vstack([upper, by_state[:n]]),
@@ -125,10 +115,4 @@ def _equations(
         residual += [row @ unknown[:n] + more for row, more in zip(jacobian, bias, strict=True)]
     made = expression(np.array(residual, dtype=object))
     state = casadi.vertcat(arguments[1], arguments[2])
-    jacobians = [
-        casadi.densify(casadi.jacobian(made, each)) for each in (arguments[3], state, arguments[4])
-    ]
-    return (
-        casadi.Function("equations", arguments, [made]),
-        casadi.Function("derivatives", arguments, jacobians),
-    )
+    return implicit_functions(arguments, made, (arguments[3], state, arguments[4]))

@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.dynamics.queries import points
+from heelstrike.dynamics.queries.evaluation import contact_indices
+from heelstrike.dynamics.queries.query import of_position
 from heelstrike.dynamics.spatial import kinematics, rows
 from heelstrike.dynamics.spatial.algebra import Vector
-from heelstrike.dynamics.spatial.queries.evaluation import SpatialEvaluation, spatial_contacts
-from heelstrike.dynamics.spatial.queries.query import of_position, of_state
+from heelstrike.dynamics.spatial.queries.evaluation import SpatialEvaluation
 from heelstrike.dynamics.spatial.rotations import Matrix
 from heelstrike.robot.model import Floats
 
@@ -27,13 +29,13 @@ ON_LEVEL_GROUND: Matrix = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 """Normal up, then tangents along x and y."""
 
 
-@of_position("(3,) float: World position, in m.")
+@points.point_position.in_space
 def point_position(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> Floats:
     """Where a point of a link is."""
     return np.array(at.point(link, local)[1])
 
 
-@of_state("(6,) float: Along x, y, z in m/s, and about them in rad/s.")
+@points.point_velocity.in_space
 def point_velocity(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> Floats:
     """Velocity of a point and angular velocity of its link."""
     place, position = at.point(link, local)
@@ -41,7 +43,7 @@ def point_velocity(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> 
     return np.array([*moves, *at.run(kinematics.angular_velocity, at.work, place)])
 
 
-@of_position("(6, nv) float: Rows x, y, z and rotations about them, in m and 1.")
+@points.point_jacobian.in_space
 def point_jacobian(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> Floats:
     """Jacobian of a point of a link and of the link's rotation.
 
@@ -57,7 +59,7 @@ def point_jacobian(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> 
     return result
 
 
-@of_state("(6,) float: Along x, y, z in m/s², and about them in rad/s².")
+@points.point_bias_acceleration.in_space
 def point_bias_acceleration(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> Floats:
     """J̇v of :func:`point_jacobian`: the acceleration at v̇ = 0."""
     place, position = at.point(link, local)
@@ -65,10 +67,10 @@ def point_bias_acceleration(at: SpatialEvaluation, link: int | str, local: Array
     return np.array([*moves, *at.work.bias_acceleration[place, :3]])
 
 
-@of_position("(k, 3) float: World positions, in m.")
+@points.contact_positions.in_space
 def contact_positions(at: SpatialEvaluation, contacts: Iterable[int | str] | None = None) -> Floats:
     """Where the centres of the contact spheres and rims are."""
-    found = spatial_contacts(at.robot, contacts)
+    found = contact_indices(at.robot, contacts)
     centers = [at.run(rows.contact_center, at.model, at.work, each) for each in found]
     return np.array(centers).reshape(-1, 3)
 
@@ -76,15 +78,15 @@ def contact_positions(at: SpatialEvaluation, contacts: Iterable[int | str] | Non
 @of_position("(k, 3) float: World positions, in m.")
 def lowest_positions(at: SpatialEvaluation, contacts: Iterable[int | str] | None = None) -> Floats:
     """Where the lowest points of the contact spheres and rims are."""
-    found = spatial_contacts(at.robot, contacts)
+    found = contact_indices(at.robot, contacts)
     lowest = [at.run(rows.contact_point, at.model, at.work, each, UP) for each in found]
     return np.array(lowest).reshape(-1, 3)
 
 
-@of_position("(k, 3, nv) float: Rows normal (up) and tangents (x, y), in m and 1.")
+@points.contact_jacobian.in_space
 def contact_jacobian(at: SpatialEvaluation, contacts: Iterable[int | str] | None = None) -> Floats:
     """Jacobian of the contact points on level ground: of the lowest point of each sphere or rim."""
-    found = spatial_contacts(at.robot, contacts)
+    found = contact_indices(at.robot, contacts)
     result = at.zeros(len(found), 3, at.model.nv)
     for block, contact in zip(result, found, strict=True):
         lowest = at.run(rows.contact_point, at.model, at.work, contact, UP)
@@ -93,7 +95,7 @@ def contact_jacobian(at: SpatialEvaluation, contacts: Iterable[int | str] | None
     return result
 
 
-@of_state("(k, 3) float: Normal (up) and tangential (x, y), in m/s².")
+@points.contact_bias_acceleration.in_space
 def contact_bias_acceleration(
     at: SpatialEvaluation, contacts: Iterable[int | str] | None = None
 ) -> Floats:
@@ -102,7 +104,7 @@ def contact_bias_acceleration(
     It belongs to the gap and to the sliding velocity of each sphere or rim: a sphere that rolls on
     the ground has neither.
     """
-    found = spatial_contacts(at.robot, contacts)
+    found = contact_indices(at.robot, contacts)
     result = at.zeros(len(found), 3)
     for row, contact in zip(result, found, strict=True):
         x, y, z = at.run(rows.contact_bias, at.model, at.work, contact, UP)

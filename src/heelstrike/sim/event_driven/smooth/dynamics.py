@@ -89,11 +89,12 @@ def list_unknowns(
         is_loop = place >= count
         if is_loop or modes.carrier[contact] == 1 or modes.closed[contact] == 0:
             held.row[size] = 2 * place
-            held.lean[size] = 0.0 if is_loop else -modes.slide[contact] * friction[contact]
+            ratio = 0.0 if is_loop else -modes.slide[contact] * friction[contact]
+            held.friction_ratio[size] = ratio
             size += 1
         if not is_loop and modes.holder[contact] == 1:
             held.row[size] = 2 * place + 1
-            held.lean[size] = 0.0
+            held.friction_ratio[size] = 0.0
             size += 1
     return size
 
@@ -105,15 +106,15 @@ def solve_constraints(size: int, friction: float, delassus: Floats, held: HeldRo
     Their right-hand side is there. A contact may be a million times heavier than another: only in
     units in which all weigh the same does the size of a pivot tell whether it is one.
     """
-    row, lean, scale, system = held.row, held.lean, held.scale, held.system
+    row, ratio, scale, system = held.row, held.friction_ratio, held.scale, held.system
     for i in range(size):
         weight = delassus[row[i], row[i]]
         scale[i] = 1.0 / math.sqrt(weight) if weight > 0.0 else 1.0
     for i in range(size):
         for j in range(size):
             entry = delassus[row[i], row[j]]
-            if lean[j] != 0.0:
-                entry += friction * lean[j] * delassus[row[i], row[j] + 1]
+            if ratio[j] != 0.0:
+                entry += friction * ratio[j] * delassus[row[i], row[j] + 1]
             system[i, j] = scale[i] * scale[j] * entry
         system[i, size] *= scale[i]
     rank = solve_to_rank(size, system, held.column, held.unknown)
@@ -167,7 +168,7 @@ def list_pressing(
 
 @kernel
 def hold_by_saddle_point(
-    size: int, count: int, total: int, model: Model, rows: Rows, face: Integers, bend: Floats,
+    size: int, count: int, total: int, model: Model, rows: Rows, face: Integers, curvature: Floats,
     loop_bias: Floats, latched: Integers, candidate: Integers, jacobian: Floats, tree: Workspace,
     matrix: Floats, rate: Floats, answer: ContactAnswer, held: HeldRows, saddle: SaddlePoint,
 ) -> bool:  # fmt: skip
@@ -178,8 +179,9 @@ def hold_by_saddle_point(
     """
     nv, impulse, velocity = model.nv, answer.impulse, answer.velocity
     state_accelerations(
-        count, total, candidate, model, tree, rows, face, bend, loop_bias, jacobian, saddle.bias
-    )
+        count, total, candidate, model, tree, rows, face, curvature, loop_bias, jacobian,
+        saddle.bias,
+    )  # fmt: skip
     mass_matrix(model, tree, matrix)
     write_equations(size, nv, matrix, jacobian, held, saddle.system)
     for i in range(nv):
@@ -189,7 +191,7 @@ def hold_by_saddle_point(
     rank = solve_saddle_point(nv + size, saddle)
     if rank < nv + size:
         shorten(
-            nv, nv + size, rank, saddle.scale, held.lean, saddle.order, saddle.system,
+            nv, nv + size, rank, saddle.scale, held.friction_ratio, saddle.order, saddle.system,
             saddle.unknown,
         )  # fmt: skip
         list_pressing(size, count, candidate, latched, rows, held)
@@ -200,8 +202,8 @@ def hold_by_saddle_point(
     for k in range(size):
         row, force = held.row[k], saddle.unknown[nv + k]
         impulse[row] += force
-        if held.lean[k] != 0.0:
-            impulse[row + 1] += held.lean[k] * force
+        if held.friction_ratio[k] != 0.0:
+            impulse[row + 1] += held.friction_ratio[k] * force
     for row in range(2 * total):
         velocity[row] = saddle.bias[row] + row_product(jacobian, row, rate)
     return rank < nv + size
@@ -221,8 +223,8 @@ def hold_closed(
     for place in range(count):
         contact = candidate[place]
         free_gap_acceleration(
-            contact, place, model, equations.tree, rows, modes.face, modes.bend, equations.rate,
-            jacobian, free,
+            contact, place, model, equations.tree, rows, modes.face, modes.curvature,
+            equations.rate, jacobian, free,
         )  # fmt: skip
         impulse[2 * place] = 0.0
         impulse[2 * place + 1] = 0.0
@@ -237,18 +239,20 @@ def hold_closed(
     rank = solve_constraints(size, 1.0, assembly.problem.delassus, held)
     if is_delicate(size, rank, held.system):
         return hold_by_saddle_point(
-            size, count, total, model, rows, modes.face, modes.bend, loops.rows.bias, loops.held,
-            candidate, jacobian, equations.tree, equations.mass_matrix, equations.rate,
+            size, count, total, model, rows, modes.face, modes.curvature, loops.rows.bias,
+            loops.held, candidate, jacobian, equations.tree, equations.mass_matrix, equations.rate,
             assembly.answer, held, saddle,
         )  # fmt: skip
     if rank < size:
-        shorten(0, size, rank, held.scale, held.lean, held.column, held.system, held.unknown)
+        shorten(
+            0, size, rank, held.scale, held.friction_ratio, held.column, held.system, held.unknown
+        )
         list_pressing(size, count, candidate, loops.held, rows, held)
         raise_to_zero(0, size, rank, held.presses, held.system, held.unknown)
     for i in range(size):
         impulse[held.row[i]] += held.unknown[i]
-        if held.lean[i] != 0.0:
-            impulse[held.row[i] + 1] += held.lean[i] * held.unknown[i]
+        if held.friction_ratio[i] != 0.0:
+            impulse[held.row[i] + 1] += held.friction_ratio[i] * held.unknown[i]
     add_impulse(model, 2 * total, impulse, directions, equations, equations.rate)
     return rank < size
 

@@ -91,7 +91,7 @@ def locate(
         find_constraints(model, q, v, tree, rows)
     if ground.curved == 1:
         for point in range(model.nc):
-            face[point], modes.bend[point] = CURVE, surface.bend[point]
+            face[point], modes.curvature[point] = CURVE, surface.curvature[point]
     if not has_corners(ground):
         return
     normals, normal = rows.normal, ground.normal

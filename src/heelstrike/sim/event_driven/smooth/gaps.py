@@ -65,8 +65,8 @@ def write_candidates(
 
 @dissolved_kernel
 def free_gap_acceleration(
-    entry: int, place: int, model: Model, tree: Workspace, rows: Rows, face: Integers, bend: Floats,
-    rate: Floats, jacobian: Floats, free: Floats,
+    entry: int, place: int, model: Model, tree: Workspace, rows: Rows, face: Integers,
+    curvature: Floats, rate: Floats, jacobian: Floats, free: Floats,
 ) -> None:  # fmt: skip
     """Acceleration b = J v̇ + J̇ v of an entry, under v̇ = `rate`.
 
@@ -86,12 +86,12 @@ def free_gap_acceleration(
         center = x - tree.pivot[0], z - tree.pivot[1]
         along_normal, along_tangent = into_frame(normal, bias_at(tree, link, center))
         along_tangent -= radius * tree.bias_acceleration[link, 0]
-        curvature = bend[entry] if face[entry] == CURVE else 0.0
+        here = curvature[entry] if face[entry] == CURVE else 0.0
         if face[entry] >= 0 and face[entry] % 2 == 1:
-            curvature = 1.0 / radius
-        if curvature != 0.0:  # the centre goes round a corner, or along a curve
+            here = 1.0 / radius
+        if here != 0.0:  # the centre goes round a corner, or along a curve
             _, along = into_frame(normal, velocity_at(tree.velocity, link, center))
-            along_normal += curvature * along * along
+            along_normal += here * along * along
     for j in range(model.nv):
         along_normal += jacobian[2 * place, j] * rate[j]
         along_tangent += jacobian[2 * place + 1, j] * rate[j]

@@ -86,7 +86,7 @@ def move_by_saddle_point(
     """
     mass_matrix(model, tree, matrix)
     for k in range(size):
-        held.lean[k] = 0.0
+        held.friction_ratio[k] = 0.0
     write_equations(size, model.nv, matrix, jacobian, held, saddle.system)
     for i in range(model.nv):
         saddle.system[i, model.nv + size] = 0.0

@@ -95,18 +95,18 @@ def write_equations(
 ) -> None:
     """Write the matrix of the equations: those of motion first, then those of ``held.row``.
 
-    A force along a row brings along its tangential one, by ``held.lean``.
+    A force along a row brings along its tangential one, by ``held.friction_ratio``.
     """
     for i in range(nv):
         for j in range(nv):
             system[i, j] = matrix[i, j]
     for k in range(size):
-        row, lean = held.row[k], held.lean[k]
+        row, ratio = held.row[k], held.friction_ratio[k]
         for j in range(nv):
             system[nv + k, j] = jacobian[row, j]
             system[j, nv + k] = -jacobian[row, j]
-            if lean != 0.0:
-                system[j, nv + k] -= lean * jacobian[row + 1, j]
+            if ratio != 0.0:
+                system[j, nv + k] -= ratio * jacobian[row + 1, j]
         for other in range(size):
             system[nv + k, nv + other] = 0.0
 
@@ -114,7 +114,7 @@ def write_equations(
 @kernel
 def state_accelerations(
     count: int, total: int, candidate: Integers, model: Model, tree: Workspace, rows: Rows,
-    face: Integers, bend: Floats, loop_bias: Floats, jacobian: Floats, bias: Floats,
+    face: Integers, curvature: Floats, loop_bias: Floats, jacobian: Floats, bias: Floats,
 ) -> None:  # fmt: skip
     """State the problem of accelerations: J̇ v of the candidates, up to `total` those of loops.
 
@@ -122,7 +122,7 @@ def state_accelerations(
     """
     for place in range(count):
         free_gap_acceleration(
-            candidate[place], place, model, tree, rows, face, bend, tree.zero, jacobian, bias
+            candidate[place], place, model, tree, rows, face, curvature, tree.zero, jacobian, bias
         )
     for place in range(count, total):
         bias[2 * place] = loop_bias[place - count]
@@ -178,21 +178,21 @@ def list_rows(
         if problem.set[place] == INTERVAL:
             if does == STICK:
                 held.row[size] = 2 * place + 1
-                held.lean[size] = 0.0
+                held.friction_ratio[size] = 0.0
                 size += 1
             continue
         if does == OPEN:
             continue
         held.row[size] = 2 * place
-        held.lean[size] = 0.0
+        held.friction_ratio[size] = 0.0
         if does in (SLIP_FORWARD, SLIDING_FORWARD):
-            held.lean[size] = -friction
+            held.friction_ratio[size] = -friction
         elif does in (SLIP_BACKWARD, SLIDING_BACKWARD):
-            held.lean[size] = friction
+            held.friction_ratio[size] = friction
         size += 1
         if does == STICK and place < count and friction > 0.0:
             held.row[size] = 2 * place + 1
-            held.lean[size] = 0.0
+            held.friction_ratio[size] = 0.0
             size += 1
     return size
 
@@ -238,8 +238,8 @@ def solve_modes(
     for k in range(size):
         row, force = held.row[k], saddle.unknown[nv + k]
         answer.impulse[row] += force
-        if held.lean[k] != 0.0:
-            answer.impulse[row + 1] += held.lean[k] * force
+        if held.friction_ratio[k] != 0.0:
+            answer.impulse[row + 1] += held.friction_ratio[k] * force
     for row in range(2 * total):
         answer.velocity[row] = bias[row] + row_product(jacobian, row, saddle.unknown[:nv])
     for place in range(total):
@@ -440,7 +440,7 @@ def solve_contacts(
     equations, the solvers are not asked unless the answer is not proven.
     """
     saddle, held, slide = phase.saddle, phase.held, phase.modes.slide
-    face, bend = phase.modes.face, phase.modes.bend
+    face, curvature = phase.modes.face, phase.modes.curvature
     tree, matrix = memory.equations.tree, memory.equations.mass_matrix
     assembly, loops, rows = memory.assembly, memory.loops, memory.rows
     candidate, jacobian, bias = assembly.candidate, assembly.directions.jacobian, saddle.bias
@@ -449,8 +449,9 @@ def solve_contacts(
     saddle.used = 0
     if accelerations and saddle.needed == 1:
         state_accelerations(
-            count, total, candidate, model, tree, rows, face, bend, loops.rows.bias, jacobian, bias
-        )
+            count, total, candidate, model, tree, rows, face, curvature, loops.rows.bias, jacobian,
+            bias,
+        )  # fmt: skip
         mass_matrix(model, tree, matrix)
         pose_problem(
             count, total, True, rows.set, friction, guess, slide, rows.latch_stop, loops.held,
@@ -472,8 +473,9 @@ def solve_contacts(
         return status
     if accelerations:
         state_accelerations(
-            count, total, candidate, model, tree, rows, face, bend, loops.rows.bias, jacobian, bias
-        )
+            count, total, candidate, model, tree, rows, face, curvature, loops.rows.bias, jacobian,
+            bias,
+        )  # fmt: skip
     else:
         state_velocities(total, assembly.problem.free, saddle)
     mass_matrix(model, tree, matrix)

@@ -1,4 +1,4 @@
-"""What ground, motors and joints can bear of what constraints ask: the nearest that they can.
+"""Joint accelerations that ground, motors and joints allow: the nearest feasible to those wanted.
 
 While the ground holds a point foot, its force, the torques of the motors and the rate of the phase
 are affine functions of what is wanted of the joints. Where that would need more friction than there
@@ -45,8 +45,8 @@ class Bounds(Bundle):
     """lower, upper: Ranges of the joints (rad)."""
 
 
-class Bearable(Bundle):
-    """What is wanted, and the programme of what can be had."""
+class Feasible(Bundle):
+    """The accelerations that are wanted, and the programme of the nearest feasible ones."""
 
     wanted: Floats = array("nu")
     slope: Floats = array("nu")
@@ -79,12 +79,12 @@ def nearing(period: float) -> float:
 
 
 @kernel
-def borne(
+def is_feasible(
     state: ControlState, robot: ControlledRobot, normal: Floats, turning: float, bounds: Bounds,
-    bearable: Bearable,
+    feasible: Feasible,
 ) -> bool:  # fmt: skip
-    """Whether what is wanted, whose force is in `robot.force`, can be had; write the bounds."""
-    bound, torque, model = bearable.program.bound, bearable.torque, robot.model
+    """Whether what is wanted, whose force is in `robot.force`, is feasible; write the bounds."""
+    bound, torque, model = feasible.program.bound, feasible.torque, robot.model
     rate = nearing(robot.period)
     up, ahead, behind = ground_rows(robot, normal, bounds.friction, torque)
     bound[0], bound[1], bound[2] = bounds.press - up, -ahead, -behind
@@ -93,7 +93,7 @@ def borne(
         bound[row] = max(model.torque_lower[i], -ENDLESS) - torque[i]
         bound[row + 1] = torque[i] - min(model.torque_upper[i], ENDLESS)
         place, speed = state.joint_position[i], state.joint_velocity[i]
-        free = bearable.wanted[i] + turning * bearable.slope[i] + 2.0 * rate * speed
+        free = feasible.wanted[i] + turning * feasible.slope[i] + 2.0 * rate * speed
         bound[row + 2] = rate**2 * (bounds.lower[i] - place) - free
         bound[row + 3] = rate**2 * (place - bounds.upper[i]) + free
     worst = 0.0
@@ -103,33 +103,33 @@ def borne(
 
 
 @kernel
-def find_shares(state: ControlState, robot: ControlledRobot, bearable: Bearable) -> None:
+def find_shares(state: ControlState, robot: ControlledRobot, feasible: Feasible) -> None:
     """Write how force and θ̈ change with what is wanted: they are affine in it."""
-    wanted, slope = bearable.wanted, bearable.slope
+    wanted, slope = feasible.wanted, feasible.slope
     rate = demand(state, robot, wanted, slope)
     for j in range(robot.nv):
-        bearable.asked[j] = robot.force[j]
+        feasible.asked[j] = robot.force[j]
     for i in range(robot.nu):
         wanted[i] += 1.0
-        bearable.turned[i] = demand(state, robot, wanted, slope) - rate
+        feasible.turned[i] = demand(state, robot, wanted, slope) - rate
         wanted[i] -= 1.0
         for j in range(robot.nv):
-            bearable.share[j, i] = robot.force[j] - bearable.asked[j]
+            feasible.share[j, i] = robot.force[j] - feasible.asked[j]
 
 
 @kernel
-def write_rows(robot: ControlledRobot, normal: Floats, friction: float, bearable: Bearable) -> None:
+def write_rows(robot: ControlledRobot, normal: Floats, friction: float, feasible: Feasible) -> None:
     """Write the rows of the programme."""
-    rows, torque = bearable.program.rows, bearable.torque
+    rows, torque = feasible.program.rows, feasible.torque
     for k in range(robot.nu):
         for j in range(robot.nv):
-            robot.force[j] = bearable.share[j, k]
+            robot.force[j] = feasible.share[j, k]
         rows[0, k], rows[1, k], rows[2, k] = ground_rows(robot, normal, friction, torque)
         for i in range(robot.nu):
             row = GROUND_ROWS + JOINT_ROWS * i
             rows[row, k], rows[row + 1, k] = torque[i], -torque[i]
             own = 1.0 if i == k else 0.0
-            rows[row + 2, k] = own + bearable.turned[k] * bearable.slope[i]
+            rows[row + 2, k] = own + feasible.turned[k] * feasible.slope[i]
             rows[row + 3, k] = -rows[row + 2, k]
 
 
@@ -157,21 +157,21 @@ def find_nearest(program: Program) -> None:
 
 
 @kernel
-def bear(
+def find_feasible_force(
     state: ControlState, contacts: Contacts, robot: ControlledRobot, phase: Floats, foot: int,
-    bounds: Bounds, bearable: Bearable,
+    bounds: Bounds, feasible: Feasible,
 ) -> None:  # fmt: skip
-    """Write `robot.force` that gives what is wanted, or the nearest that can be borne."""
+    """Write `robot.force` that gives what is wanted, or the nearest feasible."""
     normal = contacts.normal[robot.foot_contact[foot]]
     hold_foot(state, contacts, robot, phase, foot)
-    rate = demand(state, robot, bearable.wanted, bearable.slope)
-    if borne(state, robot, normal, rate, bounds, bearable):
+    rate = demand(state, robot, feasible.wanted, feasible.slope)
+    if is_feasible(state, robot, normal, rate, bounds, feasible):
         return
-    find_shares(state, robot, bearable)
-    write_rows(robot, normal, bounds.friction, bearable)
-    find_nearest(bearable.program)
+    find_shares(state, robot, feasible)
+    write_rows(robot, normal, bounds.friction, feasible)
+    find_nearest(feasible.program)
     for j in range(robot.nv):
-        total = bearable.asked[j]
+        total = feasible.asked[j]
         for i in range(robot.nu):
-            total += bearable.share[j, i] * bearable.program.x[i]
+            total += feasible.share[j, i] * feasible.program.x[i]
         robot.force[j] = total

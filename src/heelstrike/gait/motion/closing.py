@@ -1,0 +1,172 @@
+"""How nearly a motion, integrated, comes to the state in which it goes on.
+
+Computed torque follows the motion from its first state; contact points that stand and loops are
+held by whatever forces it takes, and landings are plastic impacts. Of the motion only its joint
+accelerations are used, and forces where they are not determined: all else follows from the
+equations of motion, integrated far more finely than the motion was designed. What is missed at the
+end is the error of the design.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import casadi
+import numpy as np
+
+from heelstrike.dynamics.loops import count_rows
+from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
+from heelstrike.gait.motion.instant import point_rows
+from heelstrike.gait.motion.motion import Motion, MotionPhase
+from heelstrike.gait.motion.phases import standing
+from heelstrike.gait.motion.request import Repeat
+from heelstrike.gait.polynomials import evaluated
+from heelstrike.robot.model import Floats
+from heelstrike.robot.robot import Robot
+
+PROPORTIONAL, DERIVATIVE = 400.0, 40.0
+"""Gains of computed torque (1/s², 1/s). Without feedback a chain of links that nothing holds falls
+over: the flat walk of bravo7 multiplies an error by more than 1e6 in a step."""
+FORCES = 1e-6
+"""Price of forces, in (m/s²)² for the robot's weight: they give way before the motion does."""
+MOST_CALLS = 5000
+"""Evaluations of the equations of motion after which a piece is given up: a linkage that passes
+through a position in which it may go on in two ways stops every integrator."""
+FINE = {"method": "DOP853", "rtol": 3e-11, "atol": 1e-12}
+"""How phases are integrated."""
+
+
+class Follower:
+    """A robot that follows a motion by computed torque, without a controller.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    motion : Motion
+        Its motion.
+    """
+
+    def __init__(self, robot: Robot, motion: Motion) -> None:
+        self.robot, self.motion = robot, motion
+        q, v = casadi.SX.sym("q", robot.nv), casadi.SX.sym("v", robot.nv)
+        along = np.array([np.cos(motion.slope), np.sin(motion.slope)])
+        dynamics = TracedDynamics(robot, symbols(q), symbols(v))
+        _, rows, moved = point_rows(dynamics, np.array([-along[1], along[0]]), along)
+        rows = np.vstack([rows, dynamics.loop_jacobian()])
+        moved = np.concatenate([moved, dynamics.loop_bias_acceleration()])
+        force = dynamics.bias_force() - dynamics.passive_force()
+        found = [dynamics.mass_matrix(), force, rows, moved]
+        self._mechanics = casadi.Function("mechanics", [q, v], casadi.cse(
+            [casadi.densify(expression(each)) for each in found]
+        ))  # fmt: skip
+
+    def missed(self) -> float:
+        """Largest difference (m, rad, m/s, rad/s) at the end of the whole motion.
+
+        It is infinite if the motion cannot be integrated.
+        """
+        q, v = self.motion.initial_state.q, self.motion.initial_state.v
+        for p in range(len(self.motion.phases)):
+            q, v = self._through(p, q, v)
+            if not np.all(np.isfinite(v)):
+                return np.inf
+        return self._away(len(self.motion.phases) - 1, q, v)
+
+    def missed_by_phases(self) -> Floats:
+        """Likewise at the end of every phase that begins where it was designed to, (phases,)."""
+        ends = [0.0, *self.motion.ends[:-1]]
+        starts = [(self.motion.position(t), self.motion.velocity(t)) for t in ends]
+        return np.array(
+            [self._away(p, *self._through(p, *start)) for p, start in enumerate(starts)]
+        )
+
+    def _away(self, p: int, q: Floats, v: Floats) -> float:
+        """Distance from the state in which the motion goes on after a phase."""
+        motion = self.motion
+        if not np.all(np.isfinite(v)):
+            return np.inf
+        if p + 1 == len(motion.phases) and motion.repeat is Repeat.NEVER:
+            last = motion.phases[p]
+            there = [last.coordinates(last.duration, order=order) for order in range(2)]
+        else:
+            there = [motion.position(motion.ends[p]), motion.velocity(motion.ends[p])]
+        return float(max(np.abs(q - there[0]).max(), np.abs(v - there[1]).max()))
+
+    def _through(self, p: int, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """State after a phase, and after what comes down at its end."""
+        from scipy.integrate import solve_ivp  # takes long to import
+
+        phase = self.motion.phases[p]
+        held = self._held(phase.contacts)
+        given = _forces(phase)
+        for k, (begin, end) in enumerate(pairwise(phase.breakpoints)):
+            # One polynomial at a time: the next one has other accelerations where both meet.
+            span = np.array([0.0, end - begin])
+            terms, forces = phase.pieces[k : k + 1], given[k : k + 1, :, held]
+
+            def rate(
+                t: float, state: Floats, span: Floats = span, terms: Floats = terms,
+                forces: Floats = forces,
+            ) -> Floats:  # fmt: skip
+                time = np.asarray(t)
+                q, v, a = (evaluated(terms, span, time, order) for order in range(3))
+                wanted = np.concatenate([q, v, a])
+                exerted = evaluated(forces, span, time, 0)
+                return self._rate(state, wanted, held, exerted)
+
+            self._calls = 0
+            found = solve_ivp(rate, span, np.concatenate([q, v]), **FINE)
+            q, v = np.split(found.y[:, -1], 2)
+            if found.status < 0:
+                return q, np.full(v.size, np.inf)
+        return q, self._landed(p, q, v)
+
+    def _rate(self, state: Floats, wanted: Floats, held: list[int], exerted: Floats) -> Floats:
+        """How the state changes: the possible accelerations nearest to those of computed torque."""
+        self._calls += 1
+        if self._calls > MOST_CALLS:
+            return np.full(state.size, np.nan)
+        q, v = np.split(state, 2)
+        at, fast, bend = np.split(wanted, 3)
+        mass, force, rows, moved = (np.array(each) for each in self._mechanics(q, v))
+        rows, moved, weight = rows[held], moved[held, 0], self.robot.weight
+        n, count, driven = q.size, len(held), self.robot.model.actuator_joint
+        free = np.setdiff1d(np.arange(n), driven)
+        price = np.zeros(n + count)
+        price[driven], price[n:] = 1.0, FORCES
+        nearest = np.concatenate(
+            [bend + DERIVATIVE * (fast - v) + PROPORTIONAL * (at - q), exerted / weight]
+        )
+        must = np.block([[mass[free] / weight, -rows.T[free]], [rows, np.zeros((count, count))]])
+        right = np.concatenate([price * nearest, -force[free, 0] / weight, -moved])
+        system = np.block([[np.diag(price), must.T], [must, np.zeros((len(must), len(must)))]])
+        return np.concatenate([v, np.linalg.solve(system, right)[:n]])
+
+    def _landed(self, p: int, q: Floats, v: Floats) -> Floats:
+        """Velocity after a plastic impact of all that stands after a phase, if a point is new."""
+        motion, names = self.motion, self.robot.contact_names
+        before, last = set(motion.phases[p].contacts), p + 1 == len(motion.phases)
+        if last and motion.repeat is Repeat.NEVER:
+            return v
+        after = motion.phases[0 if last else p + 1].contacts
+        if last and motion.repeat is Repeat.MIRRORED:
+            after = tuple(names[motion.mirror_contact[names.index(each)]] for each in after)
+        if not set(after) - before:
+            return v
+        mass, _, rows, _ = (np.array(each) for each in self._mechanics(q, v))
+        rows = rows[self._held(after)]
+        inverse = np.linalg.solve(mass, rows.T)
+        return np.asarray(v - inverse @ np.linalg.lstsq(rows @ inverse, rows @ v)[0])
+
+    def _held(self, contacts: tuple[str, ...]) -> list[int]:
+        """Rows that hold the robot."""
+        points = [self.robot.contact_names.index(each) for each in contacts]
+        loops = range(2 * self.robot.nc, 2 * self.robot.nc + count_rows(self.robot.model))
+        return [*standing(self.robot, points).forces, *loops]
+
+
+def _forces(phase: MotionPhase) -> Any:
+    """Coefficients of the forces of points and loops, lowest first, (K, s, forces)."""
+    return np.concatenate([phase.force_pieces, phase.loop_force_pieces], axis=2)
