@@ -124,7 +124,7 @@ def test_where_classes_of_robots_are_defined_is_no_input(monkeypatch: pytest.Mon
     robot = walking.bravo7()
     first = digest_with(robot)
     mass = robot.model.mass.copy()
-    mass[0] *= 1.0 + 1e-12
+    mass *= 1.0 + 1e-12
     heavier = replace(robot, model=robot.model.replaced(mass=mass))
     toes = replace(robot, feet=robot.feet[::-1])
     renamed = replace(robot, name="other")
