@@ -151,6 +151,13 @@ def test_files_of_packages_and_unequal_legs(tmp_path: Path) -> None:
     assert json.loads(CliRunner().invoke(app, [*there, "--mirror"]).stdout)["symmetric"]
 
 
+def test_a_folder_of_packages_for_a_built_in_robot_is_refused_in_words_of_the_command() -> None:
+    told = CliRunner().invoke(app, ["inspect", "bravo7", "--package-path", "."])
+    assert told.exit_code != 0
+    assert "leave out --package-path" in " ".join(told.stderr.split())
+    assert "package_path" not in told.stderr
+
+
 def _inspect(*arguments: str, encoding: str) -> subprocess.CompletedProcess[bytes]:
     code = "from heelstrike.cli.main import app; app()"
     return subprocess.run(

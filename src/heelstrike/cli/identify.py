@@ -75,6 +75,9 @@ def identify(
             ],
             "delay": None if math.isnan(found.delay) else found.delay,
             "friction": found.friction.value if found.friction.samples else None,
+            "friction_at_least": (
+                None if math.isnan(found.friction.at_least) else found.friction.at_least
+            ),
             "not_told": list(found.hidden), "misfit": found.misfit,
         }  # fmt: skip
         typer.echo(json.dumps(told, indent=2))

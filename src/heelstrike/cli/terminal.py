@@ -71,6 +71,7 @@ _OPTIONS = {
     "leave out mirror, or use dimension=2": "leave out --mirror",
     'forward="y"': "--forward y",
     "package_path=…": "--package-path",
+    "leave out package_path": "leave out --package-path",
 }
 
 

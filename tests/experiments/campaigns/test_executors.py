@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import pickle
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -211,6 +212,9 @@ class Reads:
     def __setstate__(self, state: dict[str, Any]) -> None:
         raise FileNotFoundError(2, "No such file or directory", state["file"])
 
+    def __deepcopy__(self, _: object) -> Reads:
+        return Reads()
+
 
 @pytest.mark.parametrize(
     "executor", [Client(), pytest.param(process_pool(1), marks=pytest.mark.slow)]
@@ -226,7 +230,9 @@ def test_what_a_worker_cannot_read_is_no_loss_of_workers_and_no_crash_of_trials(
     assert "policy.npz" in str(at.value)
     assert "nobody works" not in str(at.value)
     assert len(campaign.load(tmp_path)) == 0
-    assert len(campaign.run(tmp_path, workers=1)) == 40
+    results = campaign.run(tmp_path, workers=1)
+    assert len(results) == 40
+    assert not {each.status for each in results.outcomes} & {"refused", "crashed"}
 
 
 def test_trials_that_cannot_be_sent_are_refused() -> None:
@@ -240,6 +246,64 @@ def test_trials_that_cannot_be_sent_are_refused() -> None:
     trial = replace(cases.limp(), controller=Local())
     with pytest.raises(SimulationError, match="cannot be sent to workers: OSError: a device"):
         hs.Campaign(trial, FRICTION, 2, 3).run(executor=Client())
+
+
+class Held:
+    """A controller that holds a device: it can be copied, but not be sent."""
+
+    def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+        return np.zeros(6)
+
+    def __reduce__(self) -> Any:
+        raise OSError("a device")
+
+    def __deepcopy__(self, _: object) -> Held:
+        return Held()
+
+
+def test_trials_are_packed_only_if_a_block_goes_to_another_process(tmp_path: Path) -> None:
+    """Not for threads of this process, nor where nothing is left to do."""
+    campaign = hs.Campaign(replace(cases.limp(), controller=Held()), FRICTION, 3, 3)
+    alone = as_text(campaign.run(workers=1))
+    with ThreadPoolExecutor(1) as pool:
+        assert as_text(campaign.run(tmp_path, executor=pool)) == alone
+    assert as_text(campaign.run(executor=lambda: ThreadPoolExecutor(1))) == alone
+    assert as_text(campaign.run(tmp_path, executor=Client())) == alone
+
+
+class Counts:
+    """A controller that counts the runs that it was in, and breaks off to tell."""
+
+    runs = 0
+
+    def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+        if t > 0.0:
+            raise ValueError(f"run {self.runs}")
+        self.runs += 1
+        return np.zeros(6)
+
+
+@pytest.mark.parametrize("executor", [None, Client(), lambda: ThreadPoolExecutor(2)])
+def test_a_controller_keeps_nothing_from_one_trial_to_the_next(executor: Any) -> None:
+    """Neither in a block nor from block to block of one worker."""
+    controller = Counts()
+    campaign = hs.Campaign(replace(cases.limp(), controller=controller), FRICTION, 40, 3)
+    results = campaign.run(executor=executor, workers=2)
+    assert all("run 1" in each.message for each in results.outcomes)
+    for number in (0, 39, 39):
+        assert campaign.replay(number).message == results.outcomes[number].message
+    assert controller.runs == 0
+
+
+def test_a_controller_that_cannot_be_copied_is_refused_in_words() -> None:
+    class Stuck(Held):
+        def __deepcopy__(self, _: object) -> Held:
+            raise TypeError("a lock")
+
+    campaign = hs.Campaign(replace(cases.limp(), controller=Stuck()), FRICTION, 1, 3)
+    outcome = campaign.run(workers=1).outcomes[0]
+    assert outcome.status == "refused"
+    assert "controller Stuck cannot be copied: TypeError: a lock" in outcome.message
 
 
 def test_workers_read_the_trials_once() -> None:

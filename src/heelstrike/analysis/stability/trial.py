@@ -52,7 +52,7 @@ class Trial:
     robot: Robot
     """A floating robot."""
     controller: Controller | Law | None
-    """Object with ``torque(t, state, contacts)``,. What makes it walk. One in Python that remembers
+    """Object with ``torque(t, state, contacts)``: what makes it walk. One in Python that remembers
     must forget at time 0."""
     state: State
     """Where it begins, on a walk that repeats."""

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 from contextlib import closing, contextmanager
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol
@@ -415,7 +415,7 @@ def _worked(
 ) -> Iterator[Callable[[Iterable[Block]], Generator[Done]]]:
     """Make a function that has blocks worked on, and yields them in their order as they come."""
     if executor is not None:
-        yield partial(_by_others, executor, packed(trials))
+        yield partial(_by_others, executor, cache(partial(packed, trials)))
         return
     stop = threading.Event()
     with ThreadPoolExecutor(workers, thread_name_prefix="heelstrike") as pool:
@@ -441,7 +441,9 @@ def _in_order(
         yield block, future.result()
 
 
-def _by_others(executor: Any, trials: bytes, blocks: Iterable[Block]) -> Generator[Done]:
+def _by_others(
+    executor: Any, trials: Callable[[], bytes], blocks: Iterable[Block]
+) -> Generator[Done]:
     """Have blocks worked on by an executor; where one dies of a block, find the trial.
 
     A maker of executors is asked for another then; an executor that was given is broken for good.

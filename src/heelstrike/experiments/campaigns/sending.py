@@ -1,14 +1,16 @@
 """Blocks on their way to workers elsewhere, so that errors of both ends are told from theirs.
 
-The trials of a campaign are pickled once and go as bytes. A worker reads them when the first block
-comes and keeps them for the next. What it cannot read, it says in its answer: an error that comes
-instead of an answer is one of the executor.
+The trials of a campaign are pickled once, when the first block goes, and go as bytes. A worker
+reads them when the first block comes and keeps them for the next. What it cannot read, it says in
+its answer: an error that comes instead of an answer is one of the executor. Threads of this process
+take trials as they are.
 """
 
 from __future__ import annotations
 
 import pickle
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import lru_cache
 from importlib import import_module
@@ -72,17 +74,19 @@ class Elsewhere:
     ----------
     executor : object with ``submit(function, argument)``
         Who works.
-    trials : bytes
-        The trials of the campaign, as :func:`packed` makes them.
+    trials : callable
+        Makes the trials of the campaign bytes, as :func:`packed` does, or returns those it made.
     """
 
-    def __init__(self, executor: Any, trials: bytes) -> None:
+    def __init__(self, executor: Any, trials: Callable[[], bytes]) -> None:
         self._executor, self._trials = executor, trials
 
     def submit(self, block: Block) -> Any:
         """Send a block; return what has its ``result()``, which :func:`outcomes_of` looks at."""
+        if isinstance(self._executor, ThreadPoolExecutor):
+            return self._executor.submit(run_block, block)
         sent = SentBlock(
-            self._trials, block.numbers, block.values, block.seeds, block.duration, block.limit
+            self._trials(), block.numbers, block.values, block.seeds, block.duration, block.limit
         )
         return self._executor.submit(work_on, sent)
 

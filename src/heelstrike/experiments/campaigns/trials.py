@@ -8,6 +8,7 @@ import json
 import math
 import pickle
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import replace
 from time import thread_time
 from typing import Any
@@ -103,10 +104,27 @@ def replayed(
 ) -> Run:  # fmt: skip
     """Simulate a trial alone, to the last bit as in its block."""
     return simulate(
-        lane.robot, lane.controller, state=lane.state, duration=duration, method=trial.method,
+        lane.robot, _unused(lane), state=lane.state, duration=duration, method=trial.method,
         ground=lane.ground, pushes=lane.pushes, control_period=trial.control_period,
         on_error=OnError.STOP, record_every=record_every, progress=progress,
     )  # fmt: skip
+
+
+def _unused(lane: Laid) -> Any:
+    """Return the controller of a trial as nothing has used it: of one in Python, a copy.
+
+    What it keeps from call to call would go from one trial to the next, and between threads.
+    """
+    if law_of(lane.controller) is not None:
+        return lane.controller
+    try:  # a robot does not change, and is the same one for a controller that looks
+        return deepcopy(lane.controller, {id(lane.robot): lane.robot})
+    except Exception as error:
+        raise SimulationError(
+            f"controller {type(lane.controller).__name__} cannot be copied: "
+            f"{type(error).__name__}: {error}. Each trial of a campaign begins with a copy of its "
+            "controller: give it a method __deepcopy__, or attributes that copy.deepcopy takes"
+        ) from error
 
 
 def _alone(

@@ -22,11 +22,14 @@ H is too large by what noise of the curves makes of it. The moment of inertia of
 the foot turns faster and faster; one that does not tells nothing, but a curve that noise has moved
 turns it. Along the true motion H is smaller by C, on average, and there the gradient of the sum of
 squares has the slope H − C, though it is as noisy as H says. Of combinations whose H is C in more
-than a small part, nothing is told: there the file is left in, whole.
+than a small part, nothing is told: what the curves say there is left out, and value and tolerance
+of the file stay. Where the sum of squares is larger than the noise that was told explains, all
+noise is taken for as much larger: of the motors, of the ground and of the curves.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -60,6 +63,8 @@ tells nothing of it: on a walk of bravo7, 0.02 at most for all but the moments o
 feet, where it is 0.3 to 1 and more."""
 DRAWS, SEED = 4, 0
 """Moves of the curves by chance, each to both sides, of which what they add is the mean."""
+SURPRISE = 4.0
+"""Standard deviations by which the sum of squares is too large for the noise that was told."""
 MOST_STEPS = 60
 """Steps that are tried: most motions need six."""
 
@@ -83,7 +88,7 @@ class Fit:
     values: Floats
     """(b,) Base parameters."""
     covariance: Floats
-    """(b, b)"""
+    """(b, b) For noise as large as the errors are, if that is surprisingly larger than told."""
     delay: float
     """Of the motors (s)."""
     delay_deviation: float
@@ -143,16 +148,18 @@ class Fitting:
         size = len(self.base.chosen)
         free = size + (self.longest > 0.0)
         before = self.base.matrix * self.equations.unknowns.size
-        known = np.linalg.inv(before @ before.T)
-        there = np.zeros(free)  # base parameters, and the delay if it is looked for
-        there[:size] = begun = self.base.matrix @ values
+        known = np.zeros((free, free))
+        known[:size, :size] = np.linalg.inv(before @ before.T)
+        known[size:, size:] = self.longest**-2 if free > size else 0.0
+        begun = np.zeros(free)  # base parameters, and the delay if it is looked for
+        begun[:size] = self.base.matrix @ values
+        there = begun.copy()
         least, part = np.inf, 1.0
         for _ in range(MOST_STEPS):
             found = self._evaluated(values, there)
-            matrix, right, squares = found.matrix, found.right, found.squares
-            matrix[:size, :size] += known
-            right[:size] += known @ (there[:size] - begun)
-            away = squares + float((there[:size] - begun) @ known @ (there[:size] - begun))
+            matrix, squares = found.matrix + known, found.squares
+            right = found.right + known @ (there - begun)
+            away = squares + float((there - begun) @ known @ (there - begun))
             if away > least + NO_WORSE * found.rows and part > SHORTEST_STEP:
                 part *= 0.5  # too far: a shorter step from where it began
             else:
@@ -166,16 +173,14 @@ class Fitting:
                     step = -covariance @ right
                 deviation = np.sqrt(np.diag(covariance))
                 if np.all(np.abs(step) <= SETTLED_FIT * deviation):
-                    kept = size if held else free
-                    noise: Floats = np.zeros((free, free))
-                    for piece in self._pieces:
-                        noise += piece.made_by_noise(free)
-                    own = slice(0, kept)
-                    there[own], covariance = _without_file(
-                        matrix[own, own], noise[own, own], np.asarray(known), there[own], begun
-                    )
-                    deviation = np.sqrt(np.diag(covariance))
+                    own = slice(0, size if held else free)
                     degrees = found.rows - free - sum(piece.size for piece in self._pieces)
+                    noise = self._made_by_noise(values, there)
+                    there[own], covariance = _without_file(
+                        found.matrix[own, own], noise[own, own], known[own, own], there[own],
+                        begun[own], _surprise(squares / degrees, degrees),
+                    )  # fmt: skip
+                    deviation = np.sqrt(np.diag(covariance))
                     return Fit(
                         there[:size], covariance[:size, :size], float(there[size:].sum()),
                         np.nan if held else float(deviation[size:].sum()),
@@ -205,6 +210,15 @@ class Fitting:
             found = found.plus(piece.reduced(assumed, there[:size], delay, len(there)))
         return found
 
+    def _made_by_noise(self, values: Floats, there: Floats) -> Floats:
+        """Return what noise of the curves makes of the information, on average, (free, free)."""
+        size = len(self.base.chosen)
+        assumed, delay = self.assumed(values, there[:size]), float(there[size:].sum())
+        found: Floats = np.zeros((len(there), len(there)))
+        for piece in self._pieces:
+            found += piece.made_by_noise(assumed, there[:size], delay, len(there))
+        return found
+
     def assumed(self, values: Floats, beta: Floats) -> Floats:
         """Return values of all unknowns, near to some, that have given base parameters."""
         matrix, size = self.base.matrix, self.equations.unknowns.size
@@ -213,42 +227,50 @@ class Fitting:
         return values + size * change
 
 
+def _surprise(misfit: float, degrees: int) -> float:
+    """By how much variances are larger than the noise that was told explains."""
+    return misfit if misfit > 1.0 + SURPRISE * math.sqrt(2.0 / degrees) else 1.0
+
+
 def _without_file(
-    matrix: Floats, noise: Floats, known: Floats, there: Floats, begun: Floats
+    seen: Floats, noise: Floats, file: Floats, there: Floats, begun: Floats, surprise: float
 ) -> tuple[Floats, Floats]:
     """Take what the file says out of the most likely parameters, where the motion tells them.
 
     Parameters
     ----------
-    matrix : (k, k) array
-        Information on base parameters, and maybe a delay, with that of the file.
+    seen : (k, k) array
+        Information of the motion on base parameters, and maybe a delay, for noise that was told.
     noise : (k, k) array
         What noise of the curves makes of it.
-    known : (b, b) array
-        Information of the file on base parameters.
+    file : (k, k) array
+        Information of the file on them.
     there : (k,) array
         Most likely parameters.
-    begun : (b,) array
-        Base parameters of the file.
+    begun : (k,) array
+        Parameters of the file.
+    surprise : float
+        By how much variances of noise are larger than told. Of noise that is, `noise` stays as it
+        is: the curves move by more, and what they seem to tell counts for less.
 
     Returns
     -------
     tuple of (k,) and (k, k) arrays
         The parameters, and their covariance.
     """
-    file, away = np.zeros_like(matrix), np.zeros(len(there))
-    file[: len(begun), : len(begun)] = known
-    away[: len(begun)] = there[: len(begun)] - begun
-    seen = matrix - (1.0 - FAINT) * file
+    pull = file @ (there - begun)  # of the file; the motion pulls back as much, as told
+    seen = seen / surprise + FAINT * file
     factor = np.linalg.cholesky(seen)
     part, turned = np.linalg.eigh(np.linalg.solve(factor, np.linalg.solve(factor, noise).T))
     ways, slopes = np.linalg.solve(factor.T, turned), factor @ turned
-    untold = part > NOISE_ALONE
-    onto = slopes[:, untold] @ ways[:, untold].T
-    left = onto @ file
-    inverse = np.linalg.inv((slopes * np.maximum(1.0 - part, 0.0)) @ slopes.T + left)
-    found = there + (1.0 - FAINT) * inverse @ (file - left) @ away
-    return found, inverse @ (seen + left @ onto.T) @ inverse.T
+    told = part <= NOISE_ALONE
+    onto = slopes[:, told] @ ways[:, told].T  # (k, k) Of gradients, those along what is told
+    left = file - onto @ file
+    rest = np.eye(len(file)) - onto
+    inverse = np.linalg.inv((slopes[:, told] * (1.0 - part[told])) @ slopes[:, told].T + left)
+    found = there + inverse @ ((1.0 / surprise - FAINT) * onto @ pull - rest @ pull)
+    spread = slopes[:, told] @ slopes[:, told].T + left @ rest.T
+    return found, inverse @ spread @ inverse.T
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,13 +318,10 @@ class _Stretch:
         self._torque[:, equations.robot.model.actuator_joint - equations.first] = log.torque[rows]
         self._force = None if log.force is None or piece.foot is None else log.force[rows]
         self.coefficients = self._splines.fitted(self._measured)
-        self._basis = [self._splines.basis(self._time, order) for order in ORDERS]
-        moved = np.abs(self._basis[1] @ self.coefficients) * self._apart
+        moved = np.abs(self._splines.values(self.coefficients, 1)) * self._apart
         self._moves = moved > RESTING * whole.noise.encoder
         self._answer: Floats = np.zeros(0)
         self._coupling: Floats = np.zeros((0, 0))
-        self._looked: tuple[_System, _Seen, _Seen] | None = None
-        self._scale: Floats = np.zeros((0, 0, 0))  # of errors of the ground
         self.compared: tuple[Floats, Floats, Floats] = (np.zeros(0),) * 3
 
     @property
@@ -320,33 +339,41 @@ class _Stretch:
 
         Coefficients are eliminated, and change as :meth:`change` says.
         """
+        system = self._looked_at(assumed, beta, delay, free)[0]
+        self._answer, self._coupling, matrix, right = system.eliminated()
+        return _Normal(matrix, right, system.squares, system.rows)
+
+    def _looked_at(
+        self, assumed: Floats, beta: Floats, delay: float, free: int
+    ) -> tuple[_System, _Seen, _Seen]:
+        """Return equations, and what was seen of the whole motion and of that of the motors.
+
+        Rows of equations are many: nobody keeps them longer than for one piece.
+        """
         noise, joints = self._whole.noise, self._measured.shape[1]
         system = _System(self._splines.size, joints, free)
-        error = (self._basis[0] @ self.coefficients - self._measured) / noise.encoder
-        system.add_own(self._basis[0], error, noise.encoder)
-        here = there = self._seen(self._basis, assumed)
+        here = there = self._seen(self._time, assumed)
+        error = (here.theta[0] - self._measured) / noise.encoder
+        system.add_own(here.basis[0], error, noise.encoder)
         if not self._inner.all():
-            at = self._time[self._inner] + delay
-            there = self._seen([self._splines.basis(at, order) for order in ORDERS], assumed)
+            there = self._seen(self._time[self._inner] + delay, assumed)
         self._motors(system, there, beta)
         if self._force is not None:
             self._ground(system, here, beta)
-        self._answer, self._coupling, matrix, right = system.eliminated()
-        self._looked = system, here, there
-        return _Normal(matrix, right, system.squares, system.rows)
+        return system, here, there
 
-    def made_by_noise(self, free: int) -> Floats:
+    def made_by_noise(self, assumed: Floats, beta: Floats, delay: float, free: int) -> Floats:
         """Return what noise of the curve makes of the information, on average, (free, free)."""
-        assert self._looked is not None
-        system, here, there = self._looked
+        system, here, there = self._looked_at(assumed, beta, delay, free)
         rng, found = np.random.default_rng(SEED), np.zeros((free, free))
+        scale = None if self._force is None else self._scale(here)
         for _ in range(DRAWS):
             move = system.drawn(rng).reshape(self.coefficients.shape)
             sides = []
             for side in (move, -move):
                 each = [self._of_motors(*self._moved(there, side), there.slopes.motors, free)]
-                if self._force is not None:
-                    each.append(self._of_ground(self._moved(here, side)[0], free))
+                if scale is not None:
+                    each.append(self._of_ground(self._moved(here, side)[0], scale, free))
                 sides.append(each)
             found += system.seen([0.5 * (one - two) for one, two in zip(*sides, strict=True)])
         return np.asarray(found / DRAWS, np.float64)
@@ -364,15 +391,16 @@ class _Stretch:
         chosen = at.motors[:, :, list(self._whole.base.chosen)]
         return _with_delay(chosen, slopes, theta, free) / self._whole.noise.torque
 
-    def _of_ground(self, at: Columns, free: int) -> Floats:
+    def _of_ground(self, at: Columns, scale: Floats, free: int) -> Floats:
         """Derivatives of the errors of the ground by the parameters, (n, b, free)."""
-        chosen = self._scale @ at.ground[:, :, list(self._whole.base.chosen)]
+        chosen = scale @ at.ground[:, :, list(self._whole.base.chosen)]
         found = np.zeros((*chosen.shape[:2], free))
         found[:, :, : chosen.shape[2]] = chosen
         return found
 
-    def _seen(self, basis: Sequence[Floats], assumed: Floats) -> _Seen:
+    def _seen(self, time: Floats, assumed: Floats) -> _Seen:
         """Look at the motion at some times."""
+        basis = [self._splines.basis(time, order) for order in ORDERS]
         theta = [each @ self.coefficients for each in basis]
         equations = self._whole.equations
         at = equations.columns((theta[0], theta[1], theta[2]), self._foot)
@@ -396,18 +424,28 @@ class _Stretch:
         assert self._foot is not None
         whole = self._whole
         at, slopes = seen.columns, seen.slopes.ground
-        held = whole.equations.held_rows(self._foot)
         points = list(whole.equations.soles[self._foot].contacts)
         force = self._force[:, points].reshape(len(self._time), -1)
-        back = np.swapaxes(at.rows[:, held, : whole.equations.first], 1, 2)
+        back, scale = self._back(at), self._scale(seen)
         made = at.ground[:, :, list(whole.base.chosen)] @ beta
         error = made - (back @ force[:, :, None])[:, :, 0]
-        scale = np.linalg.inv(np.linalg.cholesky(back @ np.swapaxes(back, 1, 2)))
-        self._scale = scale = scale / whole.noise.force
         system.add(
             seen.basis, (scale @ error[:, :, None])[:, :, 0], [scale @ each for each in slopes],
-            self._of_ground(at, system.free), np.ones(error.shape, dtype=bool),
+            self._of_ground(at, scale, system.free), np.ones(error.shape, dtype=bool),
         )  # fmt: skip
+
+    def _back(self, at: Columns) -> Floats:
+        """Return what forces of the contact points of the foot do to the trunk, (n, b, held)."""
+        assert self._foot is not None
+        equations = self._whole.equations
+        rows = at.rows[:, equations.held_rows(self._foot), : equations.first]
+        return np.swapaxes(rows, 1, 2)
+
+    def _scale(self, seen: _Seen) -> Floats:
+        """Return axes of errors of the ground, over their standard deviations, (n, b, b)."""
+        back = self._back(seen.columns)
+        axes = np.linalg.inv(np.linalg.cholesky(back @ np.swapaxes(back, 1, 2)))
+        return np.asarray(axes / self._whole.noise.force, np.float64)
 
 
 def _with_delay(

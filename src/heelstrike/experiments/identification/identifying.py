@@ -32,8 +32,6 @@ COVERING = 1.959964
 """Standard deviations of an interval that holds in 95 %."""
 KNOTS = 0.06
 """Time between two knots of the motion (s): robots that walk do not change faster."""
-SURPRISE = 4.0
-"""Standard deviations by which the sum of squares is too large for the noise that was told."""
 TOLD = 0.3
 """Part of the standard deviation beforehand above which a motion tells little of a number."""
 SHOWN = 3
@@ -220,13 +218,12 @@ def identify(
             f"the equations of this motion have no single answer ({error}): it does not fit the "
             "robot, or a noise is told much too small. Look whether columns have the right units"
         ) from error
-    covariance = fit.covariance * _surprise(fit)
-    numbers = _numbers(equations.unknowns, base, known, fit, covariance)
+    numbers = _numbers(equations.unknowns, base, known, fit)
     return Identified(
         numbers=numbers,
-        covariance=covariance,
+        covariance=fit.covariance,
         delay=fit.delay if longest_delay > 0.0 else math.nan,
-        delay_deviation=fit.delay_deviation * math.sqrt(_surprise(fit)),
+        delay_deviation=fit.delay_deviation,
         friction=friction,
         hidden=(
             *_hidden(equations.unknowns, base, numbers),
@@ -300,16 +297,11 @@ def _encoder_noise(
     return np.sqrt(np.maximum(squares / max(count, 1), np.finfo(float).tiny))
 
 
-def _surprise(fit: Fit) -> float:
-    """By how much variances are larger than the noise that was told explains."""
-    return fit.misfit if fit.misfit > 1.0 + SURPRISE * math.sqrt(2.0 / fit.degrees) else 1.0
-
-
 def _numbers(
-    unknowns: Unknowns, base: BaseParameters, known: Floats, fit: Fit, covariance: Floats
+    unknowns: Unknowns, base: BaseParameters, known: Floats, fit: Fit
 ) -> tuple[IdentifiedNumber, ...]:
     names, assumed = unknowns.names, base.matrix @ known
-    deviation, before = np.sqrt(np.diag(covariance)), base.deviation(unknowns.size)
+    deviation, before = np.sqrt(np.diag(fit.covariance)), base.deviation(unknowns.size)
     return tuple(
         IdentifiedNumber(
             name=names[k], unit=unknowns.units[k], value=float(fit.values[row]),

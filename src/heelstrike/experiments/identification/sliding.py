@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from decimal import ROUND_FLOOR, Context
+from statistics import NormalDist
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -25,6 +27,8 @@ AGREES = 4.0
 """Standard deviations of a ratio of forces beyond which its sample is not of one that slides."""
 AGAIN = 5
 """How often samples that do not agree are left out: one is left out or not after two."""
+DOUBT = 0.05
+"""Part of all recordings in which friction may be less than what forces are said to have used."""
 ALL_BUT = 0.9
 """Part of its friction from which on a foot may slide: noise and slow sliding hide the rest."""
 
@@ -41,10 +45,17 @@ class GroundFriction:
     """Samples of contact points that slide."""
     reason: str = ""
     """Why it is not visible."""
+    at_least: float = math.nan
+    """What it is at least, in 95 % of all recordings, by the forces that have used it; NaN where
+    they were not measured."""
 
     def __str__(self) -> str:
         if not self.samples:
-            return f"friction of the ground: not visible, {self.reason}"
+            least = Context(prec=2, rounding=ROUND_FLOOR).create_decimal_from_float(self.at_least)
+            told = f"friction of the ground: not visible, {self.reason}"
+            if least.is_nan():
+                return told
+            return f"{told}; it is {float(least):g} at least, which forces have used"
         return (
             f"friction of the ground: {self.value:.4g} ± {1.96 * self.deviation:.2g}, from "
             f"{self.samples} samples of points that slide"
@@ -111,36 +122,66 @@ def ground_friction(
     force_noise : float
         Standard deviation of the noise of forces (N).
     """
-    if senses is None or log.force is None:
-        missing = "forces of the contact points" if log.force is None else "where the trunk is"
-        return GroundFriction(math.nan, math.nan, 0, f"for {missing} is not in the recording")
+    if log.force is None:
+        return _hidden("for forces of the contact points are not in the recording")
     scale = equations.robot.model.friction_scale
-    pressing = (scale * log.force[:, :, 0])[senses != 0.0]
-    rubbing = -(senses * log.force[:, :, 1])[senses != 0.0]
+    least = at_least(log.force, scale, force_noise)
+    if senses is None:
+        return _hidden("for where the trunk is is not in the recording", least)
+    rubs = (senses != 0.0) & (scale > 0.0)
+    pressing = (scale * log.force[:, :, 0])[rubs]
+    rubbing = -(senses * log.force[:, :, 1])[rubs]
     if not len(pressing):
-        return GroundFriction(math.nan, math.nan, 0, _at_least(log.force, scale, force_noise))
+        return _hidden("for no foot slides so far and so fast that it shows", least)
     value = float(np.median(rubbing / pressing))
     for _ in range(AGAIN):  # of a point that sticks meanwhile the force is less than friction
         noise = force_noise * np.hypot(1.0, scale.max() * value)
         agree = np.abs(rubbing - value * pressing) < AGREES * noise
         if 2 * np.count_nonzero(agree) < len(agree):
-            return GroundFriction(
-                math.nan, math.nan, 0,
-                "for forces of the points that slide do not agree on one coefficient",
-            )  # fmt: skip
+            return _hidden(
+                "for forces of the points that slide do not agree on one coefficient", least
+            )
         value = float(rubbing[agree].sum() / pressing[agree].sum())
     count, weight = int(np.count_nonzero(agree)), float(pressing[agree].sum())
     deviation = force_noise * math.sqrt(count * (1.0 + value**2)) / weight
-    return GroundFriction(value, deviation, count)
+    return GroundFriction(value, deviation, count, at_least=least)
 
 
-def _at_least(force: Floats, scale: Floats, force_noise: float) -> str:
-    """Say why friction is not visible, and what it is at least: what forces have used of it."""
-    normal, tangent = scale * force[:, :, 0], np.abs(force[:, :, 1])
-    presses = (force[:, :, 0] > PRESSED * force_noise) & (scale > 0.0)
-    least = (tangent - AGREES * force_noise) / np.where(presses, normal, np.inf)
-    used = max(float(least.max(initial=0.0)), 0.0)
-    return f"for no foot slides; it is {used:.2g} at least, which forces have used"
+def _hidden(reason: str, least: float = math.nan) -> GroundFriction:
+    return GroundFriction(math.nan, math.nan, 0, reason, least)
+
+
+def at_least(force: Floats, scale: Floats, force_noise: float) -> float:
+    """Tell what friction of the ground is at least, as forces have used it.
+
+    A force within the cone of friction is measured outside of it by noise alone: by more than z
+    standard deviations, as far as the line f_t = μ f_n is away, in one of 1/Φ(−z) samples. Of all
+    samples together, to either side, with z of Bonferroni, hardly ever. So μ is no less than where
+    the line comes as near as that.
+
+    Parameters
+    ----------
+    force : (n, nc, 2) array
+        Forces of the contact points, normal and tangent (N).
+    scale : (nc,) array
+        By what friction at each point is multiplied.
+    force_noise : float
+        Standard deviation of their noise (N).
+
+    Returns
+    -------
+    float
+        A coefficient that is less than the ground's in all but a part `DOUBT` of recordings.
+    """
+    rubs = scale > 0.0
+    normal, tangent = force[:, rubs, 0], np.abs(force[:, rubs, 1])
+    if not normal.size:
+        return 0.0
+    away = -NormalDist().inv_cdf(DOUBT / (2.0 * normal.size)) * force_noise
+    size = np.hypot(normal, tangent)
+    angle = np.arctan2(tangent, normal) - np.arcsin(np.minimum(away / np.maximum(size, away), 1.0))
+    used = np.tan(np.where(normal > 0.0, np.maximum(angle, 0.0), 0.0)) / scale[rubs]
+    return float(used.max())
 
 
 def may_slide(
