@@ -124,15 +124,28 @@ def test_motions_of_another_robot_do_not_close(name: str, heavier: float) -> Non
 def test_a_design_that_may_not_be_halved_tells_what_it_misses(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    robot = hs.load_robot("bravo7")
-    phase = hs.ContactPhase("right_foot", duration=0.7, pieces=2)
-    monkeypatch.setattr(optimize, "SMALLEST_PIECES", 3)
+    robot = hs.load_robot("rabbit")
+    phase = hs.ContactPhase("right_tibia", duration=0.6, pieces=4)
+    monkeypatch.setattr(optimize, "SMALLEST_PIECES", 4)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
-        motion = hs.optimize_motion(robot, [phase], distance=0.3)
-    assert len(motion.phases[0].pieces) < 4
-    assert motion.closes_to > 10.0 * CLOSED
+        motion = hs.optimize_motion(robot, [phase], distance=0.25)
+    assert len(motion.phases[0].pieces) == 4
+    assert 10.0 * CLOSED < motion.closes_to < 1e-4
     assert motion.closes_to == pytest.approx(Follower(robot, motion).missed(), rel=1e-6)
+    assert motion.closes_to == pytest.approx(gap(mechanics_of(robot, 0.0), motion), rel=1e-3)
+
+
+def test_closing_is_of_ends_only() -> None:
+    """A knee that swings by 0.3 rad within a piece closes all the same; what it lacks tells."""
+    robot, motion, mechanics = loaded("single support")
+    (phase,) = motion.phases
+    pieces, length = phase.pieces.copy(), np.diff(phase.breakpoints)[2]
+    swing = 16.0 * 0.3 * np.array([0.0, 0.0, 1.0, -2.0, 1.0, 0.0]) / length ** np.arange(6)
+    pieces[2, :, robot.joint_names.index("left_knee")] += swing
+    bent = replace(motion, phases=(replace(phase, pieces=pieces),))
+    assert Follower(robot, bent).missed() < CLOSED
+    assert lacking(mechanics, bent) > 0.1 * robot.weight
 
 
 def test_soles_stay_above_the_obstacle() -> None:
