@@ -23,7 +23,7 @@ import numpy as np
 from machine import load
 
 import heelstrike as hs
-from heelstrike.dynamics.spatial.queries.equations_of_motion import mass_matrix
+from heelstrike.dynamics import mass_matrix
 
 STEP = 1e-3
 FLOOR = '<geom name="speed_floor" type="plane" size="0 0 1"/>'

@@ -86,6 +86,7 @@ def usual() -> dict[str, dict[str, Any]]:
             "phases": [hs.ContactPhase("right_foot")],
             "speed": 0.4,
         },
+        "over_obstacle": {"robot": robot, "place": 0.15, "height": 0.1, "half_width": 0.02},
         "gait_family": {"robot": robot, "speed": [0.4]},
         "gait_sensitivity_norm": dict.fromkeys("ABCD", 0.5 * ONE),
         "human": {},

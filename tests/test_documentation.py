@@ -14,6 +14,9 @@ from types import SimpleNamespace
 import pytest
 from public_names import public_names
 
+from heelstrike.robot import Robot, SpatialRobot
+from heelstrike.robot.named_tree import NamedTree
+
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 SOME_SLOW = [PAGES[0], *(pytest.param(page, marks=pytest.mark.slow) for page in PAGES[1:])]
@@ -40,6 +43,16 @@ def test_the_reference_is_that_of_the_public_names() -> None:
     assert sorted(each.partition("#")[2] for each in described) == sorted(public_names())
     index = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
     assert sorted(re.findall(r"\((reference/\S+#\S+)\)", index)) == sorted(described)
+
+
+@pytest.mark.parametrize("kind", [Robot, SpatialRobot])
+def test_the_reference_shows_what_all_robots_have(kind: type[NamedTree]) -> None:
+    """Members that are inherited appear where the page lists them."""
+    page = (ROOT / "docs" / "reference" / "robots.md").read_text(encoding="utf-8")
+    block = rf"^::: heelstrike\.{kind.__name__}\n +options:\n +inherited_members: \[(.*)\]$"
+    listed = re.findall(block, page, re.MULTILINE)[0].split(", ")
+    shared = {name for name in vars(NamedTree) if not name.startswith("_")}
+    assert sorted(listed) == sorted(shared - set(vars(kind)))
 
 
 def test_links_to_names_lead_to_what_is_described() -> None:

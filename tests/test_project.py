@@ -123,6 +123,31 @@ def test_importing_heelstrike_loads_nothing_heavy() -> None:
     assert HEAVY.isdisjoint(loaded)
 
 
+def test_programs_beside_the_package_import_what_there_is() -> None:
+    """Most need other engines, or minutes, so that no test runs them."""
+    lost = []
+    for source in sorted([*(ROOT / "benchmarks").rglob("*.py"), *(ROOT / "docs").rglob("*.py")]):
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("heelstrike"):
+                lost += [
+                    f"{source.relative_to(ROOT)}: {node.module}.{each.name}"
+                    for each in node.names
+                    if not there(f"{node.module}.{each.name}")
+                ]
+    assert lost == []
+
+
+def there(name: str) -> bool:
+    """Whether a name, or module, can be imported where the packages that it needs are installed."""
+    try:
+        pkgutil.resolve_name(name)
+    except (ImportError, AttributeError) as error:
+        return (getattr(error, "name", None) or "heelstrike").split(".")[0] != "heelstrike"
+    except heelstrike.HeelstrikeError:  # which says what to install
+        return True
+    return True
+
+
 def test_simulations_begin_without_what_takes_long_to_import() -> None:
     """The stock laws, gaits and the built-in robots among them: at every start."""
     script = (

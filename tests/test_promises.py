@@ -145,7 +145,7 @@ def test_precision_is_that_of_the_page() -> None:
     bullet, dart, drake = (float(sides[name][3]) for name in ("Bullet", "DART", "Drake"))
     assert sides["MuJoCo"][1].startswith("not reached")
     assert min(dart, drake) > bullet
-    assert promise("1 s of walking to 1e-4 rad") == (
+    assert promise("1 s of walking, joints exact to 1e-4 rad") == (
         f"{ours:.0f} ms; Bullet takes {round(bullet, -2):.0f} × as long, DART and Drake longer; "
         "MuJoCo does not reach this precision"
     )

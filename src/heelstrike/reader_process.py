@@ -20,6 +20,7 @@ import struct
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -63,6 +64,7 @@ class ReaderProcess:
 
     def __init__(self, *, python: str | None = None, remembers: bool = False) -> None:
         self._process: subprocess.Popen[bytes] | None = None
+        self._watch: _Watch | None = None
         self._owner = os.getpid()
         self._lock = threading.Lock()
         self._python, self._remembers = python, remembers
@@ -103,6 +105,9 @@ class ReaderProcess:
     def end(self) -> None:
         """End the process; the next order starts another."""
         process, self._process = self._process, None
+        watch, self._watch = self._watch, None
+        if watch is not None:
+            watch.leave()
         if process is not None and self._owner == os.getpid():
             process.kill()
             process.communicate()
@@ -115,18 +120,13 @@ class ReaderProcess:
                 return _function(job)(order)
             except Exception as error:
                 raise ReadingError(str(error), type(error).__name__) from error
-        process = self._process
+        process, watch = self._process, self._watch
         assert process is not None
+        assert watch is not None
         assert process.stdin is not None
         assert process.stdout is not None
-        name, late = job.encode(), threading.Event()
-
-        def stop() -> None:
-            late.set()
-            process.kill()
-
-        timer = threading.Timer(patience, stop)
-        timer.start()
+        name = job.encode()
+        watch.begin(patience)
         try:
             head = _HEAD.pack(patience, memory, len(name), len(order))
             process.stdin.write(head + name + order)
@@ -135,7 +135,7 @@ class ReaderProcess:
             answer = _exactly(process.stdout, length)
         except BaseException as error:  # Ctrl-C, too: what it would answer is not waited for
             self.end()
-            if late.is_set():
+            if watch.late:
                 raise ReadingError(
                     f"has not finished with this file after {patience:.0f} s"
                 ) from None
@@ -143,7 +143,7 @@ class ReaderProcess:
                 raise _GoneError(f"crashes on this file (exit {process.returncode})") from None
             raise
         finally:
-            timer.cancel()
+            watch.end()
         if how == _DONE:
             return answer
         self.end()  # who knows in what state it is
@@ -170,7 +170,58 @@ class ReaderProcess:
             )
         except OSError:
             return False
+        self._watch = _Watch(self._process)
         return True
+
+
+class _Watch:
+    """A thread that ends a process which takes too long.
+
+    It is one for all orders of the process, and is not woken for each: it sleeps until the first
+    one should have been done, and sees then which is being done.
+
+    Parameters
+    ----------
+    process : Popen
+        The process.
+    """
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self.late = False
+        self._process = process
+        self._until = self._wakes = math.inf
+        self._changed = threading.Condition()
+        self._left = False
+        threading.Thread(target=self._stay, daemon=True).start()
+
+    def begin(self, patience: float) -> None:
+        """Watch from now on, for so many seconds."""
+        with self._changed:
+            self._until = time.monotonic() + patience
+            if self._until < self._wakes:
+                self._changed.notify()
+
+    def end(self) -> None:
+        """Watch no more, until the next order."""
+        with self._changed:
+            self._until = math.inf
+
+    def leave(self) -> None:
+        """End the thread."""
+        with self._changed:
+            self._left = True
+            self._changed.notify()
+
+    def _stay(self) -> None:
+        with self._changed:
+            while not self._left:
+                now = time.monotonic()
+                if self._until <= now:
+                    self.late = True
+                    self._process.kill()
+                    return
+                self._wakes = self._until
+                self._changed.wait(None if math.isinf(self._wakes) else self._wakes - now)
 
 
 class _GoneError(ReadingError):

@@ -13,7 +13,13 @@ from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
 from heelstrike.experiments import engine_comparison
-from heelstrike.experiments.engine_comparison import CompassTable, PushTable, SceneTable, search
+from heelstrike.experiments.engine_comparison import (
+    CompassTable,
+    Guards,
+    PushTable,
+    SceneTable,
+    search,
+)
 from heelstrike.experiments.engines import InvalidRunError
 
 
@@ -180,3 +186,91 @@ def test_options_that_would_do_nothing_are_refused(tmp_path: Path) -> None:
     sizes = invoke(tmp_path, "--engines", "mujoco", "--sizes", "abc")
     assert sizes.exit_code == 2
     assert "--sizes" in sizes.output
+
+
+@pytest.fixture
+def whole(monkeypatch: pytest.MonkeyPatch, asked: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """What a whole comparison asks for, one made up call after the other."""
+
+    def told(name: str, answer: Any) -> Any:
+        def call(*_: Any, **options: Any) -> Any:
+            asked.append({"asks": name, **options})
+            return answer
+
+        return call
+
+    tables = {
+        "compare_pushes": PushTable("bravo7", ()),
+        "compare_scenes": SceneTable((), "defaults", 1e-3, ()),
+        "compare_compass": CompassTable(3, "defaults", ()),
+        "guard": Guards(0.0, 1.0, 0.0, 1.0, 0.0, float32=False),
+    }
+    for name, answer in tables.items():
+        monkeypatch.setattr(engine_comparison, name, told(name, answer))
+    return asked
+
+
+def test_one_command_makes_all_of_the_page(tmp_path: Path, whole: list[dict[str, Any]]) -> None:
+    page = tmp_path / "engines.md"
+    result = invoke(
+        tmp_path, "--engines", "mujoco,ode", "--whole", "--processes", "1", "--page", str(page)
+    )
+    assert result.exit_code == 0, result.stderr
+    walks = [call for call in whole if "law" in call]
+    assert [(call["law"], call["steps"], call["control_period"]) for call in walks] == [
+        ("FootstepFeedback", 20, 2e-3), ("ComputedTorque", 20, 2e-3), ("ComputedTorque", 4, 2e-4),
+    ]  # fmt: skip
+    assert min(min(call["step_sizes"]) for call in walks) == 2e-4
+    assert [call["asks"] for call in whole if "asks" in call] == [
+        "compare_pushes", "compare_scenes", "compare_compass", "guard", "guard",
+    ]  # fmt: skip
+    processes = {id(call["processes"]) for call in whole if "processes" in call}
+    assert len(processes) == 1  # engines are started once
+    written = {file.name for file in (tmp_path / "out").iterdir()}
+    assert written == {
+        "engines-FootstepFeedback.json", "pushes-FootstepFeedback.json",
+        "engines-ComputedTorque.json", "engines-ComputedTorque-every-0.2-ms.json", "scenes.json",
+        "engines.png", "whole.json",
+    }  # fmt: skip
+    assert "## 3 steps under ComputedTorque every 0.2 ms" in page.read_text()
+    assert "compare bravo7 --engines mujoco,ode --whole --page" in page.read_text()
+    assert "of processor time" in " ".join(result.stderr.split())
+
+
+def test_finer_steps_come_apart(tmp_path: Path, whole: list[dict[str, Any]]) -> None:
+    result = invoke(tmp_path, "--engines", "all", "--whole", "--processes", "1", "--fine", "--json")
+    assert result.exit_code == 0, result.stderr
+    first, *others = [call for call in whole if "law" in call]
+    assert first["step_sizes"][-2:] == (1e-4, 5e-5)
+    assert first["longest"] == 120.0
+    assert min(min(call["step_sizes"]) for call in others) == 2e-4
+    assert json.loads(result.stdout)["command"].endswith("--engines all --whole --fine")
+
+
+def test_a_quick_whole_comparison_is_short(tmp_path: Path, whole: list[dict[str, Any]]) -> None:
+    result = invoke(tmp_path, "--engines", "all", "--whole", "--processes", "1", "--quick")
+    assert result.exit_code == 0, result.stderr
+    walks = [call for call in whole if "law" in call]
+    assert all((call["steps"], call["step_sizes"]) == (4, (1e-3,)) for call in walks)
+    asks = {call["asks"]: call for call in whole if "asks" in call}
+    assert "compare_pushes" not in asks
+    assert asks["compare_compass"]["steps"] == asks["compare_scenes"]["steps"] == ()
+    assert all("-quick" in file.name for file in (tmp_path / "out").iterdir())
+
+
+def test_a_whole_comparison_refuses_what_it_decides_itself(
+    tmp_path: Path, whole: list[dict[str, Any]]
+) -> None:
+    for options, named in (
+        (["--sizes", "1e-3", "--largest-push"], "--sizes, --largest-push"),
+        (["--controller", "JointPD"], "--controller"),
+        (["--quick", "--fine"], "--fine"),
+        (["--quick", "--page", "page.md"], "--page"),
+    ):
+        result = invoke(tmp_path, "--engines", "all", "--whole", "--processes", "1", *options)
+        assert result.exit_code == 2
+        assert f"{named}: " in " ".join(result.output.split())
+    apart = invoke(tmp_path, "--engines", "all", "--fine")
+    assert apart.exit_code == 2
+    assert "--fine: for the whole comparison only" in " ".join(apart.output.split())
+    assert not whole

@@ -43,7 +43,7 @@ SIMULATORS = [
 RACED = [name for name in SIMULATORS if PACKAGES[name].raced]
 
 
-FLIGHT = {"ode": 1e-3, "siconos": 1e-3, "simbody": 1e-3, "physx": 1e-4}
+FLIGHT = {"ode": 1e-3, "siconos": 1e-3, "simbody": 1e-3, "physx": 1e-4, "newton": 1e-4}
 """How far (m, rad) engines fly from ours that step otherwise, or in single precision: link by link
 where joints hold it together (ODE), by the mean of two velocities (Siconos), in an order of its own
 (Simbody). Half a step of 1 ms over 0.1 s is 5e-4 at 10 m/s² or rad/s²."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from pathlib import Path
@@ -14,7 +15,7 @@ from fresh_python import fresh_python
 from synthetic_runs import box
 
 import heelstrike as hs
-from heelstrike.sim import RunStatus, Scheme
+from heelstrike.sim import RunStatus, Scheme, snapshot
 from heelstrike.sim import simulation as simulation_module
 from heelstrike.sim.record.record import allocate_record
 
@@ -318,8 +319,25 @@ def test_snapshots_of_an_older_layout_are_refused_for_that(tmp_path: Path) -> No
     kept = simulation("time stepping").snapshot()
     identity = np.array(json.dumps({"format": 1, **kept.identity}))
     np.savez(tmp_path / "old.npz", identity=identity, **kept.arrays)
-    with pytest.raises(hs.SimulationError, match="layout 1, this version of heelstrike reads 8"):
+    with pytest.raises(hs.SimulationError, match="layout 1, this version of heelstrike reads 9"):
         hs.load_snapshot(tmp_path / "old.npz")
+
+
+def test_other_names_of_arrays_are_another_layout() -> None:
+    """Files hold arrays by their names: where one is renamed, _FORMAT of sim/snapshot.py is raised.
+
+    Otherwise files that an earlier version wrote are called damaged.
+    """
+    kept = {method: simulation(method, "none").snapshot().arrays for method in METHODS}
+    spatial = hs.load_robot("bravo7", dimension=3)
+    still = hs.Simulation(spatial, state=spatial.reference_state())
+    kept["in space"] = still.snapshot().arrays
+    names = {
+        method: sorted(f"{name} {each.dtype}" for name, each in arrays.items())
+        for method, arrays in kept.items()
+    }
+    digest = hashlib.sha256(json.dumps(names, sort_keys=True).encode()).hexdigest()[:16]
+    assert (snapshot._FORMAT, digest) == (9, "cb76d0e4b52215f6")
 
 
 def test_files_that_are_no_snapshots_are_refused(tmp_path: Path) -> None:

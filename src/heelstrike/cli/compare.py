@@ -32,6 +32,7 @@ from heelstrike.cli.terminal import (
     tell_interruption,
     wrote,
 )
+from heelstrike.cli.whole_comparison import compare_whole
 from heelstrike.errors import SimulationError
 
 USUAL = (
@@ -81,6 +82,9 @@ def compare(
     elif method:
         raise SimulationError("--method: engines have methods of their own. Leave it out")
     case = asked_for(robot, how, walking, steps=steps, restitution=restitution)
+    if others.whole:
+        compare_whole(case, others, walking, out, as_json=as_json)
+        return
     methods = methods_asked(case, method or USUAL, step)
     case = with_gait(case, walking.gait)
     start = beginning(case.robot, case.gait, case.ground, case.law)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,6 +16,7 @@ from heelstrike.errors import SimulationError
 
 if TYPE_CHECKING:
     from heelstrike.experiments.engine_comparison import EngineComparison, SceneTable
+    from heelstrike.experiments.engines.served import EngineProcesses
     from heelstrike.experiments.walk import Beginning, Case
 
 QUICK_STEPS, QUICK_SIZES = 4, (1e-3,)
@@ -75,6 +76,38 @@ class InEngines:
     quick: Annotated[
         bool, typer.Option("--quick", help="For engines: only four steps at 1 ms, and few pushes.")
     ] = False
+    whole: Annotated[
+        bool,
+        typer.Option(
+            "--whole",
+            help="Compare all that the page has: walks under two laws, pushes, scenes, compass "
+            "gait. It goes on where it was interrupted.",
+        ),
+    ] = False
+    fine: Annotated[
+        bool,
+        typer.Option(
+            "--fine",
+            help="With --whole: also steps of 0.1 and 0.05 ms, in walks of at most two minutes.",
+        ),
+    ] = False
+
+    processes: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            max=2,
+            help="With --whole: processes that walk at once, one from the first engine on and one "
+            "from the last.",
+        ),
+    ] = 2
+
+    @property
+    def names(self) -> list[str] | str:
+        """Names of the engines."""
+        assert self.engines is not None
+        names = self.engines.split(",")
+        return "all" if names == ["all"] else names
 
     @property
     def suffix(self) -> str:
@@ -96,6 +129,16 @@ class InEngines:
                 "under a law that is called every 2 ms. Leave out, or leave --search out"
             )
 
+    def refuse_beside_whole(self) -> None:
+        """Refuse options that the whole comparison decides, or that ask for part of it."""
+        if given := self._given("engines", "page", "quick", "whole", "fine", "processes"):
+            raise SimulationError(
+                f"{', '.join(given)}: the whole comparison has its own walks, scenes and pushes. "
+                "Leave out, or leave --whole out"
+            )
+        if self.quick and self.fine:
+            raise SimulationError("--fine: a quick comparison has no fine steps. Leave one out")
+
     def _given(self, *but: str) -> list[str]:
         """Return options that are not as usual, but for some."""
         usual = InEngines()
@@ -113,43 +156,40 @@ def compare_in_engines(
     from heelstrike.experiments.engine_comparison import compare_engines
     from heelstrike.experiments.engine_comparison.comparison import STEP_SIZES
     from heelstrike.view.style import save_figure
-    from heelstrike.whole_file import write_whole
 
     assert asked.engines is not None
     assert start.controller is not None
-    _check(case)
+    check(case)
     assert case.followed is not None
     if asked.search:
         asked.refuse_beside_search()
         _search(case, start, asked, steps, out, as_json=as_json)
         return
-    if asked.quick and asked.page is not None:
-        raise SimulationError(
-            "--page: quick comparisons are left out of pages. Leave out, or leave --quick out"
-        )
+    refuse_a_quick_page(asked)
+    if asked.fine:
+        raise SimulationError("--fine: for the whole comparison only. Add --whole, or use --sizes")
+    if asked.processes != InEngines().processes:
+        raise SimulationError("--processes: for the whole comparison only. Add --whole")
     sizes: tuple[float, ...] = QUICK_SIZES if asked.quick else STEP_SIZES
     if asked.sizes is not None:
         sizes = tuple(numbers_called(asked.sizes, "--sizes"))
-    names = asked.engines.split(",")
     with stage("walking in engines") as show:
         comparison = compare_engines(
             case.robot,
             start.controller,
             case.followed,
-            engines="all" if names == ["all"] else names,
+            engines=asked.names,
             steps=QUICK_STEPS if asked.quick else steps,
             step_sizes=sizes,
             settings=asked.settings.split(","),
             control_period=asked.period,
-            friction=_friction(case),
+            friction=friction_of(case),
             folder=out / "engines",
             films=asked.films,
             progress=show.doing,
         )
-    out.mkdir(parents=True, exist_ok=True)
-    law = _named(start, asked, sizes)
-    text = json.dumps(comparison.to_dict(), indent=2, ensure_ascii=False)
-    wrote(write_whole(out / f"engines-{law}.json", text + "\n"))
+    law = named(start, asked, sizes)
+    text = written(out / f"engines-{law}.json", comparison)
     if as_json:
         typer.echo(text)
     else:
@@ -157,16 +197,35 @@ def compare_in_engines(
     figure = out / f"engines{asked.suffix}.png"
     save_figure(comparison.plot(), figure)
     tell(f"in {out}: engines-{law}.json, {figure.name}")
-    table = _scenes(case, asked, out, as_json=as_json) if asked.scenes else None
+    table = scenes_in_engines(case, asked, out, as_json=as_json) if asked.scenes else None
     if table is not None:
         save_figure(comparison.plot(table), figure)
     if asked.pushes:
-        _pushes(case, start, asked, out, as_json=as_json)
+        pushes_in_engines(case, start, asked, out, as_json=as_json)
     if asked.page is not None:
-        _write_page(comparison, table, out, asked.page)
+        write_page(comparison, table, out, asked.page)
 
 
-def _named(start: Beginning, asked: InEngines, sizes: Sequence[float] = ()) -> str:
+def refuse_a_quick_page(asked: InEngines) -> None:
+    """Refuse a page of a quick comparison."""
+    if asked.quick and asked.page is not None:
+        raise SimulationError(
+            "--page: quick comparisons are left out of pages. Leave out, or leave --quick out"
+        )
+
+
+def written(file: Path, told: Any) -> str:
+    """Write a table as JSON, and return that."""
+    from heelstrike.whole_file import write_whole
+
+    entries = told if isinstance(told, dict) else told.to_dict()
+    text = json.dumps(entries, indent=2, ensure_ascii=False)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    wrote(write_whole(file, text + "\n"))
+    return text
+
+
+def named(start: Beginning, asked: InEngines, sizes: Sequence[float] = ()) -> str:
     """Name of a comparison in files: its law, and what is not as usual.
 
     That is how often the law is called, at which steps (s) of the engines, and whether it is quick.
@@ -181,7 +240,10 @@ def _named(start: Beginning, asked: InEngines, sizes: Sequence[float] = ()) -> s
     return name + asked.suffix
 
 
-def _scenes(case: Case, asked: InEngines, out: Path, *, as_json: bool) -> SceneTable:
+def scenes_in_engines(
+    case: Case, asked: InEngines, out: Path, *, as_json: bool,
+    processes: EngineProcesses | None = None,
+) -> SceneTable:  # fmt: skip
     """Ask engines for scenes whose ends are known, and whether they have the robot at all."""
     from dataclasses import asdict
 
@@ -189,35 +251,36 @@ def _scenes(case: Case, asked: InEngines, out: Path, *, as_json: bool) -> SceneT
     from heelstrike.experiments.engine_comparison.compass_table import STEPS as COMPASS_STEPS
     from heelstrike.experiments.engine_comparison.entries import entries_called
     from heelstrike.experiments.engine_comparison.scene_table import STEPS
+    from heelstrike.experiments.engine_comparison.whole import PATIENCE
     from heelstrike.experiments.engines import InvalidRunError
-    from heelstrike.whole_file import write_whole
+    from heelstrike.experiments.engines.served import EngineProcesses
 
-    assert asked.engines is not None
-    names = asked.engines.split(",")
-    engines: str | list[str] = "all" if names == ["all"] else names
-    landing, walker = ((), QUICK_SIZES) if asked.quick else (STEPS, COMPASS_STEPS)
-    with stage("simulating scenes with closed forms") as show:
-        table = compare_scenes(
-            engines=engines, steps=landing, folder=out / "engines", progress=show.doing
-        )
-    with stage("walking the compass gait down its slope") as show:
-        passive = compare_compass(
-            engines=engines, steps=walker, folder=out / "engines", progress=show.doing
-        )
-    guards: dict[str, dict[str, object]] = {}
-    with stage("asking whether engines have the robot") as show:
-        for name, entry in entries_called(engines).items():
-            show.doing(f"asking whether {entry.title} has the robot", 0.0)
-            try:
-                found = guard(entry, case.robot, entry.given)
-            except InvalidRunError as error:
-                guards[name] = {"reason": str(error)}
-            else:
-                guards[name] = asdict(found) | {"holds": found.holds}
-    told = {**table.to_dict(), "guards": guards, "compass": passive.to_dict()}
-    text = json.dumps(told, indent=2, ensure_ascii=False)
+    engines, own = asked.names, processes or EngineProcesses()
+    landing: tuple[float, ...] = () if asked.quick else STEPS
+    walker: tuple[float, ...] = QUICK_SIZES if asked.quick else COMPASS_STEPS
+    if asked.quick and asked.whole:
+        walker = ()  # it would take longest
+    shared: Any = {"engines": engines, "processes": own, "folder": out / "engines"}
+    try:
+        with stage("simulating scenes with closed forms") as show:
+            table = compare_scenes(steps=landing, patience=PATIENCE, progress=show.doing, **shared)
+        with stage("walking the compass gait down its slope") as show:
+            passive = compare_compass(steps=walker, progress=show.doing, **shared)
+        guards: dict[str, dict[str, object]] = {}
+        with stage("asking whether engines have the robot") as show:
+            for name, entry in entries_called(engines).items():
+                show.doing(f"asking whether {entry.title} has the robot", 0.0)
+                try:
+                    found = guard(entry, case.robot, entry.given, own)
+                except InvalidRunError as error:
+                    guards[name] = {"reason": str(error)}
+                else:
+                    guards[name] = asdict(found) | {"holds": found.holds}
+    finally:
+        if processes is None:
+            own.end()
     name = f"scenes{asked.suffix}.json"
-    wrote(write_whole(out / name, text + "\n"))
+    written(out / name, {**table.to_dict(), "guards": guards, "compass": passive.to_dict()})
     if not as_json:
         output().print(table)
         output().print(passive)
@@ -225,37 +288,37 @@ def _scenes(case: Case, asked: InEngines, out: Path, *, as_json: bool) -> SceneT
     return table
 
 
-def _pushes(case: Case, start: Beginning, asked: InEngines, out: Path, *, as_json: bool) -> None:
+def pushes_in_engines(
+    case: Case, start: Beginning, asked: InEngines, out: Path, *, as_json: bool,
+    processes: EngineProcesses | None = None,
+) -> None:  # fmt: skip
     """Search for the largest push that is stood in engines."""
     from heelstrike.experiments.engine_comparison import compare_pushes
-    from heelstrike.whole_file import write_whole
 
-    assert asked.engines is not None
     assert start.controller is not None
     assert case.followed is not None
-    names = asked.engines.split(",")
     with stage("pushing in engines") as show:
         table = compare_pushes(
             case.robot,
             start.controller,
             case.followed,
-            engines="all" if names == ["all"] else names,
+            engines=asked.names,
             settings=asked.settings.split(","),
-            friction=_friction(case),
+            friction=friction_of(case),
             control_period=asked.period,
             folder=out / "engines",
+            processes=processes,
             progress=show.doing,
             **(QUICK_SEARCH if asked.quick else {}),
         )
-    name = f"pushes-{_named(start, asked)}.json"
-    text = json.dumps(table.to_dict(), indent=2, ensure_ascii=False)
-    wrote(write_whole(out / name, text + "\n"))
+    name = f"pushes-{named(start, asked)}.json"
+    written(out / name, table)
     if not as_json:
         output().print(table)
     tell(f"in {out}: {name}")
 
 
-def _write_page(
+def write_page(
     comparison: EngineComparison, scenes: SceneTable | None, out: Path, page: Path
 ) -> None:
     """Write the page of all that lies in a folder, and its figure beside it."""
@@ -271,7 +334,7 @@ def _write_page(
     tell(f"{page}, {figure}")
 
 
-def _check(case: Case) -> None:
+def check(case: Case) -> None:
     """Refuse what engines are not asked for."""
     ground = case.ground.model()
     level = case.ground.shape is None and not ground.vertices[:, 1].any()
@@ -286,7 +349,8 @@ def _check(case: Case) -> None:
         )
 
 
-def _friction(case: Case) -> float:
+def friction_of(case: Case) -> float:
+    """Coefficient of friction of the ground, where it is lowest."""
     return float(case.ground.model().friction.min())
 
 
@@ -304,20 +368,18 @@ def _search(
     from heelstrike.experiments.engines.packages import peers
     from heelstrike.whole_file import write_whole
 
-    assert asked.engines is not None
     assert case.followed is not None
     assert start.controller is not None
     walk = Walk(
         case.robot, start.controller, case.followed, steps, CONTROL_PERIOD,
-        _friction(case), 60.0,
+        friction_of(case), 60.0,
     )  # fmt: skip
     versions = peers(load=False)
     file = out / "best_settings.json"
     out.mkdir(parents=True, exist_ok=True)
     found = json.loads(file.read_text()) if file.exists() else {}
-    names = asked.engines.split(",")
     told: dict[str, object] = {}
-    for name, entry in entries_called(names).items():
+    for name, entry in entries_called(asked.names).items():
         with stage(f"searching for the best settings of {entry.title}") as show:
             try:
                 best = search.search_settings(
@@ -330,6 +392,7 @@ def _search(
         told[name] = found[name] = asdict(best)
         write_whole(file, json.dumps(found, indent=2) + "\n")
         tell(f"{entry.title}: {dict(best.settings) or 'the defaults'}, {best.error:.2g}")
+    walk.processes.end()
     if as_json:
         typer.echo(json.dumps(told, indent=2, ensure_ascii=False))
     wrote(file)

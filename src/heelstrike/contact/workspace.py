@@ -179,7 +179,7 @@ class Equations(Bundle):
     """Number of equations."""
     unknown: Integers = array("2 nc", of=int)
     """The unknown that each belongs to."""
-    lean: Floats = array("2 nc")
+    friction_ratio: Floats = array("2 nc")
     """Tangential over normal impulse at a slipping contact, else zero."""
     weight: Floats = array("2 nc")
     """Length of the impulse per unit of its unknown."""

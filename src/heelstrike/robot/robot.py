@@ -16,6 +16,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.coordinates import Spread, checked, finite, spread_of
 from heelstrike.robot.model import Integers, Model
+from heelstrike.robot.named_tree import Foot as Foot  # where pickles of 0.1 look for it
 from heelstrike.robot.named_tree import NamedTree
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
@@ -384,9 +385,9 @@ class Robot(NamedTree, ShownInNotebooks):
         """Write the robot to a file: MJCF (``.xml``) holds all of it, URDF and SDF most.
 
         What is read back has the same dynamics, on the same coordinates. URDF (``.urdf``) and SDF
-        (``.sdf``) cannot hold speed-torque lines and torque limits that differ between the two
-        senses; URDF cannot hold springs and armature of joints without a motor either. The zero
-        configuration of either becomes the robot's reference.
+        (``.sdf``) cannot hold speed-torque lines, and keep the larger of two torque limits that
+        differ between the two senses; URDF cannot hold springs and armature of joints without a
+        motor either. The zero configuration of either becomes the robot's reference.
 
         Parameters
         ----------

@@ -20,7 +20,7 @@ from heelstrike.robot.state import State
 from heelstrike.sim.image import Image
 
 _IDENTITY = "identity"
-_FORMAT = 8
+_FORMAT = 9
 
 
 @dataclass(frozen=True, eq=False)

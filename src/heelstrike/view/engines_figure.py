@@ -11,6 +11,8 @@ from matplotlib.lines import Line2D
 from heelstrike.view.style import INK, label_powers, new_figure, styled
 
 MARKS = "osD^v<>Phd*Xp"
+COLORS = 10
+"""Colours there are; an engine beyond them shares one, and its line is dashed."""
 OURS = "heelstrike"
 FAINT = 0.35
 """Opacity of the lines of defaults, where there are better settings."""
@@ -47,6 +49,7 @@ def draw_engines(
     """
     lines = _lines(walks, scenes)
     names = list(dict.fromkeys(name for name, _, _, _ in lines))
+    names.sort(key=lambda name: not name.startswith(OURS))  # ours first, the others as they come
     panels = [panel for panel in PANELS if any(each[1] == panel for each in lines)]
     with styled():
         figure = new_figure(4.2 * len(panels) + 2.4 if len(panels) > 1 else 9.0, 5.5)
@@ -73,7 +76,7 @@ def draw_engines(
         )
         figure.suptitle(
             "a mark a step size; faint: default settings where better ones are known; hollow: it "
-            "falls", x=0.01, ha="left", fontsize=10,
+            "falls; at 10⁻¹²: rounding", x=0.01, ha="left", fontsize=10,
         )  # fmt: skip
     return figure
 
@@ -111,7 +114,7 @@ def _look(name: str, names: Sequence[str]) -> tuple[str, str, Any]:
         return INK, MARKS[own.index(name)], ("-", "--", ":")[own.index(name) % 3]
     others = [each for each in names if not each.startswith(OURS)]
     place = others.index(name)
-    return f"C{place % 10}", MARKS[(place + 3) % len(MARKS)], "-"
+    return f"C{place % COLORS}", MARKS[(place + 3) % len(MARKS)], "-" if place < COLORS else "--"
 
 
 def _draw(

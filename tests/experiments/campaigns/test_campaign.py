@@ -30,6 +30,7 @@ from heelstrike.experiments.campaigns import trials as trials_module
 from heelstrike.experiments.campaigns.store import COLUMNS, DATABASE, Store
 from heelstrike.experiments.campaigns.trials import run_block
 from heelstrike.experiments.campaigns.workers import process_pool
+from heelstrike.robot import Foot
 
 FRICTION = {"ground.friction": stats.uniform(0.2, 0.6), "state.v.root_x": stats.norm(0.0, 0.3)}
 
@@ -101,6 +102,35 @@ def test_a_law_may_follow_a_motion_instead_of_a_gait() -> None:
     assert outcome.status == "completed", outcome.message
     assert campaign.gait(0) is None
     assert campaign.replay(0).summary(gait=campaign.gait(0)).duration_s == pytest.approx(0.1)
+
+
+class Holds:
+    """A controller in Python that holds a robot."""
+
+    def __init__(self, robot: hs.Robot) -> None:
+        self.robot = robot
+
+    def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+        return np.zeros(self.robot.nu)
+
+
+def digest_with(robot: hs.Robot) -> str:
+    trial = replace(cases.limp(), controller=Holds(robot))
+    return trials_module.inputs_digest(trial, 1.0)
+
+
+def test_where_classes_of_robots_are_defined_is_no_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder goes on after they have moved; names, feet and numbers of a robot do count."""
+    robot = walking.bravo7()
+    first = digest_with(robot)
+    mass = robot.model.mass.copy()
+    mass *= 1.0 + 1e-12
+    heavier = replace(robot, model=robot.model.replaced(mass=mass))
+    toes = replace(robot, feet=robot.feet[::-1])
+    renamed = replace(robot, name="other")
+    assert len({first, *map(digest_with, (heavier, toes, renamed))}) == 4
+    monkeypatch.setattr(Foot, "__module__", "heelstrike.robot.robot")
+    assert digest_with(robot) == first
 
 
 def test_what_a_trial_cannot_begin_with_is_its_result() -> None:

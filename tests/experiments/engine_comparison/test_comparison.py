@@ -312,6 +312,37 @@ def test_an_engine_that_dies_while_a_kept_fall_is_filmed_keeps_its_row(
     assert "no film of MuJoCo, defaults: its process was ended by SIGKILL" in said
 
 
+def test_walks_that_would_take_too_long_say_so_and_kept_ones_are_told(
+    bravo7: hs.Robot, gait: hs.Gait, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A step of 30 µs: 770 steps of 1 ms in one walking step take 23 ms, of 0.1 ms 0.23 s."""
+    walked: list[float] = []
+
+    def in_engine(self: object, entry: Entry, step: float, *_: object) -> WalkFigures:
+        walked.append(step)
+        return WALK
+
+    monkeypatch.setattr(module, "peers", lambda load: dict.fromkeys(PACKAGES, "1.0"))
+    monkeypatch.setattr(module, "TRUTH", hs.TimeStepping(step=1e-3))
+    monkeypatch.setattr(module.Walk, "in_engine", in_engine)
+
+    def compare(sizes: list[float], longest: float | None) -> EngineComparison:
+        return hs.compare_engines(
+            bravo7, hs.ComputedTorque(bravo7, gait), gait, engines=["mujoco"], steps=1,
+            step_sizes=sizes, settings=["defaults"], folder=tmp_path, longest=longest,
+        )  # fmt: skip
+
+    *_, finest = compare([1e-3, 1e-4], 0.1).rows
+    assert walked == [1e-3]
+    assert finest.figures is None
+    assert finest.reason.startswith("not walked: its 1 steps at 0.1 ms would take about")
+    *_, finest = compare([1e-3, 1e-4], None).rows
+    assert walked == [1e-3, 1e-4]
+    *_, finest = compare([1e-3, 1e-4], 0.1).rows
+    assert finest.figures is not None
+    assert walked == [1e-3, 1e-4]
+
+
 def test_names_of_engines_are_checked(bravo7: hs.Robot, gait: hs.Gait) -> None:
     with pytest.raises(SimulationError, match=r"no engine 'mujocco'\. Did you mean 'mujoco'"):
         hs.compare_engines(bravo7, hs.ComputedTorque(bravo7, gait), gait, engines=["mujocco"])

@@ -30,6 +30,7 @@ from heelstrike.experiments.engine_comparison.compass import (
     our_cycle,
 )
 from heelstrike.experiments.engine_comparison.entries import ENTRIES
+from heelstrike.experiments.engines.packages import PACKAGES
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.robot import State
 from heelstrike.sim import EventDriven, TimeStepping
@@ -134,7 +135,7 @@ def test_the_table_says_who_walks_and_why_others_do_not(
 ) -> None:
     asked: list[str] = []
 
-    def in_engine(entry: Any, step: float, given: Any, start: Any) -> dict[str, Any]:
+    def in_engine(entry: Any, *_: Any) -> dict[str, Any]:
         asked.append(entry.title)
         if entry.title == "Bullet":
             raise InvalidRunError("its process was ended by SIGABRT")
@@ -155,6 +156,21 @@ def test_the_table_says_who_walks_and_why_others_do_not(
     told = console.file.getvalue()  # type: ignore[attr-defined]
     for words in ("0.734346391", "−0.199726 ± 0.544476i, 0.131573", "SIGABRT", "ODE is not inst"):
         assert words in told
+
+
+def test_an_engine_that_falls_at_its_defaults_is_tried_at_its_best(
+    monkeypatch: pytest.MonkeyPatch, cycle: tuple[CompassWalk, State]
+) -> None:
+    def in_engine(entry: Any, step: float, given: Any, *_: Any) -> dict[str, Any]:
+        walks = entry.title == "MuJoCo" or "elasticity" in given
+        return compass_table._told(replace(cycle[0], ending="" if walks else "it falls"))
+
+    monkeypatch.setattr(compass_table, "peers", lambda load: dict.fromkeys(PACKAGES, "1.0"))
+    monkeypatch.setattr(compass_table, "_in_engine", in_engine)
+    table = compare_compass(engines=["mujoco", "simbody", "ode"], steps=[1e-3])
+    assert [row.title for row in table.rows[2:]] == ["MuJoCo", "Simbody", "Simbody, best", "ODE"]
+    assert table.rows[-2].walk is not None
+    assert table.rows[-2].walk["ending"] == ""
 
 
 def test_mujoco_takes_steps(cycle: tuple[CompassWalk, State]) -> None:

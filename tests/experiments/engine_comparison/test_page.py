@@ -12,7 +12,12 @@ from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.compass_table import STEPS
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
-from heelstrike.experiments.engine_comparison.page import _compass, _pushes, engines_page
+from heelstrike.experiments.engine_comparison.page import (
+    _compass,
+    _pushes,
+    _taken,
+    engines_page,
+)
 
 BELOW, BALL = "cube below the angle of friction", "ball bouncing, e = 0.9"
 DULL, OURS = "takes no coefficient of restitution", "heelstrike, event-driven"
@@ -142,6 +147,20 @@ def test_it_says_which_rows_of_the_compass_gait_were_not_run(page: str) -> None:
     absent = {"title": "engine", "walk": None, "reason": "it is not there"}
     rows = [{"engine": name, "step_s": step} | absent for name in ENTRIES for step in STEPS]
     assert "Missing" not in _compass({"strides": 25, "settings": "defaults", "rows": rows})
+
+
+def test_it_says_what_made_it_and_how_long_that_took(tmp_path: Path) -> None:
+    file = tmp_path / "whole.json"
+    assert _taken(file) == ""
+    day, other = "2026-11-27", "2026-11-28"
+    sittings = [{"date": day, "wall_s": 1200.0, "processor_s": 900.0},
+                {"date": other, "wall_s": 60.0, "processor_s": 30.0}]  # fmt: skip
+    told = {"command": "heelstrike compare", "processors": 2, "sittings": sittings}
+    file.write_text(json.dumps(told))
+    said = _taken(file)
+    assert f"`heelstrike compare --page docs/engines.md` made all of it on {day} and" in said
+    assert "took 21 minutes on 2 processors" in said
+    assert "16 minutes of processor time" in said  # 15.5 to the even one
 
 
 def test_it_says_where_licences_were_read(page: str) -> None:

@@ -59,12 +59,12 @@ def assemble(
 ) -> None:
     """Write the equations of some modes.
 
-    At a slipping contact the tangential impulse leans on the normal one and has no equation.
+    At a slipping contact the tangential impulse follows from the normal one and has no equation.
     """
     delassus, friction = problem.delassus, problem.friction
     tangent, source, scale = reduced.tangent, reduced.source, reduced.scale
     equation, tableau = equations.unknown, equations.tableau
-    lean, weight = equations.lean, equations.weight
+    ratio, weight = equations.friction_ratio, equations.weight
     size = 0
     for contact in range(problem.count):
         if mode[contact] == OPEN:
@@ -72,19 +72,19 @@ def assemble(
         first = reduced.normal[contact]
         equation[size] = first
         weight[size] = scale[first]
-        lean[size] = slope[contact]
+        ratio[size] = slope[contact]
         if tangent[contact] >= 0:
             if mode[contact] == STICK:
                 size += 1
                 equation[size] = first + 1
                 weight[size] = scale[first + 1]
-                lean[size] = 0.0
+                ratio[size] = 0.0
             else:
-                lean[size] = friction[contact]
+                ratio[size] = friction[contact]
                 if mode[contact] == SLIP_FORWARD:
-                    lean[size] = -friction[contact]
-        if lean[size] != 0.0:
-            weight[size] *= math.sqrt(1.0 + lean[size] * lean[size])
+                    ratio[size] = -friction[contact]
+        if ratio[size] != 0.0:
+            weight[size] *= math.sqrt(1.0 + ratio[size] * ratio[size])
         size += 1
     for i in range(size):
         row = source[equation[i]]
@@ -93,8 +93,8 @@ def assemble(
         for j in range(size):
             column = source[equation[j]]
             entry = delassus[row, column]
-            if lean[j] != 0.0:
-                entry += lean[j] * delassus[row, column + 1]
+            if ratio[j] != 0.0:
+                entry += ratio[j] * delassus[row, column + 1]
             tableau[i, j + 1] = row_scale * entry * scale[equation[j]]
     equations.size = size
 
@@ -123,12 +123,12 @@ def expand(
             across = point[place]
             place += 1
         else:
-            lean = slope[contact]
+            ratio = slope[contact]
             if tangent[contact] >= 0:
                 limit = problem.friction[contact]
-                lean = -limit if mode[contact] == SLIP_FORWARD else limit
-            along /= math.sqrt(1.0 + lean * lean)
-            across = lean * along
+                ratio = -limit if mode[contact] == SLIP_FORWARD else limit
+            along /= math.sqrt(1.0 + ratio * ratio)
+            across = ratio * along
         impulse[row], across = projected(problem, contact, along, across)
         if has_tangent:
             impulse[row + 1] = across
@@ -150,7 +150,7 @@ def evaluate(
     assemble(problem, trial.mode, scaling.slope, reduced, equations)
     symmetric = settings.skewed == 0
     for j in range(equations.size):
-        symmetric = symmetric and equations.lean[j] == 0.0
+        symmetric = symmetric and equations.friction_ratio[j] == 0.0
     singular = (
         eliminate(
             equations.size, symmetric, equations.tableau, equations.pivot_row, equations.taken

@@ -62,13 +62,13 @@ def solve_block(contact: int, reduced: ReducedProblem, iterate: Floats) -> int:
             iterate[second] = friction
             return STICK
     for name in range(SLIP_FORWARD, SLIP_BACKWARD + 1):
-        lean = -cone if name == SLIP_FORWARD else cone
-        effective = inertia + lean * coupling
+        ratio = -cone if name == SLIP_FORWARD else cone
+        effective = inertia + ratio * coupling
         if effective > 0.0:
             force = -rest / effective
-            if lean * (slip + (coupling + lean * across) * force) <= 0.0:
+            if ratio * (slip + (coupling + ratio * across) * force) <= 0.0:
                 iterate[first] = force
-                iterate[second] = lean * force
+                iterate[second] = ratio * force
                 return name
     iterate[first] = -rest / inertia if inertia > 0.0 else 0.0
     return STICK

@@ -62,7 +62,7 @@ def keep_velocity(
     it. Elimination on the velocities that the directions cause leaves the combinations without.
     """
     rows, size, delassus = problem.first[problem.count], equations.size, problem.delassus
-    equation, lean, weight = equations.unknown, equations.lean, equations.weight
+    equation, ratio, weight = equations.unknown, equations.friction_ratio, equations.weight
     basis, image, kind = equations.basis, equations.image, equations.moves
     for k in range(found):
         largest = 0.0
@@ -76,8 +76,8 @@ def keep_velocity(
             for i in range(rows):
                 diagonal = delassus[i, i]
                 entry = along * delassus[i, column]
-                if lean[j] != 0.0:
-                    entry += along * lean[j] * delassus[i, column + 1]
+                if ratio[j] != 0.0:
+                    entry += along * ratio[j] * delassus[i, column + 1]
                 image[k, i] += entry / math.sqrt(diagonal) if diagonal > 0.0 else entry
         for other in range(k):
             if kind[other] == 1:

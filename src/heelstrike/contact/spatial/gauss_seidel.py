@@ -123,12 +123,12 @@ def solve_planar_point(matrix: Floats, row: int, friction: float, q: Triple) -> 
         if abs(s) <= friction * n:
             return n, s, 0.0
     for side in range(-1, 2, 2):
-        lean = friction * side
-        weight = a + lean * b
+        ratio = friction * side
+        weight = a + ratio * b
         if weight > 0.0:
             n = -q[0] / weight
-            if side * (q[1] + (b + lean * d) * n) <= 0.0:
-                return n, lean * n, 0.0
+            if side * (q[1] + (b + ratio * d) * n) <= 0.0:
+                return n, ratio * n, 0.0
     return (-q[0] / a if a > 0.0 else 0.0), 0.0, 0.0
 
 

@@ -163,11 +163,14 @@ class Evaluation(AnyEvaluation):
 
 def evaluation_of(robot: Any) -> type[AnyEvaluation]:
     """Return what evaluates a robot; space is loaded with the first of its robots."""
-    if isinstance(robot, SpatialRobot):
-        from heelstrike.dynamics.spatial.queries.evaluation import SpatialEvaluation
+    return evaluation_in_space() if isinstance(robot, SpatialRobot) else Evaluation
 
-        return SpatialEvaluation
-    return Evaluation
+
+def evaluation_in_space() -> type[AnyEvaluation]:
+    """Return what evaluates robots in space."""
+    from heelstrike.dynamics.spatial.queries.evaluation import SpatialEvaluation
+
+    return SpatialEvaluation
 
 
 def new_workspace(model: Any, kind: type[Bundle] = Workspace) -> Any:

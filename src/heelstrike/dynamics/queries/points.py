@@ -21,19 +21,19 @@ UP = np.array([0.0, 1.0])
 """Normal of level ground."""
 
 
-@of_position("(2,) float: World position (x, z), in m.")
+@of_position("(2,) float: World position (x, z), in m; (3,) in space.")
 def point_position(at: Evaluation, link: int | str, local: ArrayLike) -> Floats:
     """Where a point of a link is."""
     return at.point(link, local)[1]
 
 
-@of_state("(3,) float: Along x and z in m/s, and about +y in rad/s.")
+@of_state("(3,) float: Along x and z in m/s, and about +y in rad/s; (6,) in space.")
 def point_velocity(at: Evaluation, link: int | str, local: ArrayLike) -> Floats:
     """Velocity of a point and angular velocity of its link."""
     return at.filled((3,), kernels.point_velocity, at.work, *at.point(link, local))
 
 
-@of_position("(3, nv) float: Rows x, z and rotation about +y, in m and 1.")
+@of_position("(3, nv) float: Rows x, z and rotation about +y, in m and 1; (6, nv) in space.")
 def point_jacobian(at: Evaluation, link: int | str, local: ArrayLike) -> Floats:
     """Jacobian of a point of a link and of the link's rotation.
 
@@ -43,20 +43,22 @@ def point_jacobian(at: Evaluation, link: int | str, local: ArrayLike) -> Floats:
     return at.jacobian(*at.point(link, local))
 
 
-@of_state("(3,) float: Along x and z in m/s², and about +y in rad/s².")
+@of_state("(3,) float: Along x and z in m/s², and about +y in rad/s²; (6,) in space.")
 def point_bias_acceleration(at: Evaluation, link: int | str, local: ArrayLike) -> Floats:
     """J̇v of :func:`point_jacobian`: the acceleration at v̇ = 0."""
     return at.bias_acceleration(*at.point(link, local))
 
 
-@of_position("(k, 2) float: World positions (x, z), in m.")
+@of_position("(k, 2) float: World positions (x, z), in m; (k, 3) in space.")
 def contact_positions(at: Evaluation, contacts: Iterable[int | str] | None = None) -> Floats:
     """Where the centres of the contact discs are."""
     centers = [center for _, _, center in at.contact_centers(contacts)]
     return np.array(centers).reshape(-1, at.model.axes)
 
 
-@of_position("(k, 2, nv) float: Rows normal (up) and tangent (forward), in m and 1.")
+@of_position(
+    "(k, 2, nv) float: Rows normal (up) and tangent (forward), in m and 1; (k, 3, nv) in space."
+)
 def contact_jacobian(at: Evaluation, contacts: Iterable[int | str] | None = None) -> Floats:
     """Jacobian of the contact points on level ground: of the lowest point of each contact disc."""
     found = at.contact_centers(contacts)
@@ -67,7 +69,7 @@ def contact_jacobian(at: Evaluation, contacts: Iterable[int | str] | None = None
     return result
 
 
-@of_state("(k, 2) float: Normal (up) and tangential (forward), in m/s².")
+@of_state("(k, 2) float: Normal (up) and tangential (forward), in m/s²; (k, 3) in space.")
 def contact_bias_acceleration(
     at: Evaluation, contacts: Iterable[int | str] | None = None
 ) -> Floats:

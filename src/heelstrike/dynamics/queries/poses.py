@@ -23,7 +23,7 @@ class LinkPoses:
     """(nl, 2) Position (x, z) of each link's centre of mass, in metres."""
 
 
-@of_position("LinkPoses: In m and rad.")
+@of_position("LinkPoses: In m and rad; SpatialPoses in space.")
 def link_poses(at: Evaluation) -> LinkPoses:
     """Poses of all links in the world."""
     work = at.work
@@ -45,7 +45,7 @@ class LinkVelocities:
     """(nl, 2) Velocity (x, z) of each link's centre of mass, in m/s."""
 
 
-@of_state("LinkVelocities: In m/s and rad/s.")
+@of_state("LinkVelocities: In m/s and rad/s; SpatialVelocities in space.")
 def link_velocities(at: Evaluation) -> LinkVelocities:
     """Velocities of all links in the world."""
     poses = link_poses.at(at)

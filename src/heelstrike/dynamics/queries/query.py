@@ -4,7 +4,8 @@ A query is a function of an :class:`~heelstrike.dynamics.queries.evaluation.AnyE
 decorators here make the function of (robot, q, …) of it that people call, with its documentation.
 What its first argument is annotated with says of which robots it is asked: of all, or of those of
 the plane or of space alone. A query that is another in space gets a second function there, by
-``in_space``; as :func:`functools.singledispatch` does, the class of the evaluation chooses. Its
+``in_space``; as :func:`functools.singledispatch` does, the class of the evaluation chooses.
+:func:`of_space` makes of a query the one of robots in space alone, described as it is there. Its
 ``at`` is that choice, which :mod:`heelstrike.dynamics.queries.symbolic` and
 :mod:`heelstrike.dynamics.queries.casadi_functions` ask over symbols.
 """
@@ -18,7 +19,12 @@ from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
 from numpy.typing import ArrayLike
 
-from heelstrike.dynamics.queries.evaluation import AnyEvaluation, evaluation_of
+from heelstrike.arguments import refusal
+from heelstrike.dynamics.queries.evaluation import (
+    AnyEvaluation,
+    evaluation_in_space,
+    evaluation_of,
+)
 from heelstrike.errors import RobotError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.spatial.robot import SpatialRobot
@@ -28,6 +34,7 @@ Q = ParamSpec("Q")
 Result = TypeVar("Result", covariant=True)
 Other = TypeVar("Other")
 At = TypeVar("At", bound=AnyEvaluation)
+Asked = TypeVar("Asked", bound="Query[..., Any]")
 
 VECTORS = {
     "q": "nq", "v": "nv", "end": "nq", "acceleration": "nv", "force": "nv", "torque": "nu",
@@ -70,8 +77,10 @@ class OfPosition(Query[P, Result], Protocol[P, Result]):
     ) -> Result:
         """Answer it."""
 
-    def in_space(self, body: Callable[Concatenate[At, Q], Other]) -> OfPosition[Q, Other]:
-        """Give it another function in space; return the query as it is there."""
+    def in_space(
+        self, returns: str
+    ) -> Callable[[Callable[Concatenate[At, Q], Other]], OfPosition[Q, Other]]:
+        """Give it another function in space, and its answer; return it :func:`of_space`."""
 
 
 class OfState(Query[P, Result], Protocol[P, Result]):
@@ -87,8 +96,10 @@ class OfState(Query[P, Result], Protocol[P, Result]):
     ) -> Result:
         """Answer it."""
 
-    def in_space(self, body: Callable[Concatenate[At, Q], Other]) -> OfState[Q, Other]:
-        """Give it another function in space; return the query as it is there."""
+    def in_space(
+        self, returns: str
+    ) -> Callable[[Callable[Concatenate[At, Q], Other]], OfState[Q, Other]]:
+        """Give it another function in space, and its answer; return it :func:`of_space`."""
 
 
 def of_position(
@@ -133,6 +144,37 @@ def of_state(
     return query
 
 
+def of_space(query: Asked, returns: str | None = None) -> Asked:
+    """Make of a query the one of robots in space alone, with the text of its function there.
+
+    Parameters
+    ----------
+    query : query
+        The query, of all robots.
+    returns : str, optional
+        Shape, unit and frame of the answer in space, if they are others.
+
+    Returns
+    -------
+    query
+        It refuses other robots.
+    """
+    known: Any = query
+
+    def answer(robot: SpatialRobot, *others: Any, **named: Any) -> Any:
+        if not isinstance(robot, SpatialRobot):
+            raise RobotError(refusal("robot", robot, (SpatialRobot.__name__,)))
+        return known(robot, *others, **named)
+
+    update_wrapper(answer, known)
+    own: Any = answer  # `at` and the signature came along
+    own.returns = returns or query.returns
+    in_space = inspect.getdoc(known.at.dispatch(evaluation_in_space())) or ""
+    own.__doc__ = _docstring(in_space, known.__signature__.parameters, own.returns)
+    result: Asked = own
+    return result
+
+
 def _asked(body: Callable[..., Any]) -> Any:
     """Return what chooses a function by the class of the evaluation, to begin with this one."""
 
@@ -151,9 +193,12 @@ def _asked(body: Callable[..., Any]) -> Any:
 def _described(answer: Any, ask: Any, returns: str) -> Any:
     """Give an answer the name, signature and documentation of its question."""
 
-    def in_space(body: Callable[..., Any]) -> Any:
-        ask.register(body)
-        return answer
+    def in_space(returns: str) -> Callable[[Callable[..., Any]], Any]:
+        def query(body: Callable[..., Any]) -> Any:
+            ask.register(body)
+            return of_space(answer, returns)
+
+        return query
 
     first, own = inspect.signature(answer), inspect.signature(ask)
     names = [one for one in first.parameters.values() if one.kind == one.POSITIONAL_OR_KEYWORD]
@@ -162,9 +207,13 @@ def _described(answer: Any, ask: Any, returns: str) -> Any:
     update_wrapper(answer, ask)
     answer.__signature__, answer.at, answer.returns = signature, ask, returns
     answer.in_space = in_space
-    shape, _, meaning = returns.partition(": ")
-    answer.__doc__ = docstring(summary, signature.parameters, shape, meaning)
+    answer.__doc__ = _docstring(summary, signature.parameters, returns)
     return answer
+
+
+def _docstring(summary: str, names: Iterable[str], returns: str) -> str:
+    shape, _, meaning = returns.partition(": ")
+    return docstring(summary, names, shape, meaning)
 
 
 def docstring(summary: str, names: Iterable[str], returned: str, meaning: str) -> str:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import math
 import pickle
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from time import thread_time
 from typing import Any
@@ -19,11 +20,15 @@ from heelstrike.errors import HeelstrikeError, SimulationError
 from heelstrike.experiments.campaigns.outcome import CRASHED, REFUSED, Outcome, judged
 from heelstrike.experiments.campaigns.targets import TRIAL, Laid, laid, target
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.named_tree import NamedTree
 from heelstrike.sim.batch.runs import simulate_batch
 from heelstrike.sim.closed_sets import OnError
 from heelstrike.sim.controller.law import Law, law_of
 from heelstrike.sim.run import Run
 from heelstrike.sim.simulation import simulate
+
+_PROTOCOL = 4
+"""Of pickles in digests: versions of Python choose others, whose bytes differ."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,16 +175,16 @@ def _same(several: list[Any]) -> Any:
 def inputs_digest(trial: Trial, duration: float) -> str:
     """Digest of all that the runs of a trial follow from, but for what differs among them.
 
-    Of a controller in Python its class counts, and what its attributes are, pickled.
+    Of a controller in Python its class counts, and what its attributes are, pickled; of robots in
+    them, as of that of the trial, names and numbers.
     """
     from heelstrike import __version__
 
     digest = hashlib.sha256(__version__.encode())
     robot, law = trial.robot, trial.controller
-    names = robot.link_names, robot.joint_names, robot.actuator_names, robot.contact_names
     control = type(law).__module__, type(law).__qualname__, getattr(law, "period", None)
     digest.update(
-        repr((robot.name, names, robot.constraints, control, trial.method, duration,
+        repr((*_named(robot), control, trial.method, duration,
               trial.control_period, trial.begins, trial.edge, trial.speed,
               trial.settling)).encode()
     )  # fmt: skip
@@ -192,10 +197,31 @@ def inputs_digest(trial: Trial, duration: float) -> str:
         digest.update(_attributes_of(law))
     arrays = [*trial.ground.numbers().items(), ("q", trial.state.q), ("v", trial.state.v)]
     arrays += [each for bundle in bundles for each in bundle.storage()]
+    _add(digest, arrays)
+    return digest.hexdigest()
+
+
+def _named(robot: NamedTree) -> tuple[Any, ...]:
+    names = robot.link_names, robot.joint_names, robot.actuator_names, robot.contact_names
+    return robot.name, names, getattr(robot, "constraints", ())
+
+
+def _add(digest: Any, arrays: Iterable[tuple[str, Any]]) -> None:
     for name, array in arrays:
         digest.update(f"{name} {array.dtype} {array.shape};".encode())
         digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()
+
+
+class _Digesting(pickle.Pickler):
+    """Pickles a robot as its names and numbers, wherever its classes are."""
+
+    def persistent_id(self, held: Any) -> str | None:
+        if not isinstance(held, NamedTree):
+            return None
+        feet = [(foot.name, foot.link, foot.contacts) for foot in held.feet]
+        digest = hashlib.sha256(repr((*_named(held), feet)).encode())
+        _add(digest, held.model.storage())
+        return digest.hexdigest()
 
 
 def _code_of(function: Any) -> bytes:
@@ -213,16 +239,16 @@ def _code_of(function: Any) -> bytes:
 
 def _attributes_of(law: Any) -> bytes:
     """What a controller in Python holds, as bytes that differ where it does."""
-    torque = getattr(type(law), "torque", None)
+    torque, held = getattr(type(law), "torque", None), io.BytesIO()
     try:
-        held = pickle.dumps(getattr(law, "__dict__", None))
+        _Digesting(held, _PROTOCOL).dump(getattr(law, "__dict__", None))
     except Exception:
         raise SimulationError(
             f"controller {type(law).__name__} cannot be told from others of its class, since it "
             "cannot be pickled; a campaign would take outcomes of one for those of another. Give "
             "it attributes that pickle takes, or write it with @hs.controller"
         ) from None
-    return _code_of(torque) + held
+    return _code_of(torque) + held.getvalue()
 
 
 def trial_digest(base: str, values: Mapping[str, Any], seed: int) -> bytes:

@@ -27,6 +27,7 @@ from heelstrike.experiments.engine_comparison.tables import walk_table
 from heelstrike.experiments.engine_comparison.walk import TRUTH, Walk
 from heelstrike.experiments.engines.packages import peers
 from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.experiments.engines.served import EngineProcesses
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot
@@ -128,6 +129,8 @@ def compare_engines(
     patience: float = 60.0,
     folder: Path | str | None = None,
     films: bool = False,
+    longest: float | None = None,
+    processes: EngineProcesses | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> EngineComparison:
     """Walk a gait under a controller in other engines, and say what each gets right.
@@ -163,6 +166,13 @@ def compare_engines(
         controller and program, is not walked again.
     films : bool
         Whether to write a film (.mp4) of each walk that falls into the folder.
+    longest : float, optional
+        Seconds that the steps of an engine may take in a walk. Of a walk that would take longer, as
+        the same walk at a longer step foretells, the row says so; one that is kept is told. By
+        default there is no limit.
+    processes : EngineProcesses, optional
+        Where engines have been asked before; they are not ended. By default the comparison has its
+        own.
     progress : callable, optional
         Called before each walk with a text, and the share of walks that is done.
 
@@ -179,7 +189,8 @@ def compare_engines(
     entries = entries_called(engines)
     if steps < 1:
         raise SimulationError(f"a walk has at least one step, got {steps}")
-    walk = Walk(robot, controller, gait, steps, control_period, friction, patience)
+    own = processes or EngineProcesses()
+    walk = Walk(robot, controller, gait, steps, control_period, friction, patience, own)
     say = progress or (lambda text, share: None)  # noqa: ARG005
     say("the truth, event by event", 0.0)
     truth = walk.ours(TRUTH)
@@ -191,7 +202,7 @@ def compare_engines(
             if which == BEST and not best_settings().get(name, {}).get("settings"):
                 continue  # none is better than the defaults
             asked += [(name, entry.title, which, step) for step in step_sizes]
-    rows = []
+    rows: list[EngineRow] = []
     try:
         for k, (name, title, which, step) in enumerate(asked):
             say(f"{title}, {which}, {1e3 * step:g} ms", k / len(asked))
@@ -209,6 +220,9 @@ def compare_engines(
             told = asked_of_engine(entry.package, given, versions)
             film = Path(folder) / f"{name}-{which}-{step:g}.mp4" if films and folder else None
             make = partial(walk.in_engine, entry, step, given, truth, versions, film)
+            taken = _foretold(rows, row, walk.scenario.duration)
+            if longest is not None and taken > longest:
+                make = partial(_refuse, row, steps, taken, longest)
             found = kept.row(row, told, make)
             fell = found.figures is not None and not found.figures.walks
             if fell and film is not None and not film.exists():
@@ -218,7 +232,8 @@ def compare_engines(
                     say(f"no film of {title}, {which}: {error}", k / len(asked))
             rows.append(found)
     finally:
-        walk.close()
+        if processes is None:
+            own.end()
     return EngineComparison(
         robot=robot.name,
         steps=steps,
@@ -227,4 +242,20 @@ def compare_engines(
         versions={e.package: versions[e.package] for e in entries.values()},
         rows=tuple(rows),
         absent=ABSENT if engines == "all" else {},
+    )
+
+
+def _foretold(rows: Sequence[EngineRow], row: EngineRow, duration: float) -> float:
+    """Seconds that the steps of a walk (s) will take, as the row before it has them; 0 if none."""
+    before = rows[-1] if rows else row
+    same = (before.engine, before.settings) == (row.engine, row.settings)
+    if not same or before.figures is None or before.step_s <= row.step_s:
+        return 0.0
+    return 1e-6 * before.figures.step_us * duration / row.step_s
+
+
+def _refuse(row: EngineRow, steps: int, taken: float, longest: float) -> WalkFigures:
+    raise InvalidRunError(
+        f"not walked: its {steps} steps at {1e3 * row.step_s:g} ms would take about "
+        f"{taken / 60.0:.1f} min, longer than {longest / 60.0:g} min"
     )

@@ -26,7 +26,7 @@ from heelstrike.experiments.engine_comparison.entries import Entry
 from heelstrike.experiments.engine_comparison.scenes import leaning
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.scenario import Scenario
-from heelstrike.experiments.engines.served import engine_process, served
+from heelstrike.experiments.engines.served import EngineProcesses, served
 from heelstrike.experiments.passive import passive_walk
 from heelstrike.field_texts import dataclass
 from heelstrike.robot import Robot, RobotBuilder, State, load_robot
@@ -108,6 +108,8 @@ class InEngine:
         Seconds.
     given : mapping
         Its settings.
+    processes : EngineProcesses, optional
+        Where engines have been asked before; they are not ended.
 
     Raises
     ------
@@ -115,19 +117,21 @@ class InEngine:
         If the engine is missing, ends, hangs or refuses.
     """
 
-    def __init__(self, entry: Entry, step: float, given: Mapping[str, Any]) -> None:
+    def __init__(
+        self, entry: Entry, step: float, given: Mapping[str, Any],
+        processes: EngineProcesses | None = None,
+    ) -> None:  # fmt: skip
         self.step = step
-        self._processes = [engine_process(entry.package) for _ in range(2)]
+        asked = processes or EngineProcesses()
+        self._owned = asked if processes is None else None
         try:
             self._peers = [
                 served(
                     entry.package,
                     Scenario("compass", robot, robot.reference_state(), step, friction=FRICTION),
-                    step, process=process, **given,
+                    step, process=asked.of(entry.package, both), **given,
                 )
-                for robot, process in zip(
-                    (compass(both=False), compass(both=True)), self._processes, strict=True
-                )
+                for both, robot in enumerate((compass(both=False), compass(both=True)))
             ]  # fmt: skip
         except InvalidRunError:
             self.close()
@@ -144,9 +148,9 @@ class InEngine:
         return self._peer.record(steps)[:, :8]
 
     def close(self) -> None:
-        """End both processes."""
-        for process in self._processes:
-            process.end()
+        """End both processes, if nobody else has them."""
+        if self._owned is not None:
+            self._owned.end()
 
 
 class ByOurs:

@@ -25,10 +25,16 @@ from heelstrike.experiments.engine_comparison.compass import (
 )
 from heelstrike.experiments.engine_comparison.entries import Entry, entries_called
 from heelstrike.experiments.engine_comparison.kept import KeptRows, asked_of_engine
-from heelstrike.experiments.engine_comparison.settings import DEFAULTS, settings_of
+from heelstrike.experiments.engine_comparison.settings import (
+    BEST,
+    DEFAULTS,
+    best_settings,
+    settings_of,
+)
 from heelstrike.experiments.engine_comparison.tables import short
 from heelstrike.experiments.engines.packages import PACKAGES, compared, peers
 from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.experiments.engines.served import EngineProcesses
 from heelstrike.field_texts import dataclass
 from heelstrike.robot import State
 from heelstrike.sim import TimeStepping
@@ -144,9 +150,13 @@ def compare_compass(
     settings: str = DEFAULTS,
     steps: Sequence[float] = STEPS,
     folder: Path | str | None = None,
+    processes: EngineProcesses | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> CompassTable:
     """Let the passive compass gait walk down its slope in every engine.
+
+    An engine in which it walks at none of the steps at its defaults has rows at its best settings,
+    too.
 
     Parameters
     ----------
@@ -158,6 +168,8 @@ def compare_compass(
         Steps of the engines, in s.
     folder : path, optional
         Where rows are kept as they come, to go on from there.
+    processes : EngineProcesses, optional
+        Where engines have been asked before; they are not ended.
     progress : callable, optional
         Called before each walk with a text, and the share of them that is done.
 
@@ -180,32 +192,44 @@ def compare_compass(
         walk = compass_walk(ByOurs(lambda h: TimeStepping(step=h), step), start)
         rows.append(CompassRow(OURS, f"heelstrike, {OURS}", step, _told(walk), ""))
     say = progress or (lambda text, share: None)  # noqa: ARG005
-    asked = [(name, entry, step) for name, entry in entries.items() for step in steps]
-    for k, (name, entry, step) in enumerate(asked):
-        say(f"compass gait in {entry.title}, {1e3 * step:g} ms", k / len(asked))
-        row = CompassRow(name, entry.title, step, None, "")
+    begins = [start.q.tolist(), start.v.tolist()]
+
+    def made(name: str, entry: Entry, step: float, which: str) -> CompassRow:
+        title = entry.title if which == settings else f"{entry.title}, {which}"
+        row = CompassRow(name, title, step, None, "")
         state = versions[entry.package]
         if not compared({entry.package: state}):
-            rows.append(replace(row, reason=f"{PACKAGES[entry.package].title} is {state}"))
-            continue
-        given = settings_of(name, entry, settings)
-        begins = [start.q.tolist(), start.v.tolist()]
+            return replace(row, reason=f"{PACKAGES[entry.package].title} is {state}")
+        given = settings_of(name, entry, which)
         told = [name, step, begins, asked_of_engine(entry.package, given, versions)]
         try:
             found = kept.entries(
-                f"compass-{name}-{settings}-{step:g}",
+                f"compass-{name}-{which}-{step:g}",
                 told,
-                partial(_in_engine, entry, step, given, start),
+                partial(_in_engine, entry, step, given, start, processes),
             )
         except InvalidRunError as refused:
-            rows.append(replace(row, reason=str(refused)))
-        else:
-            rows.append(replace(row, walk=found))
+            return replace(row, reason=str(refused))
+        return replace(row, walk=found)
+
+    for k, (name, entry) in enumerate(entries.items()):
+        for which in (settings,) if settings == BEST else (settings, BEST):
+            own = []
+            for step in steps:
+                say(f"compass gait in {entry.title}, {which}, {1e3 * step:g} ms", k / len(entries))
+                own.append(made(name, entry, step, which))
+            rows += own
+            walks = any(row.walk is not None and not row.walk["ending"] for row in own)
+            if walks or not best_settings().get(name, {}).get("settings"):
+                break
     return CompassTable(STRIDES, settings, tuple(rows))
 
 
-def _in_engine(entry: Entry, step: float, given: Mapping[str, Any], start: State) -> dict[str, Any]:
-    mover = InEngine(entry, step, given)
+def _in_engine(
+    entry: Entry, step: float, given: Mapping[str, Any], start: State,
+    processes: EngineProcesses | None,
+) -> dict[str, Any]:  # fmt: skip
+    mover = InEngine(entry, step, given, processes)
     try:
         return _told(compass_walk(mover, start))
     finally:

@@ -87,6 +87,12 @@ FACTS: dict[str, Facts] = {
         "none",
         "metadata of the sapien wheel; LICENSE.md of github.com/NVIDIA-Omniverse/PhysX",
     ),
+    "newton": Facts(
+        "Python", "several; here Steel, its own", "OpenGL, browser", "Apache-2.0",
+        "Linux, macOS, Windows", "yes", "yes",
+        "hard, Gauss-Seidel, single precision", "cone, as far as iterations go", "yes", "none",
+        "metadata and README of the newton wheel",
+    ),
     "siconos": Facts(
         "C++, Python", "own", "VTK", "Apache-2.0", "Linux, macOS", "yes", "yes",
         "hard, Moreau-Jean", "exact", "yes", "residual of the solver",

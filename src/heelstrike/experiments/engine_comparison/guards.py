@@ -12,7 +12,7 @@ from heelstrike.experiments.engine_comparison.entries import Entry
 from heelstrike.experiments.engine_comparison.walking import walk_in
 from heelstrike.experiments.engines.peer import flight
 from heelstrike.experiments.engines.scenario import Scenario
-from heelstrike.experiments.engines.served import ServedPeer, engine_process, served
+from heelstrike.experiments.engines.served import EngineProcesses, ServedPeer, served
 from heelstrike.experiments.laws import law_called
 from heelstrike.field_texts import dataclass
 from heelstrike.reader_process import ReaderProcess
@@ -61,7 +61,9 @@ class Guards:
         return self.extrapolated <= allowed and abs(self.weight - 1.0) <= WEIGHT
 
 
-def guard(entry: Entry, robot: Robot, given: Mapping[str, Any]) -> Guards:
+def guard(
+    entry: Entry, robot: Robot, given: Mapping[str, Any], processes: EngineProcesses | None = None
+) -> Guards:
     """Test that an engine has the same robot, by free flight and the weight at rest.
 
     Parameters
@@ -72,6 +74,8 @@ def guard(entry: Entry, robot: Robot, given: Mapping[str, Any]) -> Guards:
         A robot that stands on flat feet.
     given : mapping
         Settings of the engine.
+    processes : EngineProcesses, optional
+        Where engines have been asked before; they are not ended.
 
     Returns
     -------
@@ -87,7 +91,8 @@ def guard(entry: Entry, robot: Robot, given: Mapping[str, Any]) -> Guards:
     ours = scenario.run(FLOW).position[-1]
     ends = []
     facts: dict[str, Any] = {}
-    process = engine_process(entry.package)
+    own = processes or EngineProcesses()
+    process = own.of(entry.package)
     try:
         for step in FLIGHT_STEPS:
             settings = {**given, **entry.exact}
@@ -96,7 +101,8 @@ def guard(entry: Entry, robot: Robot, given: Mapping[str, Any]) -> Guards:
             facts = peer.facts
         weight, sunk = _at_rest(entry, robot, given, process)
     finally:
-        process.end()
+        if processes is None:
+            own.end()
     errors = [float(np.max(np.abs(end - ours))) for end in ends]
     first, second, third = ends
     apart = [float(np.max(np.abs(a - b))) for a, b in ((first, second), (second, third))]

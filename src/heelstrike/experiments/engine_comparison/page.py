@@ -24,6 +24,7 @@ from heelstrike.experiments.engine_comparison.settings import (
     found_for_others,
 )
 from heelstrike.experiments.engine_comparison.tables import BY_ITSELF, WALKING, short
+from heelstrike.experiments.engine_comparison.whole import taken
 
 SHOWN = 1e-3
 """Step (s) whose walks the page shows in full."""
@@ -67,6 +68,7 @@ def engines_page(folder: Path, figure: str) -> str:
         raise SimulationError(f"{scenes_file} is from before: it lacks {lacks[0]!r}. {first}")
     parts = [
         _INTRODUCTION,
+        _taken(folder / "whole.json"),
         _in_short(walks),
         _table_1(walks, scenes),
         _best(walks),
@@ -99,11 +101,11 @@ of heelstrike at a tolerance of 1e-9.
   table says. ComputedTorque follows the gait without balancing, so errors of the contact can make
   the robot fall. FootstepFeedback corrects them by its footholds.
 - Times cover the engine's steps and their Python calls, without the controller; only heelstrike's
-  include it. Other work ran at the same time, and rows come from several runs: ignore differences
-  below a factor of two.
+  include it. Other work ran at the same time: ignore differences below a factor of two.
 
-`heelstrike compare bravo7 --engines all` makes the tables; with `--scenes --page docs/engines.md`
-it writes this page. Use `--engines mujoco` for one engine, `--quick` for a trial, and `--films` to
+`heelstrike compare bravo7 --engines all --whole` makes the tables; with `--page docs/engines.md` it
+writes this page, and `--fine` adds shorter steps. It keeps each row as it comes and goes on where
+it was interrupted. Use `--engines mujoco` for one engine, `--quick` for a trial, and `--films` to
 see the walks that fall.
 
 The columns of the walks follow. Differences are from the reference.
@@ -124,6 +126,21 @@ The columns of the walks follow. Differences are from the reference.
 - *peak*: largest force on a foot, as a mean over a step, in multiples of the weight;
 - *step*: computing time of a step.
 """
+
+
+def _taken(file: Path) -> str:
+    """Say by which command the page was made, and how long that took."""
+    found = taken(file)
+    if not found:
+        return ""
+    sittings = found["sittings"]
+    days = list(dict.fromkeys(each["date"] for each in sittings))
+    wall, processor = (sum(each[k] for each in sittings) / 60.0 for k in ("wall_s", "processor_s"))
+    return (
+        f"`{found['command']} --page docs/engines.md` made all of it on {' and '.join(days)}. It "
+        f"took {wall:.0f} minutes on {found['processors']} processors that others used, too, and "
+        f"{processor:.0f} minutes of processor time.\n"
+    )
 
 
 def _table(headings: Sequence[str], rows: Rows) -> str:
@@ -343,11 +360,14 @@ def _peaks(walks: Mapping[str, Any]) -> str:
     headings = ["engine", "settings"]
     headings += [f"peak, {1e3 * h:g} ms" for h in sizes]
     headings += [f"computing time (s), {1e3 * h:g} ms" for h in sizes]
+    called = ",".join(f"{h:g}" for h in sizes)
     return (
         "## Foot force over step size\n\nThe peak force on a foot, as above, and the computing "
         f"time of the same walk under {law}, falls included. With hard contact a touchdown is an "
         "impulse within one step, so its force grows as the step shrinks. With soft contact the "
-        "force is that of the spring.\n\n"
+        f"force is that of the spring. Each row is `heelstrike compare {found['robot']} "
+        f"--controller {law.partition(' ')[0]} --engines NAME --settings SETTINGS --sizes {called} "
+        f"--steps {found['steps']}`.\n\n"
         + _table(headings, rows)
     )  # fmt: skip
 
@@ -429,7 +449,8 @@ def _scenes(found: Mapping[str, Any]) -> str:
     return (
         "## Scenes with closed forms\n\nThe exact result of each scene:\n\n" + "\n".join(listed)
         + f"\n\n{_SYMBOLS}\n\nErrors (simulated minus exact value, in the units above) at a step "
-        f"of {1e3 * found['step_s']:g} ms and {found['settings']}:\n\n"
+        f"of {1e3 * found['step_s']:g} ms and {found['settings']}. Each row is `heelstrike compare "
+        "bravo7 --engines NAME --scenes`:\n\n"
         + _table(headings, rows)
         + "\nA dash for a bouncing ball marks an engine without a coefficient of restitution. An "
         "error of many times the exact value means that the simulation diverged."
@@ -453,7 +474,8 @@ def _compass(found: Mapping[str, Any]) -> str:
         "landings at the ends of time steps is early or late by up to one time step, which changes "
         "the walker's next step. Where this change exceeds the disturbances, ± is large and the "
         "multipliers are not resolved. If the walker falls after a disturbance, the column "
-        "*multipliers* has the reason.\n\nEach row is `heelstrike compare bravo7 --engines NAME "
+        "*multipliers* has the reason. *best* marks rows at the best settings, of engines in which "
+        "it falls at defaults.\n\nEach row is `heelstrike compare bravo7 --engines NAME "
         f"--scenes`.{_not_run(found)}\n\n"
         + _table(COMPASS, [compass_cells(row) for row in found["rows"]])
     )
@@ -490,7 +512,8 @@ def _guards(found: Mapping[str, Any]) -> str:
         "difference of a coordinate from heelstrike (m, rad), *order* its order of convergence. "
         "*extrapolated* is *flight* extrapolated to a step of zero, and must be at most 1e-6, or "
         "1e-3 in single precision;\n- *weight*, the sum of the normal forces at rest over the "
-        "robot's weight. It must be 1, within 1 %.\n\n"
+        "robot's weight. It must be 1, within 1 %.\n\nEach row is `heelstrike compare bravo7 "
+        "--engines NAME --scenes`.\n\n"
         + _table(
             ["engine", "precision", "flight, 0.25 ms", "order", "extrapolated", "weight",
              "holds"],

@@ -31,6 +31,7 @@ from heelstrike.experiments.engine_comparison.walk import TRUTH, Start, Walk
 from heelstrike.experiments.engine_comparison.walking import seen
 from heelstrike.experiments.engines.packages import peers
 from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.experiments.engines.served import EngineProcesses
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot, State
@@ -127,6 +128,7 @@ def compare_pushes(
     halvings: int = HALVINGS,
     control_period: float = CONTROL_PERIOD,
     folder: Path | str | None = None,
+    processes: EngineProcesses | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> PushTable:
     """Find the largest push on the trunk that a walk stands, in every engine.
@@ -157,6 +159,8 @@ def compare_pushes(
         Seconds between two calls of the controller.
     folder : path, optional
         Where rows are kept as they come, to go on from there.
+    processes : EngineProcesses, optional
+        Where engines have been asked before; they are not ended.
     progress : callable, optional
         Called before each search with a text, and the share of them that is done.
 
@@ -171,7 +175,8 @@ def compare_pushes(
         If there is no engine of a name, or a number is not positive.
     """
     entries = entries_called(engines)
-    walk = Walk(robot, controller, gait, UNDISTURBED, control_period, friction, 60.0)
+    own = processes or EngineProcesses()
+    walk = Walk(robot, controller, gait, UNDISTURBED, control_period, friction, 60.0, own)
     versions = peers(load=False)
     kept = KeptRows(
         folder if walk.can_be_told else None, walk.entries(), ("walk", "walking", "pushes")
@@ -207,7 +212,8 @@ def compare_pushes(
                 found["failed"] = math.inf
             rows.append(PushRow(name, title, told[0], direction, Largest(**found), ""))
     finally:
-        walk.close()
+        if processes is None:
+            own.end()
     return PushTable(robot.name, tuple(rows))
 
 

@@ -28,9 +28,8 @@ from heelstrike.experiments.engine_comparison.settings import DEFAULTS, settings
 from heelstrike.experiments.engine_comparison.tables import short
 from heelstrike.experiments.engines.packages import PACKAGES, compared, peers
 from heelstrike.experiments.engines.peer import InvalidRunError
-from heelstrike.experiments.engines.served import engine_process
+from heelstrike.experiments.engines.served import PATIENCE, EngineProcesses
 from heelstrike.field_texts import dataclass
-from heelstrike.reader_process import ReaderProcess
 from heelstrike.sim import Compliant, EventDriven, TimeStepping
 from heelstrike.sim.method import Method
 
@@ -161,7 +160,9 @@ def compare_scenes(
     settings: str = DEFAULTS,
     step: float = STEP,
     steps: Sequence[float] = STEPS,
+    patience: float = PATIENCE,
     folder: Path | str | None = None,
+    processes: EngineProcesses | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> SceneTable:
     """Simulate scenes whose ends are known in every engine.
@@ -176,8 +177,12 @@ def compare_scenes(
         Step of the engines in s.
     steps : sequence of float
         Steps at which landing and rest are simulated, too.
+    patience : float
+        Seconds that an engine may take for a scene before it counts as hung.
     folder : path, optional
         Where errors are kept as they come, to go on from there. What is timed runs again.
+    processes : EngineProcesses, optional
+        Where engines have been asked before; they are not ended.
     progress : callable, optional
         Called before each scene with a text, and the share of scenes that is done.
 
@@ -194,7 +199,8 @@ def compare_scenes(
     entries = entries_called(engines)
     versions = peers(load=False)
     everything = scenes()
-    asked = _Engines(folder, settings, versions)
+    own = processes or EngineProcesses()
+    asked = _Engines(folder, settings, versions, own, patience)
     rows, at_steps = [], []
     say = progress or (lambda text, share: None)  # noqa: ARG005
     try:
@@ -227,7 +233,8 @@ def compare_scenes(
                         row = StepRow(shows, entry.title, each, abs(found), seconds)
                     at_steps.append(row)
     finally:
-        asked.close()
+        if processes is None:
+            own.end()
     told = tuple((s.name, s.exact, s.unit, s.source) for s in everything)
     return SceneTable(told, settings, step, tuple(rows), tuple(at_steps))
 
@@ -255,16 +262,12 @@ class _Engines:
     """
 
     def __init__(
-        self, folder: Path | str | None, settings: str, versions: Mapping[str, str]
-    ) -> None:
+        self, folder: Path | str | None, settings: str, versions: Mapping[str, str],
+        processes: EngineProcesses, patience: float,
+    ) -> None:  # fmt: skip
         self._kept = KeptRows(folder, {}, MODULES)
         self._settings, self._versions = settings, versions
-        self._processes: dict[str, ReaderProcess] = {}
-
-    def close(self) -> None:
-        """End the processes."""
-        for process in self._processes.values():
-            process.end()
+        self._processes, self._patience = processes, patience
 
     def error(self, scene: Scene, name: str, entry: Entry, step: float) -> float:
         """Return the error of a scene, which may be kept."""
@@ -282,10 +285,8 @@ class _Engines:
     def timed(self, scene: Scene, name: str, entry: Entry, step: float) -> tuple[float, float]:
         """Simulate a scene now; return its error and the seconds that it took."""
         given = self._given(name, entry)
-        if entry.package not in self._processes:
-            self._processes[entry.package] = engine_process(entry.package)
-        process = self._processes[entry.package]
-        error, seconds = scene_error(scene, entry, step, given, process)
+        process = self._processes.of(entry.package)
+        error, seconds = scene_error(scene, entry, step, given, process, self._patience)
         if not math.isfinite(error):
             raise InvalidRunError("what it ends with is not finite")
         return error, seconds

@@ -17,7 +17,7 @@ import numpy as np
 from heelstrike.experiments.engine_comparison.entries import Entry
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.scenario import Scenario
-from heelstrike.experiments.engines.served import served
+from heelstrike.experiments.engines.served import PATIENCE, served
 from heelstrike.field_texts import dataclass
 from heelstrike.reader_process import ReaderProcess
 from heelstrike.robot import Robot, RobotBuilder, State, load_robot
@@ -358,6 +358,7 @@ def scene_error(
     step: float,
     given: Mapping[str, Any],
     process: ReaderProcess | None = None,
+    patience: float = PATIENCE,
 ) -> tuple[float, float]:
     """Simulate a scene in an engine.
 
@@ -373,6 +374,8 @@ def scene_error(
         Settings of the engine.
     process : ReaderProcess, optional
         Where the engine has been before.
+    patience : float
+        Seconds that it may take before it counts as hung.
 
     Returns
     -------
@@ -388,7 +391,7 @@ def scene_error(
     """
     if scene.scenario.restitution and not entry.bounces:
         raise InvalidRunError("takes no coefficient of restitution")
-    peer = served(entry.package, scene.scenario, step, process=process, **given)
+    peer = served(entry.package, scene.scenario, step, process=process, patience=patience, **given)
     try:
         peer.restart()
         rows = peer.record(peer.steps)

@@ -15,12 +15,11 @@ from heelstrike.experiments.engine_comparison.walking import asked_of, walk_in
 from heelstrike.experiments.engines.packages import PACKAGES, compared
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.scenario import Scenario
-from heelstrike.experiments.engines.served import engine_process, served
+from heelstrike.experiments.engines.served import EngineProcesses, served
 from heelstrike.experiments.walk import LAST_STEP
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.gait.file import entries_of
-from heelstrike.reader_process import ReaderProcess
 from heelstrike.robot import Robot, State
 from heelstrike.robot.files.robot_json import robot_entries
 from heelstrike.sim import Controller, EventDriven, Run, simulate
@@ -59,16 +58,11 @@ class Walk:
     patience: float
     """robot, controller, gait, steps, control_period, friction, patience: As of
     :func:`compare_engines`."""
-    processes: dict[str, ReaderProcess] = field(default_factory=dict)
-    """Processes of the engines that have walked, by their names."""
+    processes: EngineProcesses = field(default_factory=EngineProcesses)
+    """Where the engines walk."""
 
     pasts: dict[Push, Run] = field(default_factory=dict)
     """What was until the end of each push, the same for all engines."""
-
-    def close(self) -> None:
-        """End the processes of the engines."""
-        for process in self.processes.values():
-            process.end()
 
     @property
     def can_be_told(self) -> bool:
@@ -144,6 +138,7 @@ class Walk:
         truth : Run
             What is held for true.
         """
+        self.ours(method, until=self.control_period)  # what is made or read once is not timed
         return walk_figures(self.ours(method), truth, self.gait, self.steps)
 
     def in_engine(
@@ -205,8 +200,6 @@ class Walk:
         state = versions[entry.package]
         if not compared({entry.package: state}):
             raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
-        if entry.package not in self.processes:
-            self.processes[entry.package] = engine_process(entry.package)
         scenario, begins = self.scenario, 0.0
         if start is not None:
             scenario, begins = replace(scenario, state=start.state), start.time
@@ -214,7 +207,7 @@ class Walk:
         controller = self.asked() if start is None else start.controller
         peer = served(
             entry.package, scenario, step, patience=self.patience,
-            process=self.processes[entry.package], **given,
+            process=self.processes.of(entry.package), **given,
         )  # fmt: skip
         run = walk_in(
             peer, controller, control_period=self.control_period, name=entry.title, begins=begins

@@ -320,6 +320,33 @@ def engine_process(name: str) -> ReaderProcess:
     return ReaderProcess(python=python or None, remembers=True)
 
 
+class EngineProcesses:
+    """Processes of engines that are started once and asked again, until all are ended together."""
+
+    def __init__(self) -> None:
+        self._started: dict[tuple[str, int], ReaderProcess] = {}
+
+    def of(self, name: str, number: int = 0) -> ReaderProcess:
+        """Return a process of an engine.
+
+        Parameters
+        ----------
+        name : str
+            Name of the engine.
+        number : int
+            Which of its processes, where it has several scenarios at once.
+        """
+        key = name, number
+        if key not in self._started:
+            self._started[key] = engine_process(name)
+        return self._started[key]
+
+    def end(self) -> None:
+        """End them all; who asks again starts others."""
+        for process in self._started.values():
+            process.end()
+
+
 def served(name: str, scenario: Scenario, step: float, **settings: Any) -> ServedPeer:
     """Return a scenario in an engine that runs in a process of its own.
 

@@ -163,7 +163,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         "```",
         "",
         f"It used heelstrike {settings.version}, {settings.method}, seed {settings.seed}, and "
-        "called controllers every millisecond (once per step if steps are longer).",
+        "called controllers once a millisecond, at most once per time step.",
         "",
         f"![Largest disturbance by robot and controller, one panel for each disturbance]({link})",
         "",

@@ -10,7 +10,7 @@ from heelstrike.dynamics.spatial.queries.evaluation import SpatialEvaluation
 from heelstrike.robot.model import Floats
 
 
-@equations_of_motion.forward_dynamics.in_space
+@equations_of_motion.forward_dynamics.in_space(equations_of_motion.forward_dynamics.returns)
 def forward_dynamics(at: SpatialEvaluation, force: ArrayLike) -> Floats:
     """Acceleration under a generalised force: there are no loops."""
     total, size = at.vector("force", force), at.model.nv

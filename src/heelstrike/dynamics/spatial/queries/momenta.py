@@ -7,7 +7,7 @@ from heelstrike.dynamics.spatial.queries.evaluation import SpatialEvaluation
 from heelstrike.robot.model import Floats
 
 
-@momenta.angular_momentum.in_space
+@momenta.angular_momentum.in_space("(3,) float: In N m s, in world axes.")
 def angular_momentum(at: SpatialEvaluation) -> Floats:
-    """Moment of momentum about the centre of mass, (3,)."""
+    """Moment of momentum about the centre of mass."""
     return momenta.momentum.at(at)[3:]

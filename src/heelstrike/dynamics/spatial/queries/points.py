@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.dynamics.queries import points
 from heelstrike.dynamics.queries.evaluation import contact_indices
-from heelstrike.dynamics.queries.query import of_position
+from heelstrike.dynamics.queries.query import of_position, of_space
 from heelstrike.dynamics.spatial import kinematics, rows
 from heelstrike.dynamics.spatial.algebra import Vector
 from heelstrike.dynamics.spatial.queries.evaluation import SpatialEvaluation
@@ -29,13 +29,13 @@ ON_LEVEL_GROUND: Matrix = (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 """Normal up, then tangents along x and y."""
 
 
-@points.point_position.in_space
+@points.point_position.in_space("(3,) float: World position (x, y, z), in m.")
 def point_position(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> Floats:
     """Where a point of a link is."""
     return np.array(at.point(link, local)[1])
 
 
-@points.point_velocity.in_space
+@points.point_velocity.in_space("(6,) float: Along x, y, z in m/s, and about them in rad/s.")
 def point_velocity(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> Floats:
     """Velocity of a point and angular velocity of its link."""
     place, position = at.point(link, local)
@@ -43,7 +43,7 @@ def point_velocity(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> 
     return np.array([*moves, *at.run(kinematics.angular_velocity, at.work, place)])
 
 
-@points.point_jacobian.in_space
+@points.point_jacobian.in_space("(6, nv) float: Rows x, y, z and rotations about them, in m and 1.")
 def point_jacobian(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> Floats:
     """Jacobian of a point of a link and of the link's rotation.
 
@@ -59,7 +59,9 @@ def point_jacobian(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> 
     return result
 
 
-@points.point_bias_acceleration.in_space
+@points.point_bias_acceleration.in_space(
+    "(6,) float: Along x, y, z in m/s², and about them in rad/s²."
+)
 def point_bias_acceleration(at: SpatialEvaluation, link: int | str, local: ArrayLike) -> Floats:
     """J̇v of :func:`point_jacobian`: the acceleration at v̇ = 0."""
     place, position = at.point(link, local)
@@ -67,7 +69,7 @@ def point_bias_acceleration(at: SpatialEvaluation, link: int | str, local: Array
     return np.array([*moves, *at.work.bias_acceleration[place, :3]])
 
 
-@points.contact_positions.in_space
+@points.contact_positions.in_space("(k, 3) float: World positions (x, y, z), in m.")
 def contact_positions(at: SpatialEvaluation, contacts: Iterable[int | str] | None = None) -> Floats:
     """Where the centres of the contact spheres and rims are."""
     found = contact_indices(at.robot, contacts)
@@ -75,7 +77,8 @@ def contact_positions(at: SpatialEvaluation, contacts: Iterable[int | str] | Non
     return np.array(centers).reshape(-1, 3)
 
 
-@of_position("(k, 3) float: World positions, in m.")
+@of_space
+@of_position("(k, 3) float: World positions (x, y, z), in m.")
 def lowest_positions(at: SpatialEvaluation, contacts: Iterable[int | str] | None = None) -> Floats:
     """Where the lowest points of the contact spheres and rims are."""
     found = contact_indices(at.robot, contacts)
@@ -83,7 +86,9 @@ def lowest_positions(at: SpatialEvaluation, contacts: Iterable[int | str] | None
     return np.array(lowest).reshape(-1, 3)
 
 
-@points.contact_jacobian.in_space
+@points.contact_jacobian.in_space(
+    "(k, 3, nv) float: Rows normal (up) and tangents along x and y, in m and 1."
+)
 def contact_jacobian(at: SpatialEvaluation, contacts: Iterable[int | str] | None = None) -> Floats:
     """Jacobian of the contact points on level ground: of the lowest point of each sphere or rim."""
     found = contact_indices(at.robot, contacts)
@@ -95,7 +100,7 @@ def contact_jacobian(at: SpatialEvaluation, contacts: Iterable[int | str] | None
     return result
 
 
-@points.contact_bias_acceleration.in_space
+@points.contact_bias_acceleration.in_space("(k, 3) float: Normal (up) and along x and y, in m/s².")
 def contact_bias_acceleration(
     at: SpatialEvaluation, contacts: Iterable[int | str] | None = None
 ) -> Floats:

@@ -23,7 +23,7 @@ class SpatialPoses:
     """(nl, 3) Position of each link's centre of mass, in metres."""
 
 
-@poses.link_poses.in_space
+@poses.link_poses.in_space("SpatialPoses: In m, rotations as matrices.")
 def link_poses(at: SpatialEvaluation) -> SpatialPoses:
     """Poses of all links in the world."""
     origin = at.work.origin.copy()
@@ -44,7 +44,7 @@ class SpatialVelocities:
     """(nl, 3) Velocity of each link's centre of mass, in m/s."""
 
 
-@poses.link_velocities.in_space
+@poses.link_velocities.in_space("SpatialVelocities: In m/s and rad/s.")
 def link_velocities(at: SpatialEvaluation) -> SpatialVelocities:
     """Velocities of all links in the world."""
     here = link_poses.at(at)
