@@ -10,15 +10,15 @@ hip up to half of weight times leg, and one at the ankle of the foot that stands
 is least is the cost of transport ∫Σ|power| dt / (weight · step). His limits on how fast forces
 change are left out. Speed and step are given here, from within his bounds.
 
-His runs: 7.2 and 0.4 kg, legs of 0.6 to 1 m. Ours have no torque at the ankle: every one of them is
-a gait of his problem.
+His runs: 7.2 and 0.4 kg, legs of 0.6 to 1 m. Ours have no torque at the ankle: but for the limits
+left out, each of them is a gait of his problem.
 
 His walk: 6.8 and 0.6 kg, legs of 0.7 to 0.9 m, ankle torque up to 0.2 weight times leg, a step of
 0.05 m at 0.1 m/s, its shortest and slowest, on both feet for 0.05 s, his shortest. The foot in the
 air keeps above ½h (1 + cos(π x / step)), x being how far it is ahead of the other one and h 1 cm.
 The ankle torque of ours is that of a flat foot without mass, 0.36 m long, of which the ground must
-not pull an end. On both feet our hips may exert torques, which his may not: the last column says
-how large they are there.
+not pull an end. On both feet our hips may exert torques, which his may not, so that ours is not a
+gait of his problem: the last column says how large they are there.
 
 The trunk between the legs has an inertia of 0.01 kg m², which his has not: torques at the two hips
 are then opposite but for what turns it. Costs are those of the motion, by inverse dynamics on 400

@@ -11,7 +11,8 @@ from gait_motion import instant
 
 import heelstrike as hs
 from heelstrike.errors import GaitError
-from heelstrike.gait.cost_rate import ROUNDED
+from heelstrike.gait.cost import Cost, Instant
+from heelstrike.gait.cost_rate import ROUNDED, rate_of
 
 STEP = {"step_length": 0.30, "step_duration": 0.70, "starts": 1}
 
@@ -51,6 +52,26 @@ def test_what_was_spent_is_the_integral(bravo7: hs.Robot, thrifty: hs.Gait) -> N
     rounded = ROUNDED * unit * 0.7 * bravo7.nu
     assert thrifty.spent is not None
     assert energy - rounded < thrifty.spent < energy + 1e-3 * energy
+
+
+@pytest.mark.parametrize("power", [-300.0, -1.0, -0.01, 0.0, 0.02, 0.5, 40.0])
+def test_corners_are_rounded_as_wide_as_told(power: float) -> None:
+    """|P| as √(P² + ε²) − ε, and what is greater, P or zero, as half of P more than that."""
+    unit = 700.0
+    now = Instant(
+        position=casadi.SX(1, 1), velocity=casadi.SX(1, 1), torque=casadi.SX(2.0),
+        motor_velocity=casadi.SX(0.5 * power), force=casadi.SX(2, 1),
+    )  # fmt: skip
+    width, heat = ROUNDED * unit, np.array([0.25])
+
+    def rate(cost: Cost, heat: Any) -> float:
+        return float(casadi.DM(rate_of({cost: 3.0}, now, heat, unit)))
+
+    mechanical = np.sqrt(power**2 + width**2) - width
+    assert rate(Cost.MECHANICAL_ENERGY, None) == pytest.approx(3.0 * mechanical, rel=1e-12)
+    spent = power + 1.0
+    electrical = 0.5 * (spent + np.sqrt(spent**2 + width**2) - width)
+    assert rate(Cost.ELECTRICAL_ENERGY, heat) == pytest.approx(3.0 * electrical, rel=1e-12)
 
 
 def test_weights_and_a_function_of_ones_own_say_the_same(bravo7: hs.Robot) -> None:

@@ -42,9 +42,9 @@ def rate_of(
     GaitError
         If the motors have no such numbers, or a function returns no number.
     """
-    total, small = smooth_rate_of(costs, now), 2.0 * ROUNDED * unit_of_power
-    for weight, one, other in powers_of(costs, now, heat):
-        apart = one - other
+    total = smooth_rate_of(costs, now)
+    for weight, width, one, other in powers_of(costs, now, heat):
+        apart, small = one - other, width * ROUNDED * unit_of_power
         total += 0.5 * weight * casadi.sum1(one + other + casadi.sqrt(apart**2 + small**2) - small)
     return total
 
@@ -58,30 +58,34 @@ def smooth_rate_of(costs: dict[Cost, float] | OwnCost, now: Instant) -> Any:
 
 def powers_of(
     costs: dict[Cost, float] | OwnCost, now: Instant, heat: Floats | None
-) -> list[tuple[float, Any, Any]]:
-    """Return the costs that have corners: their weights, and two powers of every motor, (nu,).
+) -> list[tuple[float, float, Any, Any]]:
+    """Return the costs that have corners.
 
-    What a motor spends is the greater of the two: P and −P, or P with its heat and zero.
+    Of each its weight, how widely its corners are rounded off, in units of `ROUNDED`, and two
+    powers of every motor, (nu,). What a motor spends is the greater of the two: P and −P, or P with
+    its heat and zero. The first differ by 2 P, so that their corner is as wide as the other's at
+    twice the width.
 
     Raises
     ------
     GaitError
         If the motors have no such numbers.
     """
-    powers: list[tuple[float, Any, Any]] = []
+    powers: list[tuple[float, float, Any, Any]] = []
     if not isinstance(costs, dict):
         return powers
     power = now.torque * now.motor_velocity
     for cost, weight in costs.items():
         if cost is Cost.MECHANICAL_ENERGY:
-            powers.append((weight, power, -power))
+            powers.append((weight, 2.0, power, -power))
         elif cost is Cost.ELECTRICAL_ENERGY:
             if heat is None:
                 raise GaitError(
                     "cost 'electrical_energy' needs motors: stall_torque and no_load_speed of "
                     "every driven joint. Give them to the robot, or ask for 'mechanical_energy'."
                 )
-            powers.append((weight, power + casadi.DM(heat) * now.torque**2, 0.0 * power))
+            spent = power + casadi.DM(heat) * now.torque**2
+            powers.append((weight, 1.0, spent, 0.0 * power))
     return powers
 
 

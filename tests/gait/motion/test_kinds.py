@@ -6,12 +6,19 @@ integrated phase by phase.
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
+
+import casadi
 import numpy as np
 import pytest
 from closing import Mechanics, gap, gauss_times, held_rows, lacking, mechanics_of
 from motion_kinds import FOLDER, HURDLE, KINDS, file_of, kept
 
 import heelstrike as hs
+from heelstrike.gait.cost import Instant, OwnConstraint
+from heelstrike.gait.motion import optimize
+from heelstrike.gait.motion.closing import Follower
 
 CLOSED = 1e-8
 SMALL = (
@@ -91,25 +98,61 @@ def test_it_closes(name: str) -> None:
     assert gap(mechanics, motion) < CLOSED
 
 
-def test_the_design_knows_how_it_closes() -> None:
-    """Its own estimate, of every motion that was integrated when it was designed."""
-    known = []
-    for name in KINDS:
-        _, motion, _ = loaded(name)
-        if np.isfinite(motion.closes_to):
-            known.append(name)
-            assert motion.closes_to < CLOSED
-    assert {"starting", "stopping", "stepping over", "run", "closed loops"} <= set(known)
+@pytest.mark.parametrize("name", KINDS)
+def test_the_design_knows_how_it_closes(name: str) -> None:
+    """Its own estimate, made again; and as kept, of motions that were integrated when designed."""
+    robot, motion, _ = loaded(name)
+    missed = Follower(robot, motion).missed()
+    assert missed < CLOSED
+    if name in {"starting", "stopping", "stepping over", "run", "closed loops"}:
+        assert motion.closes_to == pytest.approx(missed, abs=0.03 * CLOSED)
+
+
+@pytest.mark.parametrize("heavier", [1e-4, 1e-2])
+@pytest.mark.parametrize("name", ["rolling", "limp"])
+def test_motions_of_another_robot_do_not_close(name: str, heavier: float) -> None:
+    """Where feet do not hold the trunk, its mass decides: by as much as MuJoCo says."""
+    robot, motion, _ = loaded(name)
+    mass = robot.model.mass.copy()
+    mass[robot.joint_names.index("root_pitch")] *= 1.0 + heavier
+    other = replace(robot, model=robot.model.replaced(mass=mass))
+    missed = Follower(other, motion).missed()
+    assert missed > 0.1 * heavier
+    assert missed == pytest.approx(gap(mechanics_of(other, motion.slope), motion), rel=1e-4)
+
+
+def test_a_design_that_may_not_be_halved_tells_what_it_misses(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    robot = hs.load_robot("rabbit")
+    phase = hs.ContactPhase("right_tibia", duration=0.6, pieces=4)
+    monkeypatch.setattr(optimize, "SMALLEST_PIECES", 4)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        motion = hs.optimize_motion(robot, [phase], distance=0.25)
+    assert len(motion.phases[0].pieces) == 4
+    assert 10.0 * CLOSED < motion.closes_to < 1e-4
+    assert motion.closes_to == pytest.approx(Follower(robot, motion).missed(), rel=1e-6)
+    assert motion.closes_to == pytest.approx(gap(mechanics_of(robot, 0.0), motion), rel=1e-3)
+
+
+def test_closing_is_of_ends_only() -> None:
+    """A knee that swings by 0.3 rad within a piece closes all the same; what it lacks tells."""
+    robot, motion, mechanics = loaded("single support")
+    (phase,) = motion.phases
+    pieces, length = phase.pieces.copy(), np.diff(phase.breakpoints)[2]
+    swing = 16.0 * 0.3 * np.array([0.0, 0.0, 1.0, -2.0, 1.0, 0.0]) / length ** np.arange(6)
+    pieces[2, :, robot.joint_names.index("left_knee")] += swing
+    bent = replace(motion, phases=(replace(phase, pieces=pieces),))
+    assert Follower(robot, bent).missed() < CLOSED
+    assert lacking(mechanics, bent) > 0.1 * robot.weight
 
 
 def test_soles_stay_above_the_obstacle() -> None:
-    """All along them and at all times they clear a box of 9 cm, of the 10 that are asked for.
-
-    The design looks at five places of each at instants some 7 ms apart.
-    """
+    """All along them and at all times, to a tenth of a millimetre."""
     robot, motion, _ = loaded("stepping over")
-    closest, share = [np.inf, np.inf], np.linspace(0.0, 1.0, 101)[:, None]
-    for t in np.linspace(0.0, motion.duration, 2000):
+    closest, share = [np.inf, np.inf], np.linspace(0.0, 1.0, 201)[:, None]
+    for t in np.linspace(0.0, motion.duration, 5001):
         places = hs.dynamics.contact_positions(robot, motion.position(t))
         for foot in range(2):
             heel, toe = places[2 * foot : 2 * foot + 2]
@@ -117,7 +160,49 @@ def test_soles_stay_above_the_obstacle() -> None:
             over = np.abs(sole[:, 0] - HURDLE["place"]) <= HURDLE["half_width"]
             closest[foot] = min(closest[foot], sole[over, 1].min(initial=np.inf))
     for least in closest:
-        assert HURDLE["height"] - 0.01 < least < 2.0 * HURDLE["height"]
+        assert HURDLE["height"] - 1e-4 < least < 1.1 * HURDLE["height"]
+
+
+def over(hurdle: OwnConstraint, robot: hs.Robot, places: np.ndarray) -> float:
+    """Least of what keeps contact points, (nc, 2), above an obstacle."""
+    none = {name: casadi.SX(1, 1) for name in ("position", "velocity", "torque", "force")}
+    now = Instant(motor_velocity=casadi.SX(1, 1), points=casadi.SX(casadi.DM(places)), **none)
+    return float(np.array(casadi.DM(hurdle(now))).min())
+
+
+def test_a_sole_is_seen_wherever_it_is(bravo7: hs.Robot) -> None:
+    """No place of it over the box is lower than it says: soles that tilt, stand upright or lie."""
+    hurdle, rng = hs.over_obstacle(bravo7, **HURDLE), np.random.default_rng(5)
+    low, high = (HURDLE["place"] + side * HURDLE["half_width"] for side in (-1.0, 1.0))
+    share, seen = np.linspace(0.0, 1.0, 2001)[:, None], 0
+    for k in range(400):
+        heel = np.array([rng.uniform(-0.05, 0.35), rng.uniform(0.0, 0.2)])
+        angle = 0.5 * np.pi * rng.integers(-2, 3) if k % 4 == 0 else rng.uniform(-np.pi, np.pi)
+        toe = heel + 0.2 * np.array([np.cos(angle), np.sin(angle)])
+        away = np.array([-5.0, 1.0])
+        found = over(hurdle, bravo7, np.array([heel, toe, away, away]))
+        sole = (1.0 - share) * heel + share * toe
+        within = (sole[:, 0] >= low) & (sole[:, 0] <= high)
+        if np.any(within):
+            least = float(sole[within, 1].min()) - HURDLE["height"]
+            seen += least < 0.0
+            assert found <= least + 1e-12
+        if sole[:, 1].min() > HURDLE["height"]:
+            assert found > 0.0
+    assert seen > 50
+
+
+def test_a_foot_away_from_the_obstacle_is_free(bravo7: hs.Robot) -> None:
+    hurdle = hs.over_obstacle(bravo7, **HURDLE)
+    ahead = np.array([[0.25, 0.0], [0.45, 0.0]])
+    assert over(hurdle, bravo7, np.vstack([ahead, ahead - [0.4, 0.0]])) == pytest.approx(0.01)
+
+
+def test_a_robot_without_feet_steps_over_nothing() -> None:
+    build = hs.RobotBuilder("ball")
+    build.floating_base("ball", (0.0, 1.0), mass=1.0, inertia=0.1)
+    with pytest.raises(hs.GaitError, match="'ball' has no feet to keep above an obstacle"):
+        hs.over_obstacle(build.build(), **HURDLE)
 
 
 @pytest.mark.parametrize("wrong", [{"height": 0.0}, {"half_width": -1.0}, {"place": np.nan}])
@@ -149,8 +234,6 @@ def test_laws_refuse_motions_with_loops() -> None:
 
 def test_a_motion_that_does_not_repeat_is_seen() -> None:
     """The judge can say no: by a wrong distance, and by a force too little."""
-    from dataclasses import replace
-
     robot, motion, mechanics = loaded("single support")
     longer = replace(motion, distance=motion.distance + 1e-6)
     assert gap(mechanics, longer) > 100.0 * CLOSED

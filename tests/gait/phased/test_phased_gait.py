@@ -107,6 +107,16 @@ def test_robots_that_are_refused() -> None:
     )
     with pytest.raises(hs.GaitError, match="'rabbit' has none at left_knee"):
         hs.PhasedGait.from_bezier(driven, np.zeros((3, 4)), phase_range=(0.0, 1.0))
+    knees = tuple(rabbit().joint_names.index(f"{side}_knee") for side in ("left", "right"))
+    coupled = dataclasses.replace(
+        rabbit(),
+        model=model.replaced(
+            coupling_joint=np.array([knees]),
+            coupling_polynomial=np.array([[0.0, 1.0, 0.0, 0.0, 0.0]]),
+        ),
+    )
+    with pytest.raises(hs.GaitError, match="'rabbit' has coupling of left_knee"):
+        hs.PhasedGait.from_bezier(coupled, np.zeros((4, 4)), phase_range=(-0.1, 0.1))
 
 
 @pytest.mark.parametrize(

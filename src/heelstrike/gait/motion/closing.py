@@ -3,8 +3,11 @@
 Computed torque follows the motion from its first state; contact points that stand and loops are
 held by whatever forces it takes, and landings are plastic impacts. Of the motion only its joint
 accelerations are used, and forces where they are not determined: all else follows from the
-equations of motion, integrated far more finely than the motion was designed. What is missed at the
-end is the error of the design.
+equations of motion, integrated far more finely than the motion was designed.
+
+It is a statement of closing alone. Joints are pulled back to the motion on the way, and neither
+torques nor states within a phase are compared: a design that breaks the equations of motion between
+the ends of its pieces may close all the same.
 """
 
 from __future__ import annotations

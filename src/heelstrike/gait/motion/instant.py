@@ -172,7 +172,7 @@ class MotionFunctions:
         self.powers = len(found) * self.robot.nu
         bounds = casadi.SX.sym("spent", self.powers)
         rows, cost = Rows(), casadi.SX(0)
-        for k, (weight, *powers) in enumerate(found):
+        for k, (weight, _, *powers) in enumerate(found):
             spent = bounds[k * self.robot.nu : (k + 1) * self.robot.nu]
             cost += by * weight * unit * casadi.sum1(spent)
             for power in powers:

@@ -55,6 +55,9 @@ ROUNDS = 5
 """How often instants are added where limits fail between the Gauss points."""
 FINER = 5
 """Instants between which limits are checked, for each Gauss point."""
+OWN_FINER = 5
+"""How many times as many these are for constraints of one's own, which may have corners. Odd: each
+instant of the others is in the middle of some."""
 
 
 @takes(GaitError)
@@ -615,9 +618,9 @@ MOST_PIECES = 48
 """Pieces of a phase beyond which the mesh is not refined."""
 
 
-def _fine(pieces: int) -> Instants:
-    """Instants at which limits are checked."""
-    count = FINER * STAGES
+def _fine(pieces: int, times: int = 1) -> Instants:
+    """Instants at which limits are checked, or some times as many."""
+    count = times * FINER * STAGES
     share = (np.arange(count) + 0.5) / count
     return Instants(
         pieces, np.repeat(np.arange(pieces), count), np.tile(share, pieces),
@@ -659,9 +662,13 @@ def _held_between(found: _Found) -> _Found:
 
 def _failing(program: MotionProgram, unknowns: Floats, p: int) -> Instants:
     """Return the instants of a phase at which a limit fails most, one for each piece and limit."""
-    fine = _fine(program.grids[p].pieces)
+    own = np.array([row.kind is Kind.OWN for row in program.functions.path_rows])
+    fine = _fine(program.grids[p].pieces, OWN_FINER if np.any(own) else 1)
     rows = _rows_at(program, unknowns, p, fine)
     lower, upper = program.path_bounds(p, fine)
+    if np.any(own):  # for all others the instants that they would have without
+        others = np.arange(fine.share.size) % OWN_FINER != OWN_FINER // 2
+        lower[np.ix_(~own, others)], upper[np.ix_(~own, others)] = -np.inf, np.inf
     missing = np.maximum(lower - rows, rows - upper)
     missing = np.where(np.isfinite(missing), missing, -np.inf)
     by_piece = missing.reshape(len(rows), fine.pieces, -1)

@@ -24,6 +24,7 @@ from heelstrike.gait.gait import Gait
 from heelstrike.gait.motion.motion import Motion
 from heelstrike.gait.motion.request import Repeat
 from heelstrike.gait.phased.series import fitted, interpolated
+from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sides.mirror import Mirror
@@ -419,6 +420,7 @@ def check_robot(robot: Robot) -> None:
             "virtual constraints need a motor at every joint and none at the trunk; robot "
             f"{robot.name!r} " + (f"has none at {', '.join(free)}" if free else "moves its trunk")
         )
+    refuse_loops(robot, "virtual constraints", GaitError)
     for foot in robot.feet:
         if len(foot.contacts) != 1 or robot.model.contact_radius[foot.contacts[0]] > POINT_FOOT:
             raise GaitError(
