@@ -40,9 +40,9 @@ STAGNANT = 0.25
 ROUNDS_OF_OPENING = 4
 """How often contacts that pull are opened, and open ones that sink closed."""
 
-STUCK = 1e-12
-"""Residual up to which an answer of sticking contacts is taken."""
-
+STUCK = 1e-11
+"""Residual up to which an answer of sticking contacts is taken. Points of one foot contradict each
+other by the rounding of their gaps, 1e-16 m in a step: to look for what is better is in vain."""
 
 PROJECTIONS, CORRECTIONS = 100, 2
 """How often impulses that hold are brought into their cones, and held again each time."""
@@ -60,20 +60,21 @@ AT_ITS_BOUND = 1.0 - 1e-9
 
 @kernel
 def factorize(size: int, matrix: Floats) -> bool:
-    """Replace the upper half of a positive matrix by its Cholesky factor, 1/d on the diagonal.
+    """Replace the lower half of a positive matrix A by L of A = Lᵀ L, with 1/d on the diagonal.
 
-    The inner loops go along rows: processors take several of their numbers at a time.
+    The last row goes first. So all inner loops go along rows from their beginning: processors take
+    several of their numbers at a time, and no index needs to be looked at for its sign.
     """
-    for k in range(size):
+    for k in range(size - 1, -1, -1):
         if not matrix[k, k] > 0.0:
             return False
         inverse = 1.0 / math.sqrt(matrix[k, k])
         matrix[k, k] = inverse
-        for j in range(k + 1, size):
+        for j in range(k):
             matrix[k, j] *= inverse
-        for i in range(k + 1, size):
+        for i in range(k):
             share = matrix[k, i]
-            for j in range(i, size):
+            for j in range(i + 1):
                 matrix[i, j] -= share * matrix[k, j]
     return True
 
@@ -81,16 +82,16 @@ def factorize(size: int, matrix: Floats) -> bool:
 @kernel
 def solve_factored(size: int, factor: Floats, right: Floats) -> None:
     """Replace a right side by the solution, with the factor of :func:`factorize`."""
-    for k in range(size):
+    for k in range(size - 1, -1, -1):
         right[k] *= factor[k, k]
         own = right[k]
-        for i in range(k + 1, size):
+        for i in range(k):
             right[i] -= factor[k, i] * own
-    for i in range(size - 1, -1, -1):
-        right[i] *= factor[i, i]
-        own = right[i]
-        for k in range(i):
-            right[k] -= factor[k, i] * own
+    for k in range(size):
+        total = right[k]
+        for i in range(k):
+            total -= factor[k, i] * right[i]
+        right[k] = total * factor[k, k]
 
 
 @kernel
@@ -129,8 +130,9 @@ def begin_at_bounds(
         begin = problem.first[block]
         if problem.set[block] == INTERVAL and iterate.mode[block] == SLIP:
             x[begin] = math.copysign(scaled.bound[block], x[begin])
+            own = x[begin]
             for row in range(rows):
-                newton.moved[row] += scaled.matrix[begin, row] * x[begin]
+                newton.moved[row] += scaled.matrix[begin, row] * own
             continue
         for row in range(begin, problem.first[block + 1]):
             x[row] = 0.0
@@ -141,8 +143,9 @@ def factorize_held(size: int, scaled: ScaledBlocks, newton: NewtonSystem) -> boo
     """Factor the matrix of the listed rows, made a little firmer; return success."""
     row, system, matrix = newton.row, newton.system, scaled.matrix
     for i in range(size):
-        for j in range(i, size):
-            system[i, j] = matrix[row[i], row[j]]
+        at = row[i]
+        for j in range(i + 1):
+            system[i, j] = matrix[at, row[j]]
         system[i, i] += FIRM
     return factorize(size, system)
 
@@ -158,9 +161,10 @@ def hold(rows: int, size: int, scaled: ScaledBlocks, newton: NewtonSystem, x: Fl
         for other in range(rows):
             velocity[other] = scaled.offset[other] + newton.moved[other]
         for i in range(size if turn > 0 else 0):
-            own = x[row[i]]
+            at = row[i]
+            own = x[at]
             for other in range(rows):
-                velocity[other] += matrix[row[i], other] * own
+                velocity[other] += matrix[at, other] * own
         left = 0.0
         for i in range(size):
             total = velocity[row[i]]
