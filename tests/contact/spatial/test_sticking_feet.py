@@ -1,4 +1,4 @@
-"""Contacts that stick: their equations, and how much is looked for that rounding hides."""
+"""Equations of sticking contacts and of Newton's method, and what rounding hides of a foot."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.contact.spatial.certified_solve import block_workspace, solve_block_problem
 from heelstrike.contact.spatial.modes import SLIP, SOLVED, STICK
+from heelstrike.contact.spatial.newton import solve_general
 from heelstrike.contact.spatial.sticking import factorize, solve_factored
 from heelstrike.contact.spatial.workspace import BlockAnswer, block_answer, block_problem
 
@@ -90,3 +91,24 @@ def test_what_is_off_by_more_is_looked_at() -> None:
     assert iterations > 1
     assert answer.residual < 1e-12
     assert np.isclose(answer.velocity[:12:3].max(), 1e-9 * size, rtol=1e-3)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 8, 33])
+def test_elimination_solves_as_numpy_does(size: int) -> None:
+    """Zeros on the diagonal, so that rows must be exchanged."""
+    rng = np.random.default_rng([43, size])
+    matrix = rng.normal(size=(size, size))
+    if size > 1:
+        np.fill_diagonal(matrix, 0.0)
+    right = rng.normal(size=size)
+    system, solution = np.full((size + 2, size + 2), np.nan), right.copy()
+    system[:size, :size] = matrix
+    assert uncompiled(solve_general)(size, system, solution)
+    expected = np.linalg.solve(matrix, right)
+    limit = 1e-14 * np.linalg.cond(matrix) * np.abs(expected).max()
+    assert np.allclose(solution, expected, rtol=0.0, atol=limit)
+
+
+def test_elimination_refuses_what_is_singular() -> None:
+    """A column of zeros."""
+    assert not uncompiled(solve_general)(2, np.array([[1.0, 0.0], [2.0, 0.0]]), np.ones(2))
