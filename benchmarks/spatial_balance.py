@@ -1,4 +1,4 @@
-"""Largest push that a standing robot in space withstands, by the law that holds its balance.
+"""Pushes that a standing robot in space withstands, by the law that holds its balance.
 
 The robot stands in a posture with bent knees for a second, and is pushed at a link for 0.1 s; it
 withstands the push if it is up three seconds later. HoldBalance is called every 2 ms, HoldPosture
@@ -6,7 +6,11 @@ at every step with gains that the step bears. Beside them stands the push that w
 capture point of a pendulum of the height of the centre of mass to the edge of the soles: a law that
 leaves its feet where they are does better only by swinging its trunk.
 
-Run: python benchmarks/spatial_balance.py FILE.xml [--bent 0.3] [--link trunk]
+A robot may withstand one push and fall by a smaller one. So all pushes of a grid are tried, from
+none to half more than brings the capture point to the edge, and their outcomes are printed in a
+row. What is told is the largest push up to which none of the grid makes the robot fall.
+
+Run: python benchmarks/spatial_balance.py FILE.xml [--bent 0.3] [--link trunk] [--spacing 0.5]
 """
 
 from __future__ import annotations
@@ -42,22 +46,29 @@ def crouched(robot: hs.SpatialRobot, bent: float) -> np.ndarray:
     return q
 
 
-def largest(
+def outcomes(
     robot: hs.SpatialRobot, law: Any, q: np.ndarray, link: str, side: tuple[float, float],
-    period: float | None,
-) -> float:  # fmt: skip
-    """Largest push (N s) that it withstands, to 0.5 N s."""
-    low, high = 0.0, 80.0
-    while high - low > 0.5:
-        impulse = 0.5 * (low + high)
+    period: float | None, impulses: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Whether it withstands each push (N s)."""
+    stands = []
+    for impulse in impulses:
         force = tuple(impulse / DURATION * part for part in (*side, 0.0))
         push = hs.Push(link, force=force, start=1.0, duration=DURATION)
         run = hs.simulate(
             robot, law, state=hs.State(q, np.zeros(robot.nv)), duration=4.0, pushes=push,
-            control_period=period,
+            control_period=period, record_every=100,
         )  # fmt: skip
-        low, high = (impulse, high) if run.completed else (low, impulse)
-    return low
+        stands.append(run.completed)
+    return np.array(stands)
+
+
+def told(impulses: np.ndarray, stands: np.ndarray) -> str:
+    """Say up to which push all are withstood, and what comes after."""
+    least = int(np.argmin(stands)) if not stands.all() else len(stands)
+    below = f"{impulses[least - 1]:.2f}" if least > 0 else "none"
+    row = "".join("o" if stood else "x" for stood in stands)
+    return f"all up to {below} N s, the largest {impulses[stands].max(initial=0.0):.2f}; {row}"
 
 
 def reach(robot: hs.SpatialRobot, q: np.ndarray, side: tuple[float, float]) -> float:
@@ -87,6 +98,7 @@ def main() -> None:
     parser.add_argument("file", type=Path)
     parser.add_argument("--bent", type=float, default=0.3, help="of the knees, half (rad)")
     parser.add_argument("--link", help="that is pushed; the trunk by default")
+    parser.add_argument("--spacing", type=float, default=0.5, help="of the pushes (N s)")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     robot = hs.load_robot(options.file, dimension=3)
@@ -98,15 +110,14 @@ def main() -> None:
         "HoldPosture": (hs.HoldPosture(robot, posture=q, kp=kp, kd=kd), None),
     }
     print(f"{robot!r}; load {machine.load():.1f} on {os.cpu_count()} cores")
+    print("o: up three seconds later, x: fallen; from the smallest push on")
     for name, side in SIDES.items():
-        told = ", ".join(
-            f"{law} {largest(robot, made, q, link, side, period):.1f} N s"
-            for law, (made, period) in laws.items()
-        )
-        print(
-            f"{name}: {told}; capture point at the edge: {reach(robot, q, side):.1f} N s",
-            flush=True,
-        )
+        edge = reach(robot, q, side)
+        impulses = np.arange(options.spacing, 1.5 * edge, options.spacing)
+        print(f"{name}: capture point at the edge: {edge:.1f} N s", flush=True)
+        for law, (made, period) in laws.items():
+            stands = outcomes(robot, made, q, link, side, period, impulses)
+            print(f"  {law:11s} {told(impulses, stands)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -101,10 +101,27 @@ def weigh_blocks(problem: BlockProblem, settings: BlockSettings, scaled: ScaledB
 
 
 @kernel
+def sum_products(
+    rows: int, problem: BlockProblem, impulse: Floats, u: Floats, size: Floats
+) -> None:
+    """Write ``u = W impulse + free``, and the sizes of all terms added up."""
+    delassus = problem.delassus
+    for row in range(rows):
+        u[row] = problem.free[row]
+        size[row] = abs(problem.free[row])
+    for column in range(rows):
+        own = impulse[column]
+        for row in range(rows):
+            product = delassus[column, row] * own
+            u[row] += product
+            size[row] += abs(product)
+
+
+@kernel
 def sum_blocks(problem: BlockProblem, scaled: ScaledBlocks, answer: BlockAnswer) -> float:
     """Write ``velocity = W impulse + free``; return what rounding is left, relative to the data.
 
-    ``scaled`` has the weights and the size of the data.
+    ``scaled`` has the weights and the size of the data, and receives the sizes of the sums.
     """
     rows, first = problem.first[problem.count], problem.first
     impulse, velocity, delassus, free = (
@@ -113,26 +130,21 @@ def sum_blocks(problem: BlockProblem, scaled: ScaledBlocks, answer: BlockAnswer)
         problem.delassus,
         problem.free,
     )
+    sum_products(rows, problem, impulse, velocity, scaled.size)
     terms = rows + 2.0
     rounding = 0.0
     for block in range(problem.count):
         inverse = scaled.scale[block] / scaled.unit if scaled.unit > 0.0 else 0.0
         for row in range(first[block], first[block + 1]):
-            total = free[row]
-            size = abs(total)
-            for column in range(rows):
-                product = delassus[row, column] * impulse[column]
-                total += product
-                size += abs(product)
-            velocity[row] = total
+            size = scaled.size[row]
             left = terms * UNIT_ROUNDOFF * size * inverse
             if left > VISIBLE_ROUNDING:
                 total, error = free[row], 0.0
                 for column in range(rows):
-                    product = delassus[row, column] * impulse[column]
+                    product = delassus[column, row] * impulse[column]
                     if product == 0.0:
                         continue
-                    error += product_error(delassus[row, column], impulse[column], product)
+                    error += product_error(delassus[column, row], impulse[column], product)
                     longer = total + product
                     error += sum_error(total, product, longer)
                     total = longer

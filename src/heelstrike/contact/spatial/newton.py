@@ -207,30 +207,32 @@ def write_system(
 def solve_general(size: int, matrix: Floats, right: Floats) -> bool:
     """Replace a right side by the solution of linear equations; return success.
 
-    Elimination with the largest pivot of each column; the matrix becomes its factors.
+    Elimination with the largest pivot of each column; the matrix becomes its factors. The last
+    unknown goes first, so that the inner loops begin at zero, as in
+    :func:`~heelstrike.contact.spatial.sticking.factorize`.
     """
-    for k in range(size):
+    for k in range(size - 1, -1, -1):
         best, place = abs(matrix[k, k]), k
-        for i in range(k + 1, size):
+        for i in range(k):
             if abs(matrix[i, k]) > best:
                 best, place = abs(matrix[i, k]), i
         if not best > 0.0:
             return False
         if place != k:
-            for j in range(size):
+            for j in range(k + 1):
                 matrix[k, j], matrix[place, j] = matrix[place, j], matrix[k, j]
             right[k], right[place] = right[place], right[k]
         inverse = 1.0 / matrix[k, k]
-        for i in range(k + 1, size):
+        for i in range(k):
             factor = matrix[i, k] * inverse
             if factor == 0.0:
                 continue
-            for j in range(k + 1, size):
+            for j in range(k):
                 matrix[i, j] -= factor * matrix[k, j]
             right[i] -= factor * right[k]
-    for k in range(size - 1, -1, -1):
+    for k in range(size):
         total = right[k]
-        for j in range(k + 1, size):
+        for j in range(k):
             total -= matrix[k, j] * right[j]
         right[k] = total / matrix[k, k]
     return True

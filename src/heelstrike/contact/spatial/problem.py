@@ -83,7 +83,7 @@ def solve_in_space(
     work.settings.tolerance, work.settings.floor = tolerance, floor
     work.settings.ways = WAYS if fallback else NEWTON + 1
     problem.friction[:count] = friction
-    problem.delassus[:rows, :rows] = delassus
+    problem.delassus[:rows, :rows] = delassus.T  # symmetric to rounding only
     problem.free[:rows] = free
     answer.mode[:] = STICK
     answer.impulse[:] = 0.0

@@ -30,14 +30,17 @@ def scale_blocks(problem: BlockProblem, settings: BlockSettings, scaled: ScaledB
         forces = unit * scale
         scaled.bound[block] = problem.bound[block] / forces if forces > 0.0 else 0.0
         for row in range(first[block], first[block + 1]):
+            scaled.weight[row] = scale
             if forces > 0.0:
                 scaled.offset[row] = problem.free[row] * scale / unit
             else:
                 scaled.offset[row] = sign(problem.free[row])
-            for other in range(problem.count):
-                both = scale * scaled.scale[other]
-                for column in range(first[other], first[other + 1]):
-                    scaled.matrix[row, column] = problem.delassus[row, column] * both
+    rows = first[problem.count]
+    for row in range(rows):
+        scale = scaled.weight[row]
+        for column in range(rows):
+            both = scale * scaled.weight[column]
+            scaled.matrix[row, column] = problem.delassus[row, column] * both
 
 
 @kernel

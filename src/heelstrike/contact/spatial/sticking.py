@@ -40,9 +40,9 @@ STAGNANT = 0.25
 ROUNDS_OF_OPENING = 4
 """How often contacts that pull are opened, and open ones that sink closed."""
 
-STUCK = 1e-12
-"""Residual up to which an answer of sticking contacts is taken."""
-
+STUCK = 1e-11
+"""Residual up to which an answer of sticking contacts is taken. Points of one foot contradict each
+other by the rounding of their gaps, 1e-16 m in a step: to look for what is better is in vain."""
 
 PROJECTIONS, CORRECTIONS = 100, 2
 """How often impulses that hold are brought into their cones, and held again each time."""
@@ -60,33 +60,38 @@ AT_ITS_BOUND = 1.0 - 1e-9
 
 @kernel
 def factorize(size: int, matrix: Floats) -> bool:
-    """Replace the lower half of a positive matrix by its Cholesky factor, 1/d on the diagonal."""
-    for i in range(size):
-        for j in range(i + 1):
-            total = matrix[i, j]
-            for k in range(j):
-                total -= matrix[i, k] * matrix[j, k]
-            if i > j:
-                matrix[i, j] = total * matrix[j, j]
-                continue
-            if not total > 0.0:
-                return False
-            matrix[i, i] = 1.0 / math.sqrt(total)
+    """Replace the lower half of a positive matrix A by L of A = Lᵀ L, with 1/d on the diagonal.
+
+    The last row goes first. So all inner loops go along rows from their beginning: processors take
+    several of their numbers at a time, and no index needs to be looked at for its sign.
+    """
+    for k in range(size - 1, -1, -1):
+        if not matrix[k, k] > 0.0:
+            return False
+        inverse = 1.0 / math.sqrt(matrix[k, k])
+        matrix[k, k] = inverse
+        for j in range(k):
+            matrix[k, j] *= inverse
+        for i in range(k):
+            share = matrix[k, i]
+            for j in range(i + 1):
+                matrix[i, j] -= share * matrix[k, j]
     return True
 
 
 @kernel
 def solve_factored(size: int, factor: Floats, right: Floats) -> None:
     """Replace a right side by the solution, with the factor of :func:`factorize`."""
-    for i in range(size):
-        total = right[i]
-        for k in range(i):
-            total -= factor[i, k] * right[k]
-        right[i] = total * factor[i, i]
-    for i in range(size - 1, -1, -1):
-        right[i] *= factor[i, i]
-        for k in range(i):
-            right[k] -= factor[i, k] * right[i]
+    for k in range(size - 1, -1, -1):
+        right[k] *= factor[k, k]
+        own = right[k]
+        for i in range(k):
+            right[i] -= factor[k, i] * own
+    for k in range(size):
+        total = right[k]
+        for i in range(k):
+            total -= factor[k, i] * right[i]
+        right[k] = total * factor[k, k]
 
 
 @kernel
@@ -125,37 +130,50 @@ def begin_at_bounds(
         begin = problem.first[block]
         if problem.set[block] == INTERVAL and iterate.mode[block] == SLIP:
             x[begin] = math.copysign(scaled.bound[block], x[begin])
+            own = x[begin]
             for row in range(rows):
-                newton.moved[row] += scaled.matrix[begin, row] * x[begin]
+                newton.moved[row] += scaled.matrix[begin, row] * own
             continue
         for row in range(begin, problem.first[block + 1]):
             x[row] = 0.0
 
 
 @kernel
-def hold(size: int, scaled: ScaledBlocks, newton: NewtonSystem, x: Floats) -> bool:
-    """Find the impulses of least norm that hold the listed rows; return success."""
-    row, system, right, matrix = newton.row, newton.system, newton.right, scaled.matrix
+def factorize_held(size: int, scaled: ScaledBlocks, newton: NewtonSystem) -> bool:
+    """Factor the matrix of the listed rows, made a little firmer; return success."""
+    row, system, matrix = newton.row, newton.system, scaled.matrix
     for i in range(size):
+        at = row[i]
         for j in range(i + 1):
-            system[i, j] = matrix[row[i], row[j]]
+            system[i, j] = matrix[at, row[j]]
         system[i, i] += FIRM
-    if not factorize(size, system):
+    return factorize(size, system)
+
+
+@kernel
+def hold(rows: int, size: int, scaled: ScaledBlocks, newton: NewtonSystem, x: Floats) -> bool:
+    """Find the impulses of least norm that hold the listed of all rows; return success."""
+    row, right, matrix, velocity = newton.row, newton.right, scaled.matrix, newton.trial_u
+    if not factorize_held(size, scaled, newton):
         return False
     before = math.inf
     for turn in range(REFINEMENTS):
+        for other in range(rows):
+            velocity[other] = scaled.offset[other] + newton.moved[other]
+        for i in range(size if turn > 0 else 0):
+            at = row[i]
+            own = x[at]
+            for other in range(rows):
+                velocity[other] += matrix[at, other] * own
         left = 0.0
         for i in range(size):
-            total = scaled.offset[row[i]] + newton.moved[row[i]]
-            if turn > 0:
-                for j in range(size):
-                    total += matrix[row[i], row[j]] * x[row[j]]
+            total = velocity[row[i]]
             right[i] = -total
             left = max(left, abs(total))
         if left <= REFINED or left > STAGNANT * before:
             break
         before = left
-        solve_factored(size, system, right)
+        solve_factored(size, newton.system, right)
         for i in range(size):
             x[row[i]] += right[i]
     return True
@@ -199,7 +217,7 @@ def try_sticking(
         if size < 0:
             return False
         begin_at_bounds(problem, scaled, iterate, newton)
-        if not hold(size, scaled, newton, iterate.x):
+        if not hold(problem.first[problem.count], size, scaled, newton, iterate.x):
             return False
         look(problem, scaled, iterate)
         if iterate.worst <= STUCK:
@@ -260,19 +278,15 @@ def project_in_turn(
     return_to_best(problem, scaled, iterate)
     rows = problem.first[problem.count]
     size = list_held_rows(problem, scaled, tolerance, iterate, newton)
-    row, system, right, x = newton.row, newton.system, newton.right, iterate.x
-    for i in range(size):
-        for j in range(i + 1):
-            system[i, j] = scaled.matrix[row[i], row[j]]
-        system[i, i] += FIRM
-    if not factorize(size, system):
+    row, right, x = newton.row, newton.right, iterate.x
+    if not factorize_held(size, scaled, newton):
         return False
     for _ in range(PROJECTIONS):
         for _ in range(CORRECTIONS):
             find_velocities(rows, scaled, x, iterate.u)
             for i in range(size):
                 right[i] = -iterate.u[row[i]]
-            solve_factored(size, system, right)
+            solve_factored(size, newton.system, right)
             for i in range(size):
                 x[row[i]] += right[i]
         look(problem, scaled, iterate)

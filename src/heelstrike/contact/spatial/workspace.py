@@ -33,7 +33,7 @@ class BlockProblem(Bundle):
     bound: Floats = array("blocks")
     """Largest impulse of each interval."""
     delassus: Floats = array("rows", "rows")
-    """Delassus matrix, symmetric."""
+    """Delassus matrix, symmetric; a row says what the impulse of one does to all velocities."""
     free: Floats = array("rows")
     """Free velocity (or acceleration), the free term b."""
 
@@ -88,6 +88,10 @@ class ScaledBlocks(Bundle):
     """What rounding may hide from the certificate."""
     scale: Floats = array("blocks")
     """Inverse root of the largest diagonal entry of each block; zero where nothing moves."""
+    weight: Floats = array("rows")
+    """The same for each row."""
+    size: Floats = array("rows")
+    """Sum of the sizes of all that a velocity is summed of."""
     bound: Floats = array("blocks")
     matrix: Floats = array("rows", "rows")
     offset: Floats = array("rows")

@@ -218,6 +218,9 @@ def write_delassus(
             if first[i + 1] - r == 3 and first[j + 1] - s == 3:
                 write_block(shared, r, s, rows, matrix)
                 continue
+            if first[i + 1] - r == 1 and first[j + 1] - s == 3:
+                write_against_block(shared, r, s, rows, matrix)
+                continue
             for m in range(r, first[i + 1]):
                 for n in range(s, first[j + 1]):
                     total = 0.0
@@ -225,6 +228,19 @@ def write_delassus(
                         total += rows[m, a] * rows[n, a]
                     matrix[m, n] = total
                     matrix[n, m] = total
+
+
+@kernel
+def write_against_block(shared: int, r: int, s: int, rows: Floats, matrix: Floats) -> None:
+    """Write the products of one row and three others, which share so many velocities."""
+    first, second, third = 0.0, 0.0, 0.0
+    for a in range(shared):
+        own = rows[r, a]
+        first += own * rows[s, a]
+        second += own * rows[s + 1, a]
+        third += own * rows[s + 2, a]
+    matrix[r, s], matrix[r, s + 1], matrix[r, s + 2] = first, second, third
+    matrix[s, r], matrix[s + 1, r], matrix[s + 2, r] = first, second, third
 
 
 @kernel
