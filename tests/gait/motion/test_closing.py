@@ -70,9 +70,9 @@ def test_a_motion_closes_however_its_duration_is_summed_up(monkeypatch: Any) -> 
     first = many.phases[0].coordinates(0.0, order=1)
     image = many.mirror_sign * first[many.mirror_joint]
     np.testing.assert_array_equal(many.velocity(many.duration), image)
-    follower = Follower(robot, many.slope)
-    assert follower.missed(many) < CLOSED
-    assert follower.missed_by_phases(many).max() < CLOSED
+    follower = Follower(robot, many)
+    assert follower.missed() < CLOSED
+    assert follower.missed_by_phases().max() < CLOSED
 
 
 def test_two_feet_on_straight_legs_are_followed(bravo7: hs.Robot) -> None:
@@ -87,14 +87,14 @@ def test_two_feet_on_straight_legs_are_followed(bravo7: hs.Robot) -> None:
     rests = replace(
         rising, phases=(replace(phase, pieces=still),), initial_state=hs.State(state.q, state.v)
     )
-    assert Follower(bravo7, 0.0).missed(rests) < CLOSED
+    assert Follower(bravo7, rests).missed() < CLOSED
 
 
 def test_what_cannot_be_integrated_is_infinitely_far(bravo7: hs.Robot) -> None:
     motion = kept("single support", bravo7)
     (phase,) = motion.phases
     wild = replace(motion, phases=(replace(phase, pieces=1e160 * phase.pieces),))
-    assert Follower(bravo7, 0.0).missed(wild) == np.inf
+    assert Follower(bravo7, wild).missed() == np.inf
 
 
 def run(pieces: int) -> list[hs.ContactPhase]:
@@ -127,7 +127,7 @@ def test_one_that_does_not_close_is_told(why: str, monkeypatch: pytest.MonkeyPat
         motion = hs.optimize_motion(rabbit, run(2), speed=2.0, starts=1)
     assert pieces_of(motion) == [2, 2]
     assert CLOSED < motion.closes_to < SKETCHY
-    assert motion.closes_to == pytest.approx(Follower(rabbit, 0.0).missed(motion), rel=1e-6)
+    assert motion.closes_to == pytest.approx(Follower(rabbit, motion).missed(), rel=1e-6)
 
 
 @pytest.mark.usefixtures("coarse")

@@ -3,13 +3,16 @@
 Computed torque follows the motion from its first state; contact points that stand and loops are
 held by whatever forces it takes, and landings are plastic impacts. Of the motion only its joint
 accelerations are used, and forces where they are not determined: all else follows from the
-equations of motion, integrated far more finely than the motion was designed. What is missed at the
-end is by how much the motion does not close. Feedback on the driven joints takes away most of what
-is missed on the way: neither that nor the torques are compared.
+equations of motion, integrated far more finely than the motion was designed.
+
+It is a statement of closing alone. Joints are pulled back to the motion on the way, and neither
+torques nor states within a phase are compared: a design that breaks the equations of motion between
+the ends of its pieces may close all the same.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -44,54 +47,46 @@ class GaitWarning(UserWarning):
 
 
 class Follower:
-    """A robot that follows motions by computed torque, without a controller.
+    """A robot that follows a motion by computed torque, without a controller.
 
     Parameters
     ----------
     robot : Robot
         The robot.
-    slope : float
-        Angle (rad) at which the ground ascends ahead.
+    motion : Motion
+        Its motion.
     """
 
-    def __init__(self, robot: Robot, slope: float) -> None:
-        self.robot = robot
-        q, v = casadi.SX.sym("q", robot.nv), casadi.SX.sym("v", robot.nv)
-        along = np.array([np.cos(slope), np.sin(slope)])
-        dynamics = TracedDynamics(robot, symbols(q), symbols(v))
-        _, rows, moved = point_rows(dynamics, np.array([-along[1], along[0]]), along)
-        rows = np.vstack([rows, dynamics.loop_jacobian()])
-        moved = np.concatenate([moved, dynamics.loop_bias_acceleration()])
-        force = dynamics.bias_force() - dynamics.passive_force()
-        found = [dynamics.mass_matrix(), force, rows, moved]
-        self._mechanics = casadi.Function("mechanics", [q, v], casadi.cse(
-            [casadi.densify(expression(each)) for each in found]
-        ))  # fmt: skip
+    def __init__(self, robot: Robot, motion: Motion) -> None:
+        self.robot, self.motion = robot, motion
+        self._mechanics = _mechanics_of(robot, motion.slope)
 
-    def missed(self, motion: Motion) -> float:
-        """Largest difference (m, rad, m/s, rad/s) at the end of a whole motion.
+    def missed(self) -> float:
+        """Largest difference (m, rad, m/s, rad/s) at the end of the whole motion.
 
         It is infinite if the motion cannot be integrated.
         """
+        motion = self.motion
         q, v = motion.initial_state.q, motion.initial_state.v
         for p in range(len(motion.phases)):
-            q, v = self._through(motion, p, q, v)
+            q, v = self._through(p, q, v)
             if not np.all(np.isfinite(v)):
                 return np.inf
         return _away(motion, len(motion.phases) - 1, q, v)
 
-    def missed_by_phases(self, motion: Motion) -> Floats:
+    def missed_by_phases(self) -> Floats:
         """Likewise at the end of every phase that begins where it was designed to, (phases,)."""
+        motion = self.motion
         starts = [(each.coordinates(0.0), each.coordinates(0.0, order=1)) for each in motion.phases]
         return np.array(
-            [_away(motion, p, *self._through(motion, p, *start)) for p, start in enumerate(starts)]
+            [_away(motion, p, *self._through(p, *start)) for p, start in enumerate(starts)]
         )
 
-    def _through(self, motion: Motion, p: int, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+    def _through(self, p: int, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """State after a phase, and after what comes down at its end."""
         from scipy.integrate import solve_ivp  # takes long to import
 
-        phase = motion.phases[p]
+        phase = self.motion.phases[p]
         held = self._held(phase.contacts)
         given = _forces(phase)
         for k, (begin, end) in enumerate(pairwise(phase.breakpoints)):
@@ -114,7 +109,7 @@ class Follower:
             q, v = np.split(found.y[:, -1], 2)
             if found.status < 0:
                 return q, np.full(v.size, np.inf)
-        return q, self._landed(motion, p, q, v)
+        return q, self._landed(p, q, v)
 
     def _rate(self, state: Floats, wanted: Floats, held: list[int], exerted: Floats) -> Floats:
         """How the state changes: the possible accelerations nearest to those of computed torque."""
@@ -137,9 +132,9 @@ class Follower:
         system = np.block([[np.diag(price), must.T], [must, np.zeros((len(must), len(must)))]])
         return np.concatenate([v, _solved(system, right)[:n]])
 
-    def _landed(self, motion: Motion, p: int, q: Floats, v: Floats) -> Floats:
+    def _landed(self, p: int, q: Floats, v: Floats) -> Floats:
         """Velocity after a plastic impact of all that stands after a phase, if a point is new."""
-        names = self.robot.contact_names
+        motion, names = self.motion, self.robot.contact_names
         before, last = set(motion.phases[p].contacts), p + 1 == len(motion.phases)
         if last and motion.repeat is Repeat.NEVER:
             return v
@@ -158,6 +153,24 @@ class Follower:
         points = [self.robot.contact_names.index(each) for each in contacts]
         loops = range(2 * self.robot.nc, 2 * self.robot.nc + count_rows(self.robot.model))
         return [*standing(self.robot, points).forces, *loops]
+
+
+@lru_cache(maxsize=4)
+def _mechanics_of(robot: Robot, slope: float) -> Any:
+    """Mass matrix, force, rows that may hold the robot and their J̇v, of positions and velocities.
+
+    It is built once, for all motions that are tried.
+    """
+    q, v = casadi.SX.sym("q", robot.nv), casadi.SX.sym("v", robot.nv)
+    along = np.array([np.cos(slope), np.sin(slope)])
+    dynamics = TracedDynamics(robot, symbols(q), symbols(v))
+    _, rows, moved = point_rows(dynamics, np.array([-along[1], along[0]]), along)
+    rows = np.vstack([rows, dynamics.loop_jacobian()])
+    moved = np.concatenate([moved, dynamics.loop_bias_acceleration()])
+    force = dynamics.bias_force() - dynamics.passive_force()
+    found = [dynamics.mass_matrix(), force, rows, moved]
+    expressions = casadi.cse([casadi.densify(expression(each)) for each in found])
+    return casadi.Function("mechanics", [q, v], expressions)
 
 
 def _away(motion: Motion, p: int, q: Floats, v: Floats) -> float:

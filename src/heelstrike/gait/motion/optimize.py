@@ -555,13 +555,13 @@ def _closed(found: _Found, motion: Motion, report: Callable[[float], None]) -> M
     limit fails by more than it may between instants; if that leads nowhere, what was there before
     stays.
     """
-    follower = Follower(found.program.request.robot, motion.slope)
     for k in count(1):
-        motion = replace(motion, closes_to=follower.missed(motion))
+        follower = Follower(found.program.request.robot, motion)
+        motion = replace(motion, closes_to=follower.missed())
         report(1.0 - 0.1 / (k + 1))
         if motion.closes_to <= CLOSED or not np.isfinite(motion.closes_to):
             break
-        finer = _halved(found.program, follower.missed_by_phases(motion))
+        finer = _halved(found.program, follower.missed_by_phases())
         if finer is None:
             break
         try:
