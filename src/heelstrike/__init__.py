@@ -119,6 +119,7 @@ if TYPE_CHECKING:
     from heelstrike.gait import ContactPhase as ContactPhase
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import GaitFamily as GaitFamily
+    from heelstrike.gait import GaitWarning as GaitWarning
     from heelstrike.gait import Motion as Motion
     from heelstrike.gait import PhasedGait as PhasedGait
     from heelstrike.gait import Planner as Planner
@@ -212,6 +213,7 @@ _HOME = {
     "GaitFamily": "heelstrike.gait",
     "GaitLQR": "heelstrike.control",
     "GaitNotFoundError": "heelstrike.errors",
+    "GaitWarning": "heelstrike.gait",
     "Gradient": "heelstrike.sim.linearized.derivatives",
     "Ground": "heelstrike.contact",
     "GroundShape": "heelstrike.contact",

@@ -8,6 +8,7 @@ from heelstrike.gait.family import GaitFamily, gait_family, load_gait_family
 from heelstrike.gait.file import load_gait
 from heelstrike.gait.gait import Footing, Gait, Phase
 from heelstrike.gait.margins import Margins
+from heelstrike.gait.motion.closing import GaitWarning
 from heelstrike.gait.motion.file import load_motion
 from heelstrike.gait.motion.motion import Motion, MotionPhase
 from heelstrike.gait.motion.obstacle import over_obstacle
@@ -26,6 +27,7 @@ __all__ = [
     "Footing",
     "Gait",
     "GaitFamily",
+    "GaitWarning",
     "Instant",
     "Margins",
     "Motion",

@@ -37,6 +37,9 @@ SHIFT = 1e-15
 """Added to the squares of the singular values of equations (scaled) that may be dependent."""
 MOST_STEPS = 10
 """Steps of Newton's method that satisfy equations."""
+WORSE = 2.0
+"""How many times as much a limit may be violated after equations were satisfied as all was before:
+limits that are held at other instants are violated a little, before and after."""
 ROUNDING = 1e-12
 """Scaled violation of equations that counts as rounding."""
 RESERVE = 1e-6
@@ -385,13 +388,33 @@ class Program:
         return missing[self._gaps :]
 
     def polished(self, unknowns: Floats) -> Floats:
-        """Satisfy the equations to rounding, by the least change of the unknowns."""
+        """Satisfy the equations to rounding, by the least change of the unknowns.
+
+        What is given is returned if that would break a limit by more than it breaks anything.
+        """
         step = np.ptp([self.request.duration_bounds, self.request.length_bounds], axis=1) > 0.0
         free = np.append(np.full(self.size - 2, True), step)
-        return satisfied(
+        found = satisfied(
             unknowns, lambda x: np.array(self._blocks.value(x)[1]).ravel(), self._slopes,
             (self._lower, self._upper), free,
         )  # fmt: skip
+        return found if is_no_worse(self._missing(found), self._missing(unknowns)) else unknowns
+
+    def _missing(self, unknowns: Floats) -> float:
+        """Largest violation of a constraint, or of a bound of the step."""
+        beyond = np.abs(unknowns - self.in_bounds(unknowns)).max()
+        return float(max(beyond, np.abs(self.violations(unknowns)).max()))
+
+
+def is_no_worse(after: float, before: float) -> bool:
+    """Whether unknowns that satisfy equations more nearly break nothing else instead.
+
+    Parameters
+    ----------
+    after, before : float
+        Largest scaled violations.
+    """
+    return after <= max(FEASIBLE, WORSE * before)
 
 
 def satisfied(
@@ -410,15 +433,25 @@ def satisfied(
         Lower and upper bounds.
     free : (n,) array of bool
         Which unknowns may change.
+
+    Returns
+    -------
+    (n,) float
+        Those that came nearest, be it where it began: constraints need not be satisfied.
     """
     import scipy.sparse.linalg
 
     lower, upper = bounds
     exact = np.flatnonzero(lower == upper)
-    found = unknowns.copy()
-    for k in range(MOST_STEPS):
+    found, best, least = unknowns.copy(), unknowns, np.inf
+    for k in range(MOST_STEPS + 1):
         missing = value(found)[exact] - lower[exact]
-        if k >= 3 and np.abs(missing).max(initial=0.0) <= ROUNDING:
+        most = float(np.abs(missing).max(initial=0.0))
+        if k >= 3 and most <= ROUNDING:
+            return found
+        if most < least:
+            best, least = found.copy(), most
+        if k == MOST_STEPS or not np.isfinite(most):
             break
         rows = slopes(found).sparse().tocsr()[exact][:, free]
         # Equations may depend on each other: then, and only then, does the shift matter. They may
@@ -432,8 +465,11 @@ def satisfied(
             format="csc",
         )
         right = np.concatenate([np.zeros(count), missing])
-        found[free] -= scipy.sparse.linalg.splu(system).solve(right)[:count]
-    return found
+        try:
+            found[free] -= scipy.sparse.linalg.splu(system).solve(right)[:count]
+        except RuntimeError:  # exactly singular, for all of the shift
+            break
+    return best
 
 
 class Ipopt:

@@ -8,6 +8,23 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.robot import Robot
 
 
+def row_names(robot: Robot) -> list[str]:
+    """Say what each row of :func:`~heelstrike.dynamics.loop_jacobian` ties, (rows,).
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    list of str
+        Of closed loops, two rows each, along x and z, and of coupled joints.
+    """
+    names = [f"loop {name}" for name in robot.loop_names for _ in range(2)]
+    return names + [f"coupling of {name}" for name in robot.coupling_names]
+
+
 def refuse_loops(
     robot: Robot,
     what: str,

@@ -14,6 +14,7 @@ from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.loops import loop_displacement
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.loops import row_names
 from heelstrike.robot.model import SCALES, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -201,9 +202,7 @@ def check_state(robot: Robot, state: State) -> None:
     open_by = np.abs(loop_displacement(robot, state.q))
     if np.any(open_by > OPEN_LOOP):
         row = int(np.argmax(open_by))
-        names = [f"loop {name}" for name in robot.loop_names for _ in range(2)]
-        names += [f"coupling of {name}" for name in robot.coupling_names]
         raise SimulationError(
-            f"in this state the {names[row]} of robot {robot.name!r} is open by "
+            f"in this state the {row_names(robot)[row]} of robot {robot.name!r} is open by "
             f"{open_by[row]:.3g}; robot.closed(state) is the nearest state in which all hold"
         )

@@ -12,12 +12,14 @@ the ends of its pieces may close all the same.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
 import casadi
 import numpy as np
 
+from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
 from heelstrike.gait.motion.instant import point_rows
@@ -40,6 +42,10 @@ FINE = {"method": "DOP853", "rtol": 3e-11, "atol": 1e-12}
 """How phases are integrated."""
 
 
+class GaitWarning(UserWarning):
+    """A motion was designed, but it is not all that was wanted."""
+
+
 class Follower:
     """A robot that follows a motion by computed torque, without a controller.
 
@@ -53,49 +59,28 @@ class Follower:
 
     def __init__(self, robot: Robot, motion: Motion) -> None:
         self.robot, self.motion = robot, motion
-        q, v = casadi.SX.sym("q", robot.nv), casadi.SX.sym("v", robot.nv)
-        along = np.array([np.cos(motion.slope), np.sin(motion.slope)])
-        dynamics = TracedDynamics(robot, symbols(q), symbols(v))
-        _, rows, moved = point_rows(dynamics, np.array([-along[1], along[0]]), along)
-        rows = np.vstack([rows, dynamics.loop_jacobian()])
-        moved = np.concatenate([moved, dynamics.loop_bias_acceleration()])
-        force = dynamics.bias_force() - dynamics.passive_force()
-        found = [dynamics.mass_matrix(), force, rows, moved]
-        self._mechanics = casadi.Function("mechanics", [q, v], casadi.cse(
-            [casadi.densify(expression(each)) for each in found]
-        ))  # fmt: skip
+        self._mechanics = _mechanics_of(robot, motion.slope)
 
     def missed(self) -> float:
         """Largest difference (m, rad, m/s, rad/s) at the end of the whole motion.
 
         It is infinite if the motion cannot be integrated.
         """
-        q, v = self.motion.initial_state.q, self.motion.initial_state.v
-        for p in range(len(self.motion.phases)):
+        motion = self.motion
+        q, v = motion.initial_state.q, motion.initial_state.v
+        for p in range(len(motion.phases)):
             q, v = self._through(p, q, v)
             if not np.all(np.isfinite(v)):
                 return np.inf
-        return self._away(len(self.motion.phases) - 1, q, v)
+        return _away(motion, len(motion.phases) - 1, q, v)
 
     def missed_by_phases(self) -> Floats:
         """Likewise at the end of every phase that begins where it was designed to, (phases,)."""
-        ends = [0.0, *self.motion.ends[:-1]]
-        starts = [(self.motion.position(t), self.motion.velocity(t)) for t in ends]
-        return np.array(
-            [self._away(p, *self._through(p, *start)) for p, start in enumerate(starts)]
-        )
-
-    def _away(self, p: int, q: Floats, v: Floats) -> float:
-        """Distance from the state in which the motion goes on after a phase."""
         motion = self.motion
-        if not np.all(np.isfinite(v)):
-            return np.inf
-        if p + 1 == len(motion.phases) and motion.repeat is Repeat.NEVER:
-            last = motion.phases[p]
-            there = [last.coordinates(last.duration, order=order) for order in range(2)]
-        else:
-            there = [motion.position(motion.ends[p]), motion.velocity(motion.ends[p])]
-        return float(max(np.abs(q - there[0]).max(), np.abs(v - there[1]).max()))
+        starts = [(each.coordinates(0.0), each.coordinates(0.0, order=1)) for each in motion.phases]
+        return np.array(
+            [_away(motion, p, *self._through(p, *start)) for p, start in enumerate(starts)]
+        )
 
     def _through(self, p: int, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """State after a phase, and after what comes down at its end."""
@@ -145,7 +130,7 @@ class Follower:
         must = np.block([[mass[free] / weight, -rows.T[free]], [rows, np.zeros((count, count))]])
         right = np.concatenate([price * nearest, -force[free, 0] / weight, -moved])
         system = np.block([[np.diag(price), must.T], [must, np.zeros((len(must), len(must)))]])
-        return np.concatenate([v, np.linalg.solve(system, right)[:n]])
+        return np.concatenate([v, _solved(system, right)[:n]])
 
     def _landed(self, p: int, q: Floats, v: Floats) -> Floats:
         """Velocity after a plastic impact of all that stands after a phase, if a point is new."""
@@ -161,13 +146,58 @@ class Follower:
         mass, _, rows, _ = (np.array(each) for each in self._mechanics(q, v))
         rows = rows[self._held(after)]
         inverse = np.linalg.solve(mass, rows.T)
-        return np.asarray(v - inverse @ np.linalg.lstsq(rows @ inverse, rows @ v)[0])
+        return np.asarray(v - inverse @ _solved(rows @ inverse, rows @ v))
 
     def _held(self, contacts: tuple[str, ...]) -> list[int]:
         """Rows that hold the robot."""
         points = [self.robot.contact_names.index(each) for each in contacts]
         loops = range(2 * self.robot.nc, 2 * self.robot.nc + count_rows(self.robot.model))
         return [*standing(self.robot, points).forces, *loops]
+
+
+@lru_cache(maxsize=4)
+def _mechanics_of(robot: Robot, slope: float) -> Any:
+    """Mass matrix, force, rows that may hold the robot and their J̇v, of positions and velocities.
+
+    It is built once, for all motions that are tried.
+    """
+    q, v = casadi.SX.sym("q", robot.nv), casadi.SX.sym("v", robot.nv)
+    along = np.array([np.cos(slope), np.sin(slope)])
+    dynamics = TracedDynamics(robot, symbols(q), symbols(v))
+    _, rows, moved = point_rows(dynamics, np.array([-along[1], along[0]]), along)
+    rows = np.vstack([rows, dynamics.loop_jacobian()])
+    moved = np.concatenate([moved, dynamics.loop_bias_acceleration()])
+    force = dynamics.bias_force() - dynamics.passive_force()
+    found = [dynamics.mass_matrix(), force, rows, moved]
+    expressions = casadi.cse([casadi.densify(expression(each)) for each in found])
+    return casadi.Function("mechanics", [q, v], expressions)
+
+
+def _away(motion: Motion, p: int, q: Floats, v: Floats) -> float:
+    """Distance from the state in which a motion goes on after a phase."""
+    if not np.all(np.isfinite(v)):
+        return np.inf
+    # Not by the time, which may be rounded to either side of a landing.
+    last = p + 1 == len(motion.phases)
+    if last and motion.repeat is Repeat.NEVER:
+        ends = motion.phases[p]
+        there = [ends.coordinates(ends.duration, order=order) for order in range(2)]
+    else:
+        begins = motion.phases[0 if last else p + 1]
+        there = [begins.coordinates(0.0, order=order) for order in range(2)]
+        if last:
+            there = [motion.repeated(x, np.ones(()), order=k) for k, x in enumerate(there)]
+    return float(max(np.abs(q - there[0]).max(), np.abs(v - there[1]).max()))
+
+
+def _solved(system: Floats, right: Floats) -> Floats:
+    """Solve equations of which some may follow from others, as those of two feet that stand do."""
+    size = right.size
+    equations, found = np.column_stack([system, right]), np.zeros(size)
+    if not np.all(np.isfinite(equations)):
+        return np.full(size, np.nan)
+    solve_to_rank(size, equations, np.zeros(size, np.int64), found)
+    return found
 
 
 def _forces(phase: MotionPhase) -> Any:

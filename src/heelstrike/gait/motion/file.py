@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from heelstrike.arguments import takes
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.errors import GaitError, WriteError
 from heelstrike.gait.motion.motion import Motion, MotionPhase
 from heelstrike.gait.motion.request import Repeat
@@ -38,6 +39,12 @@ _VECTORS = {
 }
 
 
+INFINITE = "infinite"
+"""What stands for the distance of a motion that cannot be integrated."""
+_LOOPS = {"loop_force": "loop_force_N", "loop_impulse": "loop_impulse_Ns"}
+"""Entries of forces of loops (N, of some coupled joints N m), and what they were called first."""
+
+
 def save_motion(motion: Motion, path: str | PathLike[str]) -> None:
     """Write a motion to a JSON file, which appears whole or not at all."""
     entries = {
@@ -48,7 +55,7 @@ def save_motion(motion: Motion, path: str | PathLike[str]) -> None:
         "repeat": motion.repeat.value,
         "optimal": motion.optimal,
         "rise_m": motion.rise,
-        **({} if not np.isfinite(motion.closes_to) else {"closes_to": motion.closes_to}),
+        **_closing(motion.closes_to),
         "initial_position": motion.initial_state.q.tolist(),
         "initial_velocity": motion.initial_state.v.tolist(),
         "margins": {name: float(value) for name, value in motion.margins.items()},
@@ -70,13 +77,18 @@ def save_motion(motion: Motion, path: str | PathLike[str]) -> None:
         raise GaitError(str(error)) from error
 
 
+def _closing(closes_to: float) -> dict[str, Any]:
+    """By how much a motion closes, if somebody looked; a number in JSON is finite."""
+    if np.isnan(closes_to):
+        return {}
+    return {"closes_to": closes_to if np.isfinite(closes_to) else INFINITE}
+
+
 def _of_loops(phase: MotionPhase) -> dict[str, Any]:
     """What only robots with loops have."""
     if not phase.loop_force.size:
         return {}
-    return {
-        "loop_force_N": phase.loop_force.tolist(), "loop_impulse_Ns": phase.loop_impulse.tolist()
-    }  # fmt: skip
+    return {name: getattr(phase, name).tolist() for name in _LOOPS}
 
 
 @takes(GaitError)
@@ -105,7 +117,17 @@ def load_motion(path: str | PathLike[str], robot: Robot | None = None) -> Motion
         motion = _motion_of(entries)
         if robot is not None:
             motion.check_robot(robot)
+            _check_rows(motion, count_rows(robot.model))
         return motion
+
+
+def _check_rows(motion: Motion, rows: int) -> None:
+    """Refuse forces of more or fewer rows of loops and coupled joints than there are."""
+    for p, phase in enumerate(motion.phases, start=1):
+        if phase.loop_impulse.size != rows:
+            raise GaitError(
+                f'"loop_force" of phase {p} has {phase.loop_impulse.size} rows where {rows} belong'
+            )
 
 
 def _motion_of(entries: Entries) -> Motion:
@@ -121,7 +143,7 @@ def _motion_of(entries: Entries) -> Motion:
     phases = tuple(_phase_of(each, nv, contact.size) for each in entries.objects("phases"))
     if not phases:
         raise GaitError("a motion needs one phase or more")
-    return Motion(
+    motion = Motion(
         **values,
         phases=phases,
         repeat=entries.member("repeat", Repeat),
@@ -132,9 +154,17 @@ def _motion_of(entries: Entries) -> Motion:
         initial_state=State(position, entries.numbers("initial_velocity", nv)),
         optimal=entries.data.get("optimal") is True,
         rise=entries.number("rise_m") if "rise_m" in entries.data else 0.0,
-        closes_to=entries.number("closes_to") if "closes_to" in entries.data else np.nan,
+        closes_to=_closes_to(entries),
         margins={name: margins.number(name) for name in margins.data},
     )
+    _check_rows(motion, phases[0].loop_impulse.size)
+    return motion
+
+
+def _closes_to(entries: Entries) -> float:
+    if "closes_to" not in entries.data:
+        return np.nan
+    return np.inf if entries.data["closes_to"] == INFINITE else entries.number("closes_to")
 
 
 def _phase_of(entries: Entries, nv: int, nc: int) -> MotionPhase:
@@ -144,16 +174,17 @@ def _phase_of(entries: Entries, nv: int, nc: int) -> MotionPhase:
         raise GaitError('"breakpoints_s" must rise from 0')
     contacts = entries.data.get("contacts")
     names = entries.names("contacts") if contacts else ()
+    force = entries.numbers("force_N", ends.size - 1, None, nc, 2)
     loops: dict[str, Any] = {}
-    if "loop_force_N" in entries.data:
-        loops["loop_force"] = entries.numbers("loop_force_N", ends.size - 1, None, None)
-        rows = loops["loop_force"].shape[2]
-        loops["loop_impulse"] = entries.numbers("loop_impulse_Ns", rows)
+    known = [names for names in zip(*_LOOPS.items(), strict=True) if names[0] in entries.data]
+    for pull, strike in known:
+        loops["loop_force"] = entries.numbers(pull, ends.size - 1, force.shape[1], None)
+        loops["loop_impulse"] = entries.numbers(strike, loops["loop_force"].shape[2])
     return MotionPhase(
         contacts=names,
         breakpoints=ends,
         pieces=pieces,
-        force=entries.numbers("force_N", ends.size - 1, None, nc, 2),
+        force=force,
         impulse=entries.numbers("impulse_Ns", nc, 2),
         **loops,
     )

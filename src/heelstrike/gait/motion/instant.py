@@ -26,6 +26,7 @@ from heelstrike.gait.cost_rate import (
 )
 from heelstrike.gait.motion.rows import Kind
 from heelstrike.gait.rows import Limit, Rows, joint_limits
+from heelstrike.robot.loops import row_names
 from heelstrike.robot.robot import Robot
 
 Symbols = Any
@@ -60,7 +61,8 @@ class MotionFunctions:
         What its constraints mean.
     spending : Block or None
         For costs with corners, as |P| has one: variables are those of the path and, for each of the
-        powers, a bound of what every motor spends, in units of `power`. The cost is theirs, and its
+        powers, a bound of what every motor spends, in units of the robot's weight times its
+        `length` per `second`. The cost is theirs, and its
         constraints keep each above both powers of which the greater is spent. So nothing is
         rounded off, and derivatives are exact. It is None if no cost has corners.
     spending_rows : list of Row
@@ -135,7 +137,7 @@ class MotionFunctions:
             (Kind.LOOP_STILL, tied @ dynamics.v, 1.0),
             (Kind.LOOP_CLOSED, dynamics.loop_displacement(), 1.0),
         ):
-            for name, value in zip(loop_rows(robot), values, strict=True):
+            for name, value in zip(row_names(robot), values, strict=True):
                 rows.add(kind, value, subject=name, upper=0.0, unit=unit)
         self._add_cones(rows, pushes, (Kind.PUSH, Kind.FRICTION), weight)
         for i, name in enumerate(robot.contact_names):
@@ -232,7 +234,7 @@ class MotionFunctions:
             rows.add(Kind.NORMAL_STOP, leaving[2 * i], subject=name, upper=0.0, of=i)
             rows.add(Kind.TANGENT_STOP, leaving[2 * i + 1], subject=name, upper=0.0, of=i)
             rows.add(Kind.LEAVE, leaving[2 * i], subject=name, lower=-LEAVING, of=i)
-        for name, value in zip(loop_rows(robot), tied @ after, strict=True):
+        for name, value in zip(row_names(robot), tied @ after, strict=True):
             rows.add(Kind.LOOP_STOP, value, subject=name, upper=0.0)
         self._add_cones(rows, pushes, (Kind.IMPULSE, Kind.IMPULSE_FRICTION), weight * self.second)
         self.landing_rows = rows.rows
@@ -273,11 +275,6 @@ def point_rows(
         moved = dynamics.bias_acceleration(link, center)[:2]
         bias += [up @ moved, along @ moved]
     return np.array(heights, dtype=object), rows, np.array(bias, dtype=object)
-
-
-def loop_rows(robot: Robot) -> list[str]:
-    """Name of every row of closed loops, along x and z, and of coupled joints."""
-    return [name for name in robot.loop_names for _ in range(2)] + [*robot.coupling_names]
 
 
 LEAVING = 1e-6

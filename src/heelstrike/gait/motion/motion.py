@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field
 from functools import cached_property
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,6 +45,11 @@ class MotionPhase:
     row of :func:`~heelstrike.dynamics.loop_jacobian`; of no size where the robot has none."""
     loop_impulse: Floats = field(default_factory=lambda: np.zeros(0))
     """(rows,) Their impulses at the end of the phase (N s, N m s)."""
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Take up a pickled phase, also one from before forces of loops were kept."""
+        nothing = {"loop_force": np.zeros((0, 0, 0)), "loop_impulse": np.zeros(0)}
+        self.__dict__.update({**nothing, **state})
 
     @property
     def duration(self) -> float:
@@ -154,7 +160,8 @@ class Motion(ShownInNotebooks):
     """What the optimiser was asked to make least, over all phases, in its own unit: not per
     metre."""
     optimal: bool
-    """Whether it is an optimum; if not, it satisfies all constraints nevertheless."""
+    """Whether it is an optimum; if not, it satisfies all constraints nevertheless. Pieces that are
+    halved until the motion closes keep the word on the pieces before."""
     margins: Mapping[str, float]
     """Smallest distance from every kind of limit along the phases, in its unit; those of landings
     are not among them."""
@@ -168,7 +175,7 @@ class Motion(ShownInNotebooks):
     @property
     def duration(self) -> float:
         """Duration of all phases (s)."""
-        return float(sum(phase.duration for phase in self.phases))
+        return float(self.ends[-1])  # not a sum that is rounded otherwise: phases fill it exactly
 
     @property
     def speed(self) -> float:
@@ -243,14 +250,34 @@ class Motion(ShownInNotebooks):
             value[here] = each.coordinates(inside[here] - starts[p], order=order)
         if order and self.repeat is Repeat.NEVER:
             value[rests] = 0.0
+        return self.repeated(value, cycle, order=order)
+
+    def repeated(self, value: Floats, cycle: Floats, *, order: int = 0) -> Floats:
+        """Coordinates of the first cycle as they are in others, (..., nv).
+
+        Parameters
+        ----------
+        value : (..., nv) float
+            Coordinates in the first cycle, or a derivative.
+        cycle : (...) float
+            How many cycles later, whole numbers.
+        order : int
+            0 for positions, 1 for velocities, 2 for accelerations.
+
+        Returns
+        -------
+        (..., nv) float
+            Mirrored, where the motion repeats so, and moved along the ground.
+        """
+        found, many = value.copy(), np.asarray(cycle)[..., None]
         if self.repeat is Repeat.MIRRORED:
             image = self.mirror_sign * value[..., self.mirror_joint]
             image = image + self.mirror_offset if order == 0 else image
-            value = np.where((cycle % 2 == 1)[..., None], image, value)
+            found = np.where(many % 2 == 1, image, found)
         if order == 0:
             along = self.distance * np.array([np.cos(self.slope), np.sin(self.slope)])
-            value[..., :2] += cycle[..., None] * (along + np.array([0.0, self.rise]))
-        return value
+            found[..., :2] += many * (along + np.array([0.0, self.rise]))
+        return found
 
     def check_robot(self, robot: Robot) -> None:
         """Raise a `GaitError` unless the motion was designed for a robot.

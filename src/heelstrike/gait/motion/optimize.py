@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, count
 from typing import Any
 
 import casadi
@@ -23,9 +23,9 @@ from heelstrike.errors import GaitError, GaitNotFoundError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.cost import Cost, OwnConstraint, OwnCost, costs_of
 from heelstrike.gait.gait import fingerprint
-from heelstrike.gait.motion.closing import Follower
+from heelstrike.gait.motion.closing import Follower, GaitWarning
 from heelstrike.gait.motion.guess import guess_of
-from heelstrike.gait.motion.instant import MotionFunctions, loop_rows
+from heelstrike.gait.motion.instant import MotionFunctions
 from heelstrike.gait.motion.motion import Motion, MotionPhase
 from heelstrike.gait.motion.phases import ContactPhase, Standing
 from heelstrike.gait.motion.program import (
@@ -43,11 +43,12 @@ from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.gait.motion.rows import Kind
 from heelstrike.gait.polynomials import Instants
 from heelstrike.gait.program import CLOSE, FEASIBLE
-from heelstrike.robot.loops import refuse_loops
+from heelstrike.robot.loops import refuse_loops, row_names
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.robot.state import State
+from heelstrike.robot.warning import warn
 
 STARTS = ((0.0, 0.95), (0.1, 0.9), (0.0, 0.85))
 """Leans of the trunk (rad) and heights, as shares of that on straight legs, to start from."""
@@ -138,7 +139,10 @@ def optimize_motion(
         the motion may be like, to start from. Only this one is tried then.
     refine : bool
         Whether pieces and instants are added until nothing slips, and limits hold, between those
-        that are looked at. Without, it is a quick sketch to start others from.
+        that are looked at; and pieces halved until the motion closes to 1e-8, by `closes_to`. That
+        integrates the motion each time, which takes about a second, and far longer where an
+        integrator can hardly go on. Not all motions close so nearly: a `GaitWarning` tells of those
+        that do not. Without, it is a quick sketch to start others from.
     starts : int
         Starting points that are tried until one leads to an optimum; between two given states there
         is one.
@@ -156,6 +160,11 @@ def optimize_motion(
         If the robot cannot move this way or an argument makes no sense.
     GaitNotFoundError
         If no motion was found; the message names the constraints that are violated most.
+
+    Warns
+    -----
+    GaitWarning
+        If it was to be refined, but does not close to 1e-8.
 
     Examples
     --------
@@ -195,7 +204,9 @@ def optimize_motion(
         found = _held_between(found)
     motion = motion_of(found.program, found.program.polished(found.unknowns), found.optimal)
     if refine:
-        motion = _closed(found, motion)
+        motion = _closed(found, motion, report)
+        if not motion.closes_to <= PROMISED:
+            warn(_open(motion.closes_to), GaitWarning, again=True)
     report(1.0)
     return motion
 
@@ -315,11 +326,19 @@ def _check_states(request: MotionRequest) -> MotionRequest:
                     f"{names[i]!r} stands, but at the {name} it moves at "
                     f"{np.abs(rows[i]).max():.3g} m/s. Give a state in which it rests."
                 )
-        for loop, away in zip(loop_rows(robot), loop_displacement(robot, state.q), strict=True):
+        speeds = loop_jacobian(robot, state.q) @ state.v
+        apart = loop_displacement(robot, state.q)
+        for row, away, speed in zip(row_names(robot), apart, speeds, strict=True):
+            unit = "m" if row.startswith("loop") else "rad or m"
             if abs(away) > ON_THE_GROUND:
                 raise GaitError(
-                    f"at the {name} loop {loop} is open by {abs(away):.3g}. Close the state with "
-                    "robot.closed."
+                    f"at the {name} the {row} is open by {abs(away):.3g} {unit}. Close the state "
+                    "with robot.closed."
+                )
+            if abs(speed) > ON_THE_GROUND:
+                raise GaitError(
+                    f"at the {name} the {row} opens at {abs(speed):.3g} {unit} per s. Give "
+                    "velocities of all joints that belong together; robot.closed finds them."
                 )
         places = {i: told["start"][i] for i in request.never_lifted} if told else {}
         for i, place in places.items():
@@ -466,10 +485,17 @@ def _solved_to_corners(
     except GaitNotFoundError:
         return _solved(program, _known(program, motion), starts, report)
     start = _resampled(sketch, found.unknowns, program)
+    sketched = _Found(program, start, None, False)
     try:
-        return _again(replace(program, near=CLOSE), start, None)
+        exact = _again(replace(program, near=CLOSE), start, None)
     except GaitNotFoundError:
-        return _Found(program, start, None, False)
+        return sketched
+    return exact if exact.optimal else min(sketched, exact, key=_cost_of)
+
+
+def _cost_of(found: _Found) -> float:
+    """Cost, with no more than what is spent, whatever its bounds are."""
+    return float(found.program.value(found.program.counted(found.unknowns))[0])
 
 
 def _not_found(program: MotionProgram, unknowns: Floats) -> str:
@@ -523,37 +549,69 @@ def _refined(found: _Found) -> _Found:
         found = _again(finer, finer.polished(_resampled(program, unknowns, finer)), None)
 
 
-def _closed(found: _Found, motion: Motion) -> Motion:
-    """Halve pieces of the phases that are off most, until the motion closes.
+def _closed(found: _Found, motion: Motion, report: Callable[[float], None]) -> Motion:
+    """Halve pieces of the phases that are off most, until the motion closes, or as far as it goes.
 
     Where pieces are halved, both halves go on along the polynomial of the whole, and equations are
     satisfied by the least change. So nothing has corners within a piece, as optima on other meshes
     have wherever a limit begins to hold, and errors fall fast. Another optimum is sought only if a
-    limit fails by more than it may between instants.
+    limit fails by more than it may between instants; if that leads nowhere, what was there before
+    stays.
     """
-    while True:
+    for k in count(1):
         follower = Follower(found.program.request.robot, motion)
         motion = replace(motion, closes_to=follower.missed())
+        report(1.0 - 0.1 / (k + 1))
         if motion.closes_to <= CLOSED or not np.isfinite(motion.closes_to):
-            return motion
+            break
         finer = _halved(found.program, follower.missed_by_phases())
         if finer is None:
-            return motion
-        unknowns = finer.polished(_packed(motion.phases, motion.distance, finer))
-        found = _held_between(_Found(finer, unknowns, None, found.optimal))
-        if found.program is not finer:
-            unknowns = found.program.polished(found.unknowns)
-        motion = motion_of(found.program, unknowns, found.optimal)
+            break
+        try:
+            found = _on_halves(finer, motion, found.optimal)
+        except GaitNotFoundError:
+            break
+        motion = motion_of(found.program, found.unknowns, found.optimal)
+    return motion
+
+
+def _on_halves(finer: MotionProgram, motion: Motion, optimal: bool) -> _Found:
+    """Return nearly the same motion on more pieces, its equations satisfied to rounding."""
+    unknowns = finer.polished(_packed(motion.phases, motion.distance, finer))
+    found = _Found(finer, unknowns, None, optimal)
+    equations, limits = finer.missing(unknowns)
+    if equations > FEASIBLE or limits > ALLOWED:
+        found = _again(finer, unknowns, None)
+    found = _held_between(found)
+    if found.multipliers is None:
+        return found
+    return replace(found, unknowns=found.program.polished(found.unknowns))
+
+
+def _open(closes_to: float) -> str:
+    """Say that a motion does not close as it should."""
+    missed = (
+        f"misses the state in which it goes on by {closes_to:.2g} (m, rad, m/s or rad/s), more "
+        f"than {PROMISED:g}"
+        if np.isfinite(closes_to)
+        else "cannot be integrated"
+    )
+    return (
+        f"this motion satisfies its constraints, but followed by computed torque it {missed}; more "
+        "pieces did not help. Look at its closes_to before you rely on it; other durations, or "
+        "pieces of its phases, may lead to a motion that closes."
+    )
 
 
 def _halved(program: MotionProgram, missed: Floats) -> MotionProgram | None:
     """Return the program with twice the pieces in phases that are off most, if these may be."""
     request = program.request
+    before = [phase.pieces for phase in request.phases]
     pieces = [
-        2 * phase.pieces if off >= OFF_MOST * missed.max() else phase.pieces
-        for phase, off in zip(request.phases, missed.tolist(), strict=True)
+        2 * own if off >= OFF_MOST * missed.max() and 2 * own <= SMALLEST_PIECES else own
+        for own, off in zip(before, missed.tolist(), strict=True)
     ]
-    if max(pieces) > SMALLEST_PIECES:
+    if pieces == before:
         return None
     phases = tuple(
         ContactPhase(*phase.contacts, duration=phase.duration, pieces=count)
@@ -605,6 +663,8 @@ def _packed(motion: Sequence[MotionPhase], distance: float, finer: MotionProgram
     )  # fmt: skip
 
 
+PROMISED = 1e-8
+"""Difference (m, rad, m/s, rad/s) beyond which a motion that was to be refined is told to miss."""
 CLOSED = 3e-9
 """Difference (m, rad, m/s, rad/s) within which a motion goes on where it should: a third of what is
 promised, since others integrate otherwise."""

@@ -17,7 +17,7 @@ from heelstrike.gait.motion.phases import Standing
 from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.gait.motion.rows import Kind
 from heelstrike.gait.polynomials import Instants, coefficients, gauss
-from heelstrike.gait.program import NEAR, SETTINGS, Ipopt, satisfied
+from heelstrike.gait.program import NEAR, SETTINGS, Ipopt, is_no_worse, satisfied
 from heelstrike.gait.rows import Row
 from heelstrike.robot.model import Floats
 
@@ -482,17 +482,33 @@ class MotionProgram:
 
     def solve(self, guess: Floats, multipliers: Floats | None = None) -> tuple[Floats, Floats, Any]:
         """Solve from a guess; return the unknowns, the multipliers and what IPOPT tells."""
-        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
-        for p, phase in enumerate(self.request.phases):
-            place = self._ends[PARTS * (p + 1) - 1]
-            lower[place], upper[place] = phase.duration
-        lower[-1], upper[-1] = self.request.distance
+        lower, upper = self._bounds
         more = {} if multipliers is None else {"lam_g0": multipliers}
         found, told = self._solver.solve(
             x0=np.clip(guess, lower, upper), lbx=lower, ubx=upper, lbg=self._lower,
             ubg=self._upper, **more,
         )  # fmt: skip
         return np.array(found["x"]).ravel(), np.array(found["lam_g"]).ravel(), told
+
+    @cached_property
+    def _bounds(self) -> tuple[Floats, Floats]:
+        """Bounds of the unknowns: of durations and the distance."""
+        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        for p, phase in enumerate(self.request.phases):
+            place = self._ends[PARTS * (p + 1) - 1]
+            lower[place], upper[place] = phase.duration
+        lower[-1], upper[-1] = self.request.distance
+        return lower, upper
+
+    def missing(self, unknowns: Floats) -> tuple[float, float]:
+        """Largest violations: of equations, and of limits, those of durations among them."""
+        missing, (lower, upper) = np.abs(self.violations(unknowns)), self._bounds
+        exact = self._lower == self._upper
+        beyond = np.maximum(lower - unknowns, unknowns - upper).max()
+        return (
+            float(missing[exact].max(initial=0.0)),
+            float(max(beyond, missing[~exact].max(initial=0.0))),
+        )
 
     def violations(self, unknowns: Floats) -> Floats:
         """Scaled distances of the constraints outside of their bounds; positive if too low."""
@@ -502,15 +518,17 @@ class MotionProgram:
         return missing
 
     def polished(self, unknowns: Floats) -> Floats:
-        """Satisfy the equations to rounding, by the least change of all that is not given."""
-        free = np.full(self.size, True)
-        for p, phase in enumerate(self.request.phases):
-            free[self._ends[PARTS * (p + 1) - 1]] = phase.duration[0] < phase.duration[1]
-        free[-1] = self.request.distance[0] < self.request.distance[1]
-        return satisfied(
+        """Satisfy the equations to rounding, by the least change of all that is not given.
+
+        What is given is returned if that would break a limit by more than it breaks anything.
+        """
+        free = self._bounds[0] < self._bounds[1]
+        found = satisfied(
             unknowns, lambda x: np.array(self.value(x)[1]).ravel(), self.slopes,
             (self._lower, self._upper), free,
         )  # fmt: skip
+        before, after = (max(self.missing(each)) for each in (unknowns, found))
+        return found if is_no_worse(after, before) else unknowns
 
     def packed(
         self, positions: list[Floats], velocities: list[Floats], accelerations: list[Floats],
