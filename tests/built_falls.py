@@ -103,7 +103,7 @@ KNOWN = {
         Cause.SCUFFED, "right_foot", (2.4, 2.7),
     ),
     "step down": Known(
-        lambda: walk(ground=profile((EDGE, -0.04), (99, -0.04))),
+        lambda: walk(ground=profile((EDGE, -0.05), (99, -0.05))),
         Cause.LATE_TOUCHDOWN, "right_foot", (2.79, 2.81),
     ),
     "weak motors": Known(lambda: weak(9.0), Cause.TORQUE_LIMIT, "right_hip", (0.0, 0.1)),

@@ -20,18 +20,18 @@ def perturb_gaits(size: float) -> None:
     design.designed_gait = perturbed(design.designed_gait, size)  # type: ignore[assignment]
 
 
-def perturbed(designed: Callable[[Any, Any], Any], size: float) -> Callable[[Any, Any], Any]:
+def perturbed(designed: Callable[..., Any], size: float) -> Callable[..., Any]:
     """Have a gait made from perturbed unknowns: the same ones for the same unknowns, always.
 
     Its duration and length, the last two, are what was asked for and stay so; and its equations
     hold to rounding, as they do for every gait that is found.
     """
 
-    def perturbed_gait(program: Any, unknowns: Any) -> Any:
+    def perturbed_gait(program: Any, unknowns: Any, optimal: bool) -> Any:
         seed = hashlib.sha256(np.asarray(unknowns).tobytes()).digest()
         draw = np.random.default_rng(list(seed))
         factor = 1.0 + size * draw.standard_normal(len(unknowns))
         factor[-2:] = 1.0
-        return designed(program, program.polished(unknowns * factor))
+        return designed(program, program.polished(unknowns * factor), optimal)
 
     return perturbed_gait

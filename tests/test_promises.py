@@ -200,5 +200,5 @@ def test_operations_are_those_that_are_recorded() -> None:
         f"{len(results) + read} operations for bravo7: {count[Operation.MULTIPLY]} products, "
         f"{count[Operation.ADD] + count[Operation.SUBTRACT]} sums and differences, "
         f"{count[Operation.NEGATE]} negations, {count[Operation.DIVIDE]} divisions, "
-        f"{sines} sines and cosines, {read} numbers read"
+        f"{sines} sines, {sines} cosines, {read} numbers read"
     ) in " ".join(PERFORMANCE.split())

@@ -153,7 +153,7 @@ def test_what_a_robot_walks_on_with_is_no_cause_of_what_comes_later() -> None:
 
 def test_what_comes_again_no_longer_than_before_is_no_cause() -> None:
     """The knee is at its stop when the push comes; it was so for as long a stride before."""
-    push = hs.Push("trunk", force=(-300.0, 0.0), start=1.75, duration=0.1)
+    push = hs.Push("trunk", force=(-315.0, 0.0), start=1.75, duration=0.1)
     fall = first_cause(falls.walk(robot=with_stop(0.45), pushes=[push]).run(), walking.gait())
     assert fall is not None
     assert (fall.cause, fall.where) == (Cause.TIPPED_BACK, "right_foot")

@@ -44,8 +44,8 @@ def test_a_printed_gait_is_reached(name: str) -> None:
             now, force = mechanics.at(q, v), phase.forces(t)
             needed = now.mass @ a + now.force - np.einsum("ikj,ik->j", now.jacobian, force)
             spent += phase.duration / INSTANTS * float(np.abs(needed * v)[driven].sum())
-            # Without refinement, limits hold at the instants of the design: between them less so.
-            assert np.all(np.abs(needed[driven]) < 1.005 * largest)
+            # Limits hold at the instants of the design; without refinement, only nearly between.
+            assert np.all(np.abs(needed[driven]) < 1.05 * largest)
             legs = biped.longest + q[[robot.joint_names.index(f"{side}_leg") for side in SIDES]]
             assert np.all((legs > biped.shortest - SMALL) & (legs < biped.longest + SMALL))
     cost = spent / (WEIGHT * motion.distance)
