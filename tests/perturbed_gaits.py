@@ -27,11 +27,11 @@ def perturbed(designed: Callable[..., Any], size: float) -> Callable[..., Any]:
     hold to rounding, as they do for every gait that is found.
     """
 
-    def perturbed_gait(program: Any, unknowns: Any, optimal: bool) -> Any:
+    def perturbed_gait(program: Any, unknowns: Any, *others: Any, **options: Any) -> Any:
         seed = hashlib.sha256(np.asarray(unknowns).tobytes()).digest()
         draw = np.random.default_rng(list(seed))
         factor = 1.0 + size * draw.standard_normal(len(unknowns))
         factor[-2:] = 1.0
-        return designed(program, program.polished(unknowns * factor), optimal)
+        return designed(program, program.polished(unknowns * factor), *others, **options)
 
     return perturbed_gait
