@@ -17,7 +17,7 @@ def perturb_gaits(size: float) -> None:
     """Have every gait that this process designs perturbed by `size`, relative to its numbers."""
     from heelstrike.gait import design
 
-    design.designed_gait = perturbed(design.designed_gait, size)  # type: ignore[assignment]
+    design.designed_gait = perturbed(design.designed_gait, size)
 
 
 def perturbed(designed: Callable[..., Any], size: float) -> Callable[..., Any]:
