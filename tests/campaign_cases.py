@@ -1,9 +1,11 @@
-"""Trials that cost next to nothing, and one that walks."""
+"""Trials that cost next to nothing, one that walks, and a controller that cannot be sent."""
 
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
+import numpy as np
 import walking
 
 import heelstrike as hs
@@ -27,3 +29,19 @@ def walks() -> hs.Trial:
         robot=walking.bravo7(), controller=hs.ComputedTorque(walking.bravo7(), gait),
         state=gait.initial_state, step_length=gait.step_length, step_duration=gait.step_duration,
     )  # fmt: skip
+
+
+class Reads:
+    """A controller that reads a file where it is unpickled, which only this machine has."""
+
+    def __init__(self) -> None:
+        self.file = "policy.npz"
+
+    def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
+        return np.zeros(6)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        raise FileNotFoundError(2, "No such file or directory", state["file"])
+
+    def __deepcopy__(self, _: object) -> Reads:
+        return Reads()

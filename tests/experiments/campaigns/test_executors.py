@@ -200,22 +200,6 @@ def test_an_oserror_of_a_trial_is_its_outcome_and_no_loss_of_workers() -> None:
     assert "the motors do not answer" in results.outcomes[1].message
 
 
-class Reads:
-    """A controller that reads a file where it is unpickled, which only this machine has."""
-
-    def __init__(self) -> None:
-        self.file = "policy.npz"
-
-    def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
-        return np.zeros(6)
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        raise FileNotFoundError(2, "No such file or directory", state["file"])
-
-    def __deepcopy__(self, _: object) -> Reads:
-        return Reads()
-
-
 @pytest.mark.parametrize(
     "executor", [Client(), pytest.param(process_pool(1), marks=pytest.mark.slow)]
 )
@@ -223,7 +207,7 @@ def test_what_a_worker_cannot_read_is_no_loss_of_workers_and_no_crash_of_trials(
     tmp_path: Path, executor: Any
 ) -> None:
     """It is told as it is, nothing is kept of it, and the same folder goes on without it."""
-    trial = replace(cases.limp(), controller=Reads())
+    trial = replace(cases.limp(), controller=cases.Reads())
     campaign = hs.Campaign(trial, FRICTION, 40, 3)
     with pytest.raises(SimulationError, match="worker cannot read the trials: FileNotFound") as at:
         campaign.run(tmp_path, executor=executor)
