@@ -72,7 +72,7 @@ def test_a_cluster_comes_to_the_same_to_the_last_bit() -> None:
 
 def test_of_a_block_that_kills_workers_of_a_cluster_only_the_trial_is_lost() -> None:
     alone = made().run(workers=1).outcomes
-    client = Client(lambda block: 40 in block.numbers)
+    client = Client(lambda sent: 40 in sent.block.numbers)
     found = made().run(executor=client).outcomes
     assert found[40].status == "crashed"
     assert "the worker died of it" in found[40].message
@@ -90,9 +90,9 @@ class Cancelled:
 
     left: int
 
-    def __call__(self, block: Any) -> bool:
-        if 40 in block.numbers and self.left > 0:
-            self.left -= len(block.numbers) == 1
+    def __call__(self, sent: Any) -> bool:
+        if 40 in sent.block.numbers and self.left > 0:
+            self.left -= len(sent.block.numbers) == 1
             raise UncompletedJobError("cancelled")
         return False
 
@@ -126,7 +126,7 @@ class Cluster(Client):
         self.state, self.left = state, times
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, pure: bool = True) -> Any:
-        if 40 in arguments[0].numbers and self.left > 0:
+        if 40 in arguments[0].block.numbers and self.left > 0:
             self.left -= 1
             return Ended(self.state)
         return super().submit(function, *arguments, pure=pure)

@@ -12,6 +12,7 @@ import pickle
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 from functools import lru_cache
 from importlib import import_module
 from typing import Any
@@ -29,12 +30,8 @@ class SentBlock:
 
     trials: bytes
     """Pickled trials, by their names."""
-    numbers: tuple[int, ...]
-    values: tuple[Mapping[str, Any], ...]
-    seeds: tuple[int, ...]
-    duration: float
-    limit: float | None
-    """numbers, values, seeds, duration, limit: As of a :class:`Block`."""
+    block: Block
+    """All else of it."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +53,7 @@ def work_on(sent: SentBlock) -> list[Outcome] | Unread:
         trials = _read(sent.trials)
     except Exception as error:
         return Unread(f"{type(error).__name__}: {error}")
-    return run_block(
-        Block(trials, sent.numbers, sent.values, sent.seeds, sent.duration, sent.limit)
-    )
+    return run_block(replace(sent.block, trials=trials))
 
 
 @lru_cache(maxsize=1)
@@ -85,9 +80,7 @@ class Elsewhere:
         """Send a block; return what has its ``result()``, which :func:`outcomes_of` looks at."""
         if isinstance(self._executor, ThreadPoolExecutor):
             return self._executor.submit(run_block, block)
-        sent = SentBlock(
-            self._trials(), block.numbers, block.values, block.seeds, block.duration, block.limit
-        )
+        sent = SentBlock(self._trials(), replace(block, trials={}))
         return self._executor.submit(work_on, sent)
 
     def shutdown(self) -> None:
