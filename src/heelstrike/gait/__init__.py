@@ -8,11 +8,10 @@ from heelstrike.gait.family import GaitFamily, gait_family, load_gait_family
 from heelstrike.gait.file import load_gait
 from heelstrike.gait.gait import Footing, Gait, Phase
 from heelstrike.gait.margins import Margins
-from heelstrike.gait.motion.closing import GaitWarning
 from heelstrike.gait.motion.file import load_motion
 from heelstrike.gait.motion.motion import Motion, MotionPhase
 from heelstrike.gait.motion.obstacle import over_obstacle
-from heelstrike.gait.motion.optimize import optimize_motion
+from heelstrike.gait.motion.optimize import GaitWarning, optimize_motion
 from heelstrike.gait.motion.phases import ContactPhase
 from heelstrike.gait.motion.request import Repeat
 from heelstrike.gait.optimize import optimize_gait

@@ -21,8 +21,12 @@ def row_names(robot: Robot) -> list[str]:
     list of str
         Of closed loops, two rows each, along x and z, and of coupled joints.
     """
-    names = [f"loop {name}" for name in robot.loop_names for _ in range(2)]
-    return names + [f"coupling of {name}" for name in robot.coupling_names]
+    return _ties(robot, rows_of_a_loop=2)
+
+
+def _ties(robot: Robot, rows_of_a_loop: int = 1) -> list[str]:
+    loops = [f"loop {name}" for name in robot.loop_names for _ in range(rows_of_a_loop)]
+    return loops + [f"coupling of {name}" for name in robot.coupling_names]
 
 
 def refuse_loops(
@@ -51,8 +55,7 @@ def refuse_loops(
     Exception
         Of this kind, that names the loops.
     """
-    found = [f"loop {name}" for name in robot.loop_names if loops]
-    found += [f"coupling of {name}" for name in robot.coupling_names if loops]
+    found = _ties(robot) if loops else []
     found += [f"latch of {name}" for name in robot.latch_names if latches]
     if found:
         raise kind(

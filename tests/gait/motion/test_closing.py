@@ -119,7 +119,7 @@ def test_one_that_does_not_close_is_told(why: str, monkeypatch: pytest.MonkeyPat
         raise hs.GaitNotFoundError("no such motion")
 
     if why == "at the limit of pieces":
-        monkeypatch.setattr(optimize, "SMALLEST_PIECES", 2)
+        monkeypatch.setattr(optimize, "MOST_HALVED", 2)
     else:
         monkeypatch.setattr(optimize, "_on_halves", fails)
     rabbit = hs.load_robot("rabbit")
@@ -145,7 +145,7 @@ def test_progress_goes_on_while_it_is_made_to_close(recwarn: pytest.WarningsReco
 
 
 def test_each_phase_has_a_limit_of_pieces_of_its_own(monkeypatch: Any) -> None:
-    monkeypatch.setattr(optimize, "SMALLEST_PIECES", 8)
+    monkeypatch.setattr(optimize, "MOST_HALVED", 8)
     phases = [
         hs.ContactPhase("right_tibia", duration=0.2, pieces=6),
         hs.ContactPhase(duration=0.1, pieces=3),

@@ -6,7 +6,6 @@ integrated phase by phase.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 
 import casadi
@@ -126,9 +125,8 @@ def test_a_design_that_may_not_be_halved_tells_what_it_misses(
 ) -> None:
     robot = hs.load_robot("rabbit")
     phase = hs.ContactPhase("right_tibia", duration=0.6, pieces=4)
-    monkeypatch.setattr(optimize, "SMALLEST_PIECES", 4)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
+    monkeypatch.setattr(optimize, "MOST_HALVED", 4)
+    with pytest.warns(hs.GaitWarning, match="misses the state"):
         motion = hs.optimize_motion(robot, [phase], distance=0.25)
     assert len(motion.phases[0].pieces) == 4
     assert 10.0 * CLOSED < motion.closes_to < 1e-4

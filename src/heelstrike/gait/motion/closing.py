@@ -42,10 +42,6 @@ FINE = {"method": "DOP853", "rtol": 3e-11, "atol": 1e-12}
 """How phases are integrated."""
 
 
-class GaitWarning(UserWarning):
-    """A motion was designed, but it is not all that was wanted."""
-
-
 class Follower:
     """A robot that follows a motion by computed torque, without a controller.
 

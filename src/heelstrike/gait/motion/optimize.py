@@ -23,7 +23,7 @@ from heelstrike.errors import GaitError, GaitNotFoundError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.cost import Cost, OwnConstraint, OwnCost, costs_of
 from heelstrike.gait.gait import fingerprint
-from heelstrike.gait.motion.closing import Follower, GaitWarning
+from heelstrike.gait.motion.closing import Follower
 from heelstrike.gait.motion.guess import guess_of
 from heelstrike.gait.motion.instant import MotionFunctions
 from heelstrike.gait.motion.motion import Motion, MotionPhase
@@ -59,6 +59,10 @@ FINER = 5
 OWN_FINER = 5
 """How many times as many these are for constraints of one's own, which may have corners. Odd: each
 instant of the others is in the middle of some."""
+
+
+class GaitWarning(UserWarning):
+    """A motion was designed, but it is not all that was wanted."""
 
 
 @takes(GaitError)
@@ -608,7 +612,7 @@ def _halved(program: MotionProgram, missed: Floats) -> MotionProgram | None:
     request = program.request
     before = [phase.pieces for phase in request.phases]
     pieces = [
-        2 * own if off >= OFF_MOST * missed.max() and 2 * own <= SMALLEST_PIECES else own
+        2 * own if off >= OFF_MOST * missed.max() and 2 * own <= MOST_HALVED else own
         for own, off in zip(before, missed.tolist(), strict=True)
     ]
     if pieces == before:
@@ -670,8 +674,8 @@ CLOSED = 3e-9
 promised, since others integrate otherwise."""
 OFF_MOST = 0.1
 """Share of the largest error of a phase from which on the pieces of another are halved, too."""
-SMALLEST_PIECES = 192
-"""Pieces of a phase beyond which they are not halved."""
+MOST_HALVED = 192
+"""Pieces that a phase may come to have where they are halved, so that a motion closes."""
 STILL = 3e-4
 """Velocity (m/s) that a point that stands may have between the ends of pieces."""
 MOST_PIECES = 48
