@@ -54,6 +54,28 @@ def _forces(run: SpatialRun) -> tuple[str, list[Panel]]:
     return "contact forces on the robot", panels
 
 
+def _gaps(run: SpatialRun) -> tuple[str, list[Panel]]:
+    """Distance of the contact points to the ground; of many points, the lowest of each link."""
+    robot = run.robot
+    if robot.nc <= MOST_NAMED:
+        return _quantity(run, "gap")
+    links = robot.model.contact_link
+    label, unit = RECORDED["gap"].label, RECORDED["gap"].unit
+    curves = [
+        Curve(
+            np.nanmin(run.gap[:, links == link], axis=1),
+            in_words(robot.link_names[link]),
+            _look(number),
+        )
+        for number, link in enumerate(np.unique(links).tolist())
+    ]
+    panels = [
+        Panel(unit, curves[first : first + OF_A_PANEL])
+        for first in range(0, len(curves), OF_A_PANEL)
+    ]
+    return f"{label}, the lowest point of each link", panels
+
+
 def _zero_moment_point(run: SpatialRun) -> tuple[str, list[Panel]]:
     """Zero moment point in the world, and how far inside the support polygon it is."""
     found = spatial_zero_moment_point(run)
@@ -75,6 +97,7 @@ def _zero_moment_point(run: SpatialRun) -> tuple[str, list[Panel]]:
 _DRAWINGS: dict[str, Callable[[SpatialRun], tuple[str, list[Panel]]]] = {
     "forces": _forces,
     "zmp": _zero_moment_point,
+    "gap": _gaps,
 }
 
 FIGURES = tuple(_DRAWINGS)
@@ -163,12 +186,13 @@ def _quantity(run: SpatialRun, name: str) -> tuple[str, list[Panel]]:
     along = names[dims[0]]
     if not along:
         raise ViewError(f"robot {run.robot.name!r} has no {dims[0]}s: there is nothing to show")
+    unit = IN_SPACE.unit_along(run.robot, dims[0], len(along), quantity.unit)
     components = COMPONENTS[dims[1]] if len(dims) > 1 else ("",)
     table: Floats = values.reshape(len(run.time), len(along), -1)
     together = OF_A_PANEL if len(along) <= MOST_NAMED else len(along)
     panels = [
         Panel(
-            quantity.unit,
+            unit,
             [
                 Curve(table[:, i, k], in_words(along[i]), _look(i - first))
                 for i in range(first, min(first + together, len(along)))

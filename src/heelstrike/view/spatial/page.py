@@ -18,7 +18,7 @@ from heelstrike.sim.spatial.run import SpatialEvent, SpatialRun
 from heelstrike.view.page.columns import TOLERANCE, packed
 from heelstrike.view.page.markup import data_block, document, escaped, shipped, table
 from heelstrike.view.page.page import MOST_EVENTS, MOST_PHASES, check_page
-from heelstrike.view.page.provenance import versions
+from heelstrike.view.page.provenance import method_in_words, versions
 from heelstrike.view.page.rows import MOST_ROWS, Rows, rows_about
 from heelstrike.view.page.verdict import Verdict, happened
 from heelstrike.view.spatial.events import OF_POINTS
@@ -214,7 +214,7 @@ def certificates_in_space(run: SpatialRun) -> dict[str, str]:
 def provenance_in_space(run: SpatialRun, command: str = "") -> dict[str, str]:
     """Say where a run comes from, label by label."""
     robot, ground = run.robot, run.ground
-    normal = ", ".join(f"{float(value):.4g}" for value in np.asarray(ground.normal))
+    normal = ", ".join(f"{float(value) + 0.0:.4g}" for value in np.asarray(ground.normal))
     return {
         **({"command": command} if command else {}),
         **versions(),
@@ -222,7 +222,7 @@ def provenance_in_space(run: SpatialRun, command: str = "") -> dict[str, str]:
         f"actuators, {robot.nc} contact points",
         "ground": f"plane with normal ({normal}), {len(ground.boxes)} boxes, friction "
         f"{ground.friction:g}, restitution {ground.restitution:g}",
-        "method": repr(run.method),
+        "method": method_in_words(run),
         "record": f"{run.steps} steps, {len(run.time)} rows from {run.time[0]:.6g} s to "
         f"{run.time[-1]:.6g} s, {len(run.events)} events",
     }
