@@ -4,7 +4,7 @@ It computes in double precision, on the processor. Its kernels are compiled wher
 for minutes the first time on a machine; after that they are read from its cache.
 
 The robot is as we have it: without the armature of 0.1 kg m² that Genesis gives to joints of MJCF
-that have none. Its contact points are spheres of at least `LEAST_SPHERE`, which touch the ground
+that have none. Its contact points are spheres of at least `FINEST_SPHERE`, which touch the ground
 where ours do.
 """
 
@@ -24,7 +24,7 @@ shared = runpy.run_path(str(Path(__file__).with_name("exchange.py")))
 Server, Tree = shared["Server"], shared["Tree"]
 settings_of = shared["settings_of"]
 
-LEAST_SPHERE = 1e-4
+FINEST_SPHERE = 1e-4
 """Least radius of a contact point, in m: Genesis has no points, and fails on a grid of smaller
 ones."""
 
@@ -181,8 +181,8 @@ def mjcf(tree: Any) -> str:
         link = tree.links[i]
         inertia = link["inertia"]
         geoms = "".join(
-            f'<geom type="sphere" size="{numbers(max(radius, LEAST_SPHERE))}" '
-            f'pos="{numbers(x, 0.0, z + max(radius, LEAST_SPHERE) - radius)}"/>'
+            f'<geom type="sphere" size="{numbers(max(radius, FINEST_SPHERE))}" '
+            f'pos="{numbers(x, 0.0, z + max(radius, FINEST_SPHERE) - radius)}"/>'
             for _, x, z, radius in link["points"]
         )
         children = "".join(
