@@ -55,7 +55,8 @@ def test_what_is_taken_for_granted_is_so(method: hs.sim.Method, name: str) -> No
     work = work_of(method, robot)
     fixed = dict(fixed_for(robot, ground, work, method))
     seven_links = method.usual_extents == SEVEN_LINKS and name != "rabbit"
-    assert fixed == dict(PLAIN) | method.usual_numbers | (SEVEN_LINKS if seven_links else {})
+    extents = SEVEN_LINKS if seven_links else {}
+    assert fixed == {**dict(PLAIN), **method.usual_numbers, **extents}
     assert not contradictions([robot.model, ground, allocate_memory(robot), work], fixed)
     other = dict.fromkeys(fixed, 3)
     assert contradictions([robot.model, ground, allocate_memory(robot), work], other)

@@ -64,5 +64,5 @@ def test_points_of_a_sole_share_friction_as_far_as_their_cones_reach(part: float
             general = solve_contact(delassus, free, friction).impulse
             np.testing.assert_allclose(answer.impulse.reshape(4, 2), general, atol=1e-9)
             halves = pressed[:, 1].reshape(2, 2).mean(axis=1).repeat(2)
-            edges += np.any(np.abs(halves) > friction * pressed[:, 0])
+            edges += bool(np.any(np.abs(halves) > friction * pressed[:, 0]))
     assert edges >= (10 if 0.5 < part < 1.0 else 0)
