@@ -16,7 +16,7 @@ acts at once and a simulation can be stopped, kept and taken up again at any ste
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import lru_cache
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -278,7 +278,8 @@ def frame(kernels: Kernels) -> Callable[..., int]:
 
 PLAIN: Fixed = (
     ("loops", 0), ("couplings", 0), ("latches", 0), ("brakes", 0), ("loop_rows", 0), ("nd", 0),
-    ("segments", 1), ("concave", 0), ("curved", 0), ("constraints", 0), ("ties", 0),
+    ("segments", 1), ("concave", 0), ("curved", 0), ("constraints", 0), ("ties", 0), ("axes", 2),
+    ("components", 2),
 )  # fmt: skip
 """What a robot and a ground without rarer features have none of.
 
@@ -287,15 +288,25 @@ constraints from outside, profiles or curves.
 """
 
 
-def fixed_for(robot: AnyRobot, ground: Any, work: Any, usual: Mapping[str, int]) -> Fixed:
+SEVEN_LINKS = {"nl": 9, "nj": 9, "nq": 9, "nv": 9, "nu": 6, "nc": 4}
+"""Extents of a biped of seven links that stands on heels and toes, as most are.
+
+Most loops of a step are as short as these: where they end costs as much as what they do.
+"""
+
+
+def fixed_for(robot: AnyRobot, ground: Any, work: Any, way: Any) -> Fixed:
     """Return what the loop of a simulation can take for granted: all that is rare, or nothing.
 
-    Two loops a method are enough: each is compiled when it is first needed. In space there is one.
+    So a method has two loops, and a third where it names the usual extents of robots; `way` is the
+    method. Each is compiled when it is first needed. In space there is one.
     """
     plain = dimension_of(robot).is_plain(robot, ground)
-    if not (plain and all(getattr(work, name) == value for name, value in usual.items())):
+    if not (plain and all(getattr(work, name) == it for name, it in way.usual_numbers.items())):
         return ()
-    return PLAIN + tuple(usual.items())
+    fixed, extents = PLAIN + tuple(way.usual_numbers.items()), robot.model.extents
+    usual = all(extents[name] == size for name, size in way.usual_extents.items())
+    return fixed + tuple(way.usual_extents.items()) if usual else fixed
 
 
 @lru_cache
