@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -60,6 +60,37 @@ def test_what_is_taken_for_granted_is_so(method: hs.sim.Method, name: str) -> No
     assert not contradictions([robot.model, ground, allocate_memory(robot), work], fixed)
     other = dict.fromkeys(fixed, 3)
     assert contradictions([robot.model, ground, allocate_memory(robot), work], other)
+
+
+class Other(hs.Bundle):
+    """Part of a method from outside: names of the package for things of its own."""
+
+    components: int = hs.number(int)
+    nc_values: Any = hs.array("nc")
+
+
+class Outside(hs.Bundle):
+    """A method from outside."""
+
+    own: Other = hs.part(Other)
+
+
+@pytest.mark.parametrize(("components", "nc"), [(2, 4), (3, 4), (2, 8)])
+def test_a_method_from_outside_may_use_the_same_names(components: int, nc: int) -> None:
+    work = Outside.allocate(own=Other.allocate(nc=nc, components=components))
+    robot, ground = hs.load_robot("bravo7"), hs.Ground().model()
+    fixed = dict(fixed_for(robot, ground, work, replaced_numbers()))
+    assert ("components" in fixed) == (components == 2)
+    assert ("nc" in fixed) == (components == 2 and nc == 4)
+
+
+def replaced_numbers() -> TimeStepping:
+    """Time stepping without numbers of its own, but with its extents."""
+
+    class Extents(TimeStepping):
+        usual_numbers: ClassVar[dict[str, int]] = {}
+
+    return Extents()
 
 
 def test_what_is_rare_has_the_loop_that_knows_it() -> None:

@@ -19,7 +19,7 @@ import enum
 from collections.abc import Callable
 from functools import lru_cache
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from numba import types
 
@@ -40,6 +40,9 @@ from heelstrike.sim.dimension import AnyRobot, dimension_of
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record, RowsAndEvents
 from heelstrike.sim.record.recording import center_height, note_log, note_row_when_due, sound
+
+if TYPE_CHECKING:  # which have the loops that are made here
+    from heelstrike.sim.method import Method
 
 
 class Outcome(enum.IntEnum):
@@ -295,18 +298,34 @@ Most loops of a step are as short as these: where they end costs as much as what
 """
 
 
-def fixed_for(robot: AnyRobot, ground: Any, work: Any, way: Any) -> Fixed:
+def fixed_for(robot: AnyRobot, ground: Any, work: Any, way: Method) -> Fixed:
     """Return what the loop of a simulation can take for granted: all that is rare, or nothing.
 
     So a method has two loops, and a third where it names the usual extents of robots; `way` is the
     method. Each is compiled when it is first needed. In space there is one.
     """
-    plain = dimension_of(robot).is_plain(robot, ground)
-    if not (plain and all(getattr(work, name) == it for name, it in way.usual_numbers.items())):
+    plain = PLAIN + tuple(way.usual_numbers.items())
+    if not (dimension_of(robot).is_plain(robot, ground) and agrees(work, plain)):
         return ()
-    fixed, extents = PLAIN + tuple(way.usual_numbers.items()), robot.model.extents
+    extents, seven = robot.model.extents, plain + tuple(way.usual_extents.items())
     usual = all(extents[name] == size for name, size in way.usual_extents.items())
-    return fixed + tuple(way.usual_extents.items()) if usual else fixed
+    return seven if usual and agrees(work, seven) else plain
+
+
+def agrees(bundle: Any, fixed: Fixed) -> bool:
+    """Whether a bundle and its parts have what is taken for granted of extents and numbers.
+
+    Those of the package have. A method from outside may use the same names for something else.
+    """
+    known, extents = dict(fixed), bundle.extents
+    if any(size != known.get(name, size) for name, size in extents.items()):
+        return False
+    for name, member in bundle.declared.items():
+        if member.role == "part" and not agrees(getattr(bundle, name), fixed):
+            return False
+        if member.role == "number" and name in known and getattr(bundle, name) != known[name]:
+            return False
+    return True
 
 
 @lru_cache

@@ -2,9 +2,10 @@
 
 Sticking contacts make one symmetric system. Vertices of one flat foot share their tangential row,
 so that only the sum of their friction is determined; among all splits the equal one has the least
-norm. Rows may depend on each other otherwise, as those of two feet under straight legs do. Whatever
-is less usual - slip, or friction that this split cannot hold - is left to the general way, and the
-certificate decides as always.
+norm. Where a vertex cannot hold its share, the others hold what is left, as far as their cones
+reach. Rows may depend on each other otherwise, as those of two feet under straight legs do.
+Whatever is less usual, as slip is, is left to the general way, and the certificate decides as
+always.
 """
 
 from __future__ import annotations
