@@ -6,6 +6,7 @@ The kernels run as plain Python: nothing is compiled for so small problems.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -98,7 +99,7 @@ def test_the_units_are_those_of_the_documentation() -> None:
     """β = max |b_i| s_c with s_c = 1/√max diag W_cc; impulses count in β s_c, and come back."""
     problem, work = posed(0)
     diagonal = np.diag(problem.delassus)
-    s = np.array([1.0 / math.sqrt(max(diagonal[a:b])) for a, b in zip(FIRST, FIRST[1:])])
+    s = np.array([1.0 / math.sqrt(max(diagonal[a:b])) for a, b in pairwise(FIRST)])
     rows = np.repeat(s, np.diff(FIRST))
     beta = np.max(np.abs(problem.free) * rows)
     scaled = work.scaled
@@ -427,7 +428,7 @@ def test_rows_that_stick_are_listed() -> None:
 
 def test_what_is_held_is_held_by_the_shortest_impulses() -> None:
     """Of a singular matrix too: those of the pseudoinverse."""
-    problem, work = posed(8, freedoms=4)
+    _, work = posed(8, freedoms=4)
     newton, scaled = work.newton, work.scaled
     row = np.array([0, 1, 2, 5, 6])
     newton.row[:5] = row
