@@ -24,12 +24,6 @@ Run, from the top folder, on a system that forks::
 
 Everything is kept in ``build/mutations``. After tests were added, ``reach`` with their paths says
 what they reach. ``explained.json`` beside this file tells of survivors why they survive.
-
-Rooms without kernels are judged faster by tests that run compiled: with ``--compiled`` and their
-paths no ``reach`` is needed, for the process that asks has run all of them once before. Nothing
-but the rooms is traced then. Tests marked slow are left out::
-
-    python benchmarks/mutations/campaign.py run --room gait/phased --compiled tests/gait/phased
 """
 
 from __future__ import annotations
@@ -63,7 +57,6 @@ PACKAGE = HOME / "src" / "heelstrike"
 STATE = HOME / "build" / "mutations"
 COPY = STATE / f"copy-{os.getpid()}"
 REACH = STATE / "reach.jsonl"
-REACH_COMPILED = STATE / "reach-compiled.jsonl"
 LEDGER = STATE / "ledger.jsonl"
 VERDICT = COPY / "verdict.json"
 EXPLAINED = HERE / "explained.json"
@@ -120,8 +113,7 @@ def environment(**setting: str) -> dict[str, str]:
     return {"CI": "1", "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **setting}
 
 
-PLAIN = ("-p", "plain_kernels")
-OPTIONS = ("-p", "reach", "-q", "--tb=line", "--assert=plain")
+OPTIONS = ("-p", "plain_kernels", "-p", "reach", "-q", "--tb=line", "--assert=plain")
 UNCHANGED = ("-o", f"cache_dir={STATE / 'pytest'}")
 """Gaits are kept from one call to the next, where it is sure that no mutant designed them."""
 CHANGED = ("-p", "no:cacheprovider")
@@ -130,7 +122,7 @@ CHANGED = ("-p", "no:cacheprovider")
 def pytest_afresh(arguments: Iterable[str], **setting: str) -> int | None:
     """Run pytest on the copy in a new process; return its exit status, None if it never ended."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "pytest", *PLAIN, *OPTIONS, *arguments],
+        [sys.executable, "-m", "pytest", *OPTIONS, *arguments],
         cwd=COPY,
         env=os.environ | environment(**setting),
         stdout=subprocess.DEVNULL,
@@ -166,14 +158,14 @@ def reach(paths: list[str]) -> None:
 
 
 class Reached:
-    """Which tests reach a line, from a file that :func:`reach` wrote."""
+    """Which tests reach a line, from the file that :func:`reach` wrote."""
 
-    def __init__(self, path: Path = REACH) -> None:
+    def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
         self.lines: dict[tuple[str, int], set[str]] = {}
         self.functions: dict[tuple[str, int], set[str]] = {}
         self.files: dict[str, set[str]] = {}
-        newest = {each["test"]: each for each in read_lines(path)}
+        newest = {each["test"]: each for each in read_lines(REACH)}
         for name, each in newest.items():
             if not each["passed"]:
                 continue
@@ -260,19 +252,14 @@ def key(mutant: Mutant) -> tuple[str, str, str, str]:
 class Asker:
     """Asks the tests about mutants, from within pytest, which has collected all of them."""
 
-    def __init__(self, mutants: list[Mutant], *, compiled: bool = False) -> None:
+    def __init__(self, mutants: list[Mutant]) -> None:
         self.mutants = mutants
-        self.compiled = compiled
-        self.reached = Reached(REACH_COMPILED if compiled else REACH)
+        self.reached = Reached()
 
     def pytest_runtestloop(self, session: Any) -> bool:
         """Take the place of pytest's own loop over the tests."""
         self.items = {item.nodeid: item for item in session.items}
-        if self.compiled:
-            trace([item for item in session.items if item.nodeid not in self.reached.seconds])
-            self.reached = Reached(REACH_COMPILED)
-        else:
-            prepare()
+        prepare()
         for place, mutant in enumerate(self.mutants):
             found = self.ask(mutant)
             with LEDGER.open("a") as ledger:
@@ -353,17 +340,6 @@ class Asker:
             target.write_text(text)
 
 
-def trace(items: list[Any]) -> None:
-    """Run tests as they are, except slow ones, and note what they reach."""
-    verdict = os.environ.pop("VERDICT")
-    os.environ["REACH"] = str(REACH_COMPILED)
-    quick = [item for item in items if item.get_closest_marker("slow") is None]
-    for item, following in zip(quick, [*quick[1:], None], strict=True):
-        item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
-    del os.environ["REACH"]
-    os.environ["VERDICT"] = verdict
-
-
 def prepare() -> None:
     """Do once what many tests begin with."""
     walking = importlib.import_module("walking")
@@ -378,26 +354,19 @@ def forget(package: str) -> None:
         os.environ["HEELSTRIKE_KEEP_GAITS"] = "0"
 
 
-def run(
-    mutants: list[Mutant], *, again: bool = False, compiled: Sequence[str] = (),
-    rooms: Sequence[str] = (),
-) -> None:  # fmt: skip
-    """Ask for all mutants that the ledger does not know, or for all; perhaps of compiled tests."""
+def run(mutants: list[Mutant], *, again: bool = False) -> None:
+    """Ask for all mutants that the ledger does not know, or for all."""
     import pytest
 
     copy_sources()
     known = set() if again else {_entry_key(each) for each in read_lines(LEDGER)}
-    left = [mutant for mutant in mutants if key(mutant) not in known]
-    asker = Asker(left, compiled=bool(compiled))
+    asker = Asker([mutant for mutant in mutants if key(mutant) not in known])
     os.chdir(COPY)
     setting = {"DEADLINE": str(DEADLINE), "VERDICT": str(VERDICT)}
-    if compiled:  # the first test that needs a kernel waits for it to be compiled
-        setting |= {"DEADLINE": str(LONGEST), "ROOMS": " ".join(rooms)}
     os.environ.update(environment(**setting))
     sys.path[:0] = [str(COPY / "src"), str(HERE)]
-    files = compiled or sorted({test.split("::")[0] for test in asker.reached.seconds})
-    options = (*(() if compiled else PLAIN), *OPTIONS, *CHANGED)
-    pytest.main([*options, "-s", *files], plugins=[asker])
+    files = sorted({test.split("::")[0] for test in asker.reached.seconds})
+    pytest.main([*OPTIONS, *CHANGED, "-s", *files], plugins=[asker])
 
 
 def _entry_key(entry: dict[str, Any]) -> tuple[str, ...]:
@@ -465,7 +434,6 @@ def main() -> None:
         command.add_argument("--number", type=int, default=160)
         command.add_argument("--package", action="append", choices=list(SHARES))
         command.add_argument("--room", nargs="+", default=[], help="files or folders to draw from")
-        command.add_argument("--compiled", nargs="+", default=[], help="tests to ask, compiled")
     asked = parser.parse_args()
     STATE.mkdir(parents=True, exist_ok=True)
     if asked.command == "reach":
@@ -475,9 +443,9 @@ def main() -> None:
     if asked.package:
         mutants = [m for m in mutants if m.file.split("/")[0] in asked.package]
     if asked.command == "run":
-        run(mutants, compiled=asked.compiled, rooms=asked.room)
+        run(mutants)
     elif asked.command == "again":
-        run(survivors(mutants), again=True, compiled=asked.compiled, rooms=asked.room)
+        run(survivors(mutants), again=True)
     elif asked.command == "list":
         for mutant in mutants:
             print(mutant.kind, *key(mutant), sep="\t")

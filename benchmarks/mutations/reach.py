@@ -3,9 +3,8 @@
 With ``REACH`` set to a file, one line of JSON is appended to it for every test: its name, whether
 it passed, its seconds of processor time, and the lines and functions of the package that ran in it.
 Lines of a function are looked at during its first calls only, functions always. With ``DEADLINE``
-set, a test that takes more seconds of processor time fails. With ``ROOMS`` set to files or folders
-of the package, nothing else is looked at. With ``ORDER`` set to a file of names, tests run in that
-order. With ``VERDICT`` set, the first failure and its words are written there.
+set, a test that takes more seconds of processor time fails. With ``ORDER`` set to a file of names,
+tests run in that order. With ``VERDICT`` set, the first failure and its words are written there.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ import pytest
 import heelstrike
 
 HOME = str(Path(heelstrike.__file__).parent)
-ROOMS = tuple(f"{HOME}/{room}" for room in os.environ.get("ROOMS", "").split()) or (HOME,)
 FIRST_CALLS = 40
 DEADLINE = float(os.environ.get("DEADLINE", "0"))
 
@@ -48,7 +46,7 @@ class _Tracer:
         if code in self.foreign:
             return None
         calls = self.calls.get(code, 0)
-        if calls == 0 and not code.co_filename.startswith(ROOMS):
+        if calls == 0 and not code.co_filename.startswith(HOME):
             self.foreign.add(code)
             return None
         self.calls[code] = calls + 1
