@@ -57,10 +57,10 @@ test-blas-%: $(VENV)/installed-dev
 test-perturbed: $(VENV)/installed-dev
 	$(PYTEST) --perturb-gaits 1e-12
 
-# What depends on rounding most, in a few minutes.
+# What depends on rounding most, in a few minutes; by one process, beside which others may test.
 test-sample: export HEELSTRIKE_PLAIN_CODE = 1
 test-sample: $(VENV)/installed-dev
-	$(PYTEST) --perturb-gaits 1e-12 $(SAMPLE)
+	$(PYTEST) -n 1 --perturb-gaits 1e-12 $(SAMPLE)
 
 # The same with the oldest Numba that is allowed, and with what Numba documents only.
 test-numba: $(VENV)-numba/installed-$(OLDEST_NUMBA)
