@@ -51,6 +51,18 @@ class _Doctests:
         return [each for each in found if type(each) is pytest.Module]
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session: pytest.Session) -> Generator[None, Any, Any]:
+    """Where no file is compiled yet, what one process compiles is there for the next."""
+    run = getattr(session.config, "workerinput", {}).get("testrunuid")
+    if run is None or not os.environ.get("CI"):
+        return (yield)
+    from heelstrike.compiler.kept_code import alone
+
+    with alone([Path(tempfile.gettempdir())], run):
+        return (yield)
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--perturb-gaits",
