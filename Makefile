@@ -22,7 +22,7 @@ NUMBA_SAMPLE := tests/compiler tests/dynamics/queries/test_c_code.py tests/conta
 CHOSEN ?=
 PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile $(CHOSEN)
 BLAS_KERNELS ?= $(if $(filter x86_64 amd64 AMD64,$(shell uname -m)),Nehalem Haswell,ARMV8 CORTEXA57)
-SAMPLE := tests/compiler/test_plain_code.py tests/contact/solvers
+SAMPLE := tests/compiler/test_plain_code.py::test_this_suite_runs_on_plain_code tests/contact/solvers
 
 # Tests start Python some hundred times: what it makes of the sources is kept, whatever is said elsewhere.
 unexport PYTHONDONTWRITEBYTECODE
