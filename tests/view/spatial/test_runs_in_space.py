@@ -127,6 +127,8 @@ def test_an_unknown_figure_is_refused_with_what_there_is(run: hs.sim.spatial.Spa
         assert name in str(caught.value)
     with pytest.raises(ViewError, match="no rows from 5"):
         run.plot("gap", span=(5.0, 6.0))
+    with pytest.raises(ViewError, match="a span is a pair of times"):
+        run.plot("gap", span=0.5)
 
 
 def test_a_portrait(robot: hs.SpatialRobot, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, cast
 
 import numpy as np
@@ -18,7 +18,7 @@ from heelstrike.sim.files.spatial import IN_SPACE
 from heelstrike.sim.run import Run
 from heelstrike.sim.spatial.run import RECORDED, SpatialRun
 from heelstrike.view.comparison_figure import COLORS, STROKES
-from heelstrike.view.panels import THIN, Curve, Excerpt, Panel, draw_panels
+from heelstrike.view.panels import THIN, Curve, Excerpt, Panel, draw_panels, rows_within
 from heelstrike.view.style import foot_color, in_words, save_figure, styled
 from heelstrike.wording import meant
 
@@ -138,7 +138,7 @@ def plot_in_space(
     """
     if what not in _DRAWINGS and what not in RECORDED:
         raise ViewError(_unknown(what))
-    rows = _rows(run, span)
+    rows = rows_within(run, span)
     with styled():
         drawing = _DRAWINGS.get(what)
         title, panels = _quantity(run, what) if drawing is None else drawing(run)
@@ -209,22 +209,6 @@ def _look(number: int) -> dict[str, Any]:
     """Look of a curve: a colour of the palette, and other strokes when all have been used."""
     stroke = STROKES[number // len(COLORS) % len(STROKES)]
     return {"linewidth": THIN, "color": COLORS[number % len(COLORS)], "linestyle": stroke}
-
-
-def _rows(run: SpatialRun, span: Sequence[float] | None) -> slice:
-    """Rows of a run within a span of time."""
-    if not len(run.time):
-        raise ViewError(f"there is nothing to draw: the run has no rows ({run.message})")
-    if span is None:
-        return slice(0, len(run.time))
-    start, end = span
-    first, last = np.searchsorted(run.time, (start - 1e-9, end + 1e-9))
-    if not last > first:
-        raise ViewError(
-            f"there is nothing to draw: the run has no rows from {start} s to {end} s; it lasts "
-            f"from {run.time[0]:g} s to {run.time[-1]:g} s"
-        )
-    return slice(int(first), int(last))
 
 
 def _unknown(what: str) -> str:

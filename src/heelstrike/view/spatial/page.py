@@ -16,7 +16,7 @@ from heelstrike.errors import ViewError
 from heelstrike.sim.spatial.record import SpatialEventKind
 from heelstrike.sim.spatial.run import SpatialEvent, SpatialRun
 from heelstrike.view.page.columns import TOLERANCE, packed
-from heelstrike.view.page.markup import data_block, document, escaped, shipped, table
+from heelstrike.view.page.markup import data_block, escaped, player, shipped, table
 from heelstrike.view.page.page import MOST_EVENTS, MOST_PHASES, check_page
 from heelstrike.view.page.provenance import method_in_words, versions
 from heelstrike.view.page.rows import MOST_ROWS, Rows, rows_about
@@ -97,13 +97,9 @@ def page_in_space(run: SpatialRun, *, command: str = "") -> str:
         "provenance": table(provenance_in_space(run, command), "Where this comes from"),
         "camera": escaped(CAMERA),
     }
-    body = shipped("player.html")
-    for name, part in parts.items():
-        body = body.replace(f"<!--{name}-->", part)
-    script = drawing_script() + shipped("player.js")
-    title = f"{run.robot.name}: {run.message}"
-    block = data_block("run", contents_within(run, LARGEST - len(script)))
-    return document(title, body + block, style=shipped("page.css"), script=script)
+    script = drawing_script()
+    content = contents_within(run, LARGEST - len(script) - len(shipped("player.js")))
+    return player(f"{run.robot.name}: {run.message}", parts, content, script)
 
 
 def drawing_script() -> str:
