@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -27,7 +28,10 @@ CONVERGED = 1e-8
 FEASIBLE = 1e-7
 """Scaled violations up to which a point satisfies all constraints."""
 MOST_ITERATIONS = 100
-"""Iterations after which a start is given up; those that succeed take about 25."""
+"""Iterations after which IPOPT gives up."""
+PATIENCE, LESS_PATIENCE = 50, 40
+"""Iterations after which a start is given up, and after which it is if another one has succeeded.
+Those that succeed take about 25; where none does, violations are minimised first."""
 POINTS = 4
 """Gauss points in every piece of a motion that must satisfy an equation along the path."""
 PRICE_OF_EQUATIONS = 1000.0
@@ -139,6 +143,8 @@ class Program:
     """Whether guesses are nearly optima."""
     inside: bool = False
     """Whether guesses satisfy all constraints."""
+    patience: int | None = None
+    """Iterations after which a start is given up, if not after as many as usual."""
     elastic: bool = False
     """Let every constraint be violated and minimise the sum of the scaled violations instead of the
     effort: shows which constraints are in conflict when there is no solution."""
@@ -261,11 +267,16 @@ class Program:
     def _build(self) -> None:
         x = casadi.MX.sym("x", self.size)
         self._blocks = self._of_blocks(x)
+        self._slopes = casadi.Function("slopes", [x], [self._blocks.jacobian(x)])
+
+    @cached_property
+    def _solver(self) -> Ipopt:
+        """IPOPT with the derivatives of the program: no need of it to satisfy equations only."""
+        x = casadi.MX.sym("x", self.size)
         f, g = self._blocks.value(x)
         slope, slopes = self._blocks.gradient(x), self._blocks.jacobian(x)
         price, prices = casadi.MX.sym("price"), casadi.MX.sym("prices", g.numel())
         bend = self._blocks.hessian(x, price, prices)
-        self._slopes = casadi.Function("slopes", [x], [slopes])
         if self.elastic:
             # Each constraint may be exceeded upwards or downwards; the sum of that is minimised.
             gaps, total = self._gaps, self._lower.size - self._gaps
@@ -279,9 +290,12 @@ class Program:
                 self._blocks.hessian(x, 0.0, prices), casadi.DM(2 * total, 2 * total)
             )
             x = casadi.vertcat(x, excess)
-        self._solver = Ipopt(
+        settings = NEAR if self.near else INSIDE if self.inside else SETTINGS
+        if self.patience is not None:
+            settings = settings | {"max_iter": self.patience}
+        return Ipopt(
             x, f, g, gradient=slope, jacobian=slopes, hessian=(price, prices, bend),
-            settings=NEAR if self.near else INSIDE if self.inside else SETTINGS,
+            settings=settings,
         )  # fmt: skip
 
     def _of_blocks(self, x: Any) -> BlockProgram:
