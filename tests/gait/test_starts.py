@@ -1,25 +1,16 @@
-"""Steps that the optimiser starts from, and how long each is tried."""
+"""Steps that the optimiser starts from."""
 
 from __future__ import annotations
 
 from itertools import islice
-from typing import Any
 
 import numpy as np
 import pytest
 
 import heelstrike as hs
 from heelstrike.experiments.walk import typical_step
-from heelstrike.gait import design
 from heelstrike.gait.optimize import request_of
-from heelstrike.gait.program import (
-    LESS_PATIENCE,
-    MOST_ITERATIONS,
-    PATIENCE,
-    Program,
-    Solution,
-    first_instants,
-)
+from heelstrike.gait.program import Program, first_instants
 from heelstrike.gait.starts import starts
 from heelstrike.gait.transcription import Group, transcribed
 
@@ -51,22 +42,3 @@ def test_feet_are_in_their_places_where_hips_do_not_bend_backwards(name: str) ->
         free = asked.transcription.free
         assert np.all(joints >= asked.request.lower[free])
         assert np.all(joints <= asked.request.upper[free])
-
-
-@pytest.mark.parametrize(("succeeds", "others"), [(True, LESS_PATIENCE), (False, MOST_ITERATIONS)])
-def test_starts_are_given_up_sooner_where_one_has_succeeded(
-    succeeds: bool, others: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked = program_of("bravo7")
-    limits = []
-
-    def solve(self: Program, guess: Any, _: Any = None) -> Solution:
-        if not self.inside:
-            limits.append(self.patience or MOST_ITERATIONS)
-        return Solution(guess, 1.0, succeeds, "", np.zeros(0))
-
-    monkeypatch.setattr(Program, "solve", solve)
-    monkeypatch.setattr(Program, "at", lambda _, guess: Solution(guess, 1.0, True, "", np.zeros(0)))
-    monkeypatch.setattr(design, "nearest_to_feasible", lambda _: np.zeros(asked.size))
-    design._best_of_starts(asked, lambda _: None)
-    assert limits == [PATIENCE, others, others]

@@ -13,13 +13,7 @@ from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Footing, Gait, Phase, actuated_joints, fingerprint
 from heelstrike.gait.infeasible import nearest_to_feasible
 from heelstrike.gait.margins import Margins
-from heelstrike.gait.program import (
-    LESS_PATIENCE,
-    PATIENCE,
-    Program,
-    Solution,
-    first_instants,
-)
+from heelstrike.gait.program import Program, Solution, first_instants
 from heelstrike.gait.refinement import checked_instants, held_between_nodes
 from heelstrike.gait.request import Request
 from heelstrike.gait.starts import starts
@@ -58,11 +52,8 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
             return solution
     guesses = [program.sampled(start) for start in islice(starts(request), request.starts)]
     solutions: list[Solution] = []
-    first, more = (replace(program, patience=most) for most in (PATIENCE, LESS_PATIENCE))
     for guess in guesses:
-        known = any(solution.converged for solution in solutions)
-        tried = first if not solutions else more if known else program
-        solutions.append(tried.solve(guess))
+        solutions.append(program.solve(guess))
         if len(solutions) == 1 and not solutions[0].converged:
             # Perhaps no start can succeed, which ends here in an error that tells why. Otherwise
             # a point that satisfies all constraints is as good a start as can be.
