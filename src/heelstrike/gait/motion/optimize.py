@@ -792,7 +792,8 @@ def _with_failing(
 def _failing(program: MotionProgram, unknowns: Floats, p: int) -> Instants:
     """Return the instants of a phase at which a limit fails most, one for each piece and limit.
 
-    And some on both sides, since next time it fails most a little beside them.
+    And some on both sides, since next time it fails most a little beside them; but not for
+    constraints of one's own, which may fail all along.
     """
     own = np.array([row.kind is Kind.OWN for row in program.functions.path_rows])
     fine = _fine(program.grids[p].pieces, OWN_FINER if np.any(own) else 1)
@@ -807,8 +808,9 @@ def _failing(program: MotionProgram, unknowns: Floats, p: int) -> Instants:
     fails = by_piece.max(axis=2) > ALLOWED
     count = by_piece.shape[2]
     worst, beside = by_piece.argmax(axis=2), BESIDE * count // (STAGES * FINER)
-    at = np.clip([worst - beside, worst, worst + beside], 0, count - 1)
-    bad = np.unique((at + count * np.arange(fine.pieces))[:, fails])
+    at = np.clip([worst, worst - beside, worst + beside], 0, count - 1)
+    at += count * np.arange(fine.pieces)
+    bad = np.union1d(at[0, fails], at[1:, fails & ~own[:, None]])
     return Instants(fine.pieces, fine.piece[bad], fine.share[bad], np.zeros(bad.size))
 
 
