@@ -27,6 +27,10 @@ TYPICAL_LENGTH = 0.3
 """Step length in standing heights where none is given."""
 SWEEPS = 60
 START_DAMPING = 1e-4
+MET = 1e-9
+"""Distance (m, rad) within which a place counts as reached."""
+WEIGHT_OF_TRUNK = 0.1
+"""Weight of the trunk's place next to those of the feet, where both cannot be reached."""
 
 
 @dataclass(frozen=True)
@@ -138,16 +142,36 @@ class _Kinematics:
         level = [0.0][: self._request.stance.held - 2]  # a flat foot's angle
         closed = [0.0] * count_rows(self._request.robot.model)
         target = np.array([0.0, 0.0, *level, *swing, *level, *trunk, *closed])
-        q = self._bent(bend)
+        q, missing = self._nearest(self._bent(bend), target, np.ones(target.size))
+        if np.abs(missing).max() < MET:
+            return q
+        # Feet in their places are worth more than the trunk's: it may have to lean where hips
+        # cannot bend backwards.
+        weights = np.ones(target.size)
+        last = target.size - len(closed)
+        weights[last - len(trunk) : last] = WEIGHT_OF_TRUNK
+        return self._nearest(self._bent(bend), target, weights)[0]
+
+    def _nearest(self, q: Floats, target: Floats, weights: Floats) -> tuple[Floats, Floats]:
+        """Position in range nearest to targets, (nv,), and what is missing of each."""
+        lower, upper = self._request.lower, self._request.upper
         for _ in range(SWEEPS):
             value, jacobian = (np.array(part) for part in self._places(q))
             missing = target - value.ravel()
-            if np.abs(missing).max() < 1e-9:
+            if np.abs(missing).max() < MET:
                 break
-            normal = jacobian.T @ jacobian + START_DAMPING * np.eye(q.size)
-            step = np.linalg.solve(normal, jacobian.T @ missing)
+            slopes = weights[:, None] * jacobian
+            free = np.full(q.size, True)
+            for _ in range(q.size):
+                rows = np.where(free, slopes, 0.0)
+                normal = rows.T @ rows + START_DAMPING * np.eye(q.size)
+                step = np.linalg.solve(normal, rows.T @ (weights * missing))
+                held = free & (((q <= lower) & (step < 0.0)) | ((q >= upper) & (step > 0.0)))
+                if not held.any():
+                    break
+                free &= ~held
             q = self._in_range(q + step / max(1.0, np.abs(step).max() / BENT))
-        return q
+        return q, missing
 
     def _bent(self, bend: float) -> Floats:
         """Reference configuration with the joints inside the legs bent, in range."""

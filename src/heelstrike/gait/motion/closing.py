@@ -12,6 +12,7 @@ the ends of its pieces may close all the same.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -26,7 +27,6 @@ from heelstrike.gait.motion.instant import point_rows
 from heelstrike.gait.motion.motion import Motion, MotionPhase
 from heelstrike.gait.motion.phases import standing
 from heelstrike.gait.motion.request import Repeat
-from heelstrike.gait.polynomials import evaluated
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 
@@ -84,49 +84,16 @@ class Follower:
 
         phase = self.motion.phases[p]
         held = self._held(phase.contacts)
-        given = _forces(phase)
+        given = np.ascontiguousarray(_forces(phase)[:, :, held])
+        rate = _Rate(self.robot, self.motion.slope, held, phase.pieces[0], given[0])
         for k, (begin, end) in enumerate(pairwise(phase.breakpoints)):
             # One polynomial at a time: the next one has other accelerations where both meet.
-            span = np.array([0.0, end - begin])
-            terms, forces = phase.pieces[k : k + 1], given[k : k + 1, :, held]
-
-            def rate(
-                t: float, state: Floats, span: Floats = span, terms: Floats = terms,
-                forces: Floats = forces,
-            ) -> Floats:  # fmt: skip
-                time = np.asarray(t)
-                q, v, a = (evaluated(terms, span, time, order) for order in range(3))
-                wanted = np.concatenate([q, v, a])
-                exerted = evaluated(forces, span, time, 0)
-                return self._rate(state, wanted, held, exerted)
-
-            self._calls = 0
-            found = solve_ivp(rate, span, np.concatenate([q, v]), **FINE)
+            rate.follow(phase.pieces[k], given[k])
+            found = solve_ivp(rate, (0.0, end - begin), np.concatenate([q, v]), **FINE)
             q, v = np.split(found.y[:, -1], 2)
             if found.status < 0:
                 return q, np.full(v.size, np.inf)
         return q, self._landed(p, q, v)
-
-    def _rate(self, state: Floats, wanted: Floats, held: list[int], exerted: Floats) -> Floats:
-        """How the state changes: the possible accelerations nearest to those of computed torque."""
-        self._calls += 1
-        if self._calls > MOST_CALLS:
-            return np.full(state.size, np.nan)
-        q, v = np.split(state, 2)
-        at, fast, bend = np.split(wanted, 3)
-        mass, force, rows, moved = (np.array(each) for each in self._mechanics(q, v))
-        rows, moved, weight = rows[held], moved[held, 0], self.robot.weight
-        n, count, driven = q.size, len(held), self.robot.model.actuator_joint
-        free = np.setdiff1d(np.arange(n), driven)
-        price = np.zeros(n + count)
-        price[driven], price[n:] = 1.0, FORCES
-        nearest = np.concatenate(
-            [bend + DERIVATIVE * (fast - v) + PROPORTIONAL * (at - q), exerted / weight]
-        )
-        must = np.block([[mass[free] / weight, -rows.T[free]], [rows, np.zeros((count, count))]])
-        right = np.concatenate([price * nearest, -force[free, 0] / weight, -moved])
-        system = np.block([[np.diag(price), must.T], [must, np.zeros((len(must), len(must)))]])
-        return np.concatenate([v, _solved(system, right)[:n]])
 
     def _landed(self, p: int, q: Floats, v: Floats) -> Floats:
         """Velocity after a plastic impact of all that stands after a phase, if a point is new."""
@@ -149,6 +116,94 @@ class Follower:
         points = [self.robot.contact_names.index(each) for each in contacts]
         loops = range(2 * self.robot.nc, 2 * self.robot.nc + count_rows(self.robot.model))
         return [*standing(self.robot, points).forces, *loops]
+
+
+class _Rate:
+    """How the state changes on a piece: by the possible accelerations nearest to those wanted.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    slope : float
+        Angle of the ground (rad).
+    held : list of int
+        Rows that hold it.
+    terms, forces : (d + 1, nv) and (s, held) array
+        Coefficients of a piece and of its forces, of which only the shapes matter.
+    """
+
+    def __init__(
+        self, robot: Robot, slope: float, held: list[int], terms: Floats, forces: Floats
+    ) -> None:
+        sizes = len(terms), len(forces)
+        equations = _equations_of(robot, slope, tuple(held), sizes)
+        count = equations.size_out(0)[1]
+        self._time, self._state = np.zeros(1), np.zeros(2 * robot.nv)
+        self._terms, self._forces = np.zeros(terms.shape), np.zeros(forces.shape)
+        self._equations = np.zeros((count, count + 1))
+        self._found, self._column = np.zeros(count), np.zeros(count, np.int64)
+        self._buffer, self._evaluate = equations.buffer()
+        for k, given in enumerate((self._time, self._state, self._terms, self._forces)):
+            self._buffer.set_arg(k, given.data)
+        self._buffer.set_res(0, self._equations.data)
+        self._calls = 0
+
+    def follow(self, terms: Floats, forces: Floats) -> None:
+        """Follow another piece."""
+        self._terms[:], self._forces[:], self._calls = terms, forces, 0
+
+    def __call__(self, time: float, state: Floats) -> Floats:
+        """Derivative of the state (q, v)."""
+        self._calls += 1
+        self._time[0], self._state[:] = time, state
+        self._evaluate()
+        if self._calls > MOST_CALLS or not np.all(np.isfinite(self._equations)):
+            return np.full(state.size, np.nan)
+        solve_to_rank(self._found.size, self._equations, self._column, self._found)
+        half = state.size // 2
+        return np.concatenate([state[half:], self._found[:half]])
+
+
+@lru_cache(maxsize=16)
+def _equations_of(robot: Robot, slope: float, held: tuple[int, ...], sizes: tuple[int, int]) -> Any:
+    """Equations of accelerations and forces, the right-hand side last, row by row.
+
+    They are those of a least squares problem: accelerations of the motors are to be those of
+    computed torque, and forces, by far less, those of the motion, while the equations that no motor
+    enters and those of what holds the robot are satisfied. Given are time and state, (2 nv,), and
+    the coefficients, lowest first, of a piece and of its forces, one coefficient a column.
+    """
+    n, count, weight = robot.nv, len(held), robot.weight
+    driven = robot.model.actuator_joint.tolist()
+    free = [j for j in range(n) if j not in driven]
+    time, state = casadi.SX.sym("time"), casadi.SX.sym("state", 2 * n)
+    terms, forces = casadi.SX.sym("terms", n, sizes[0]), casadi.SX.sym("forces", count, sizes[1])
+    q, v = casadi.vertsplit(state, n)
+    mass, force, rows, moved = _mechanics_of(robot, slope)(q, v)
+    rows, moved = rows[list(held), :], moved[list(held)]
+    at, fast, bend = (_value(terms, time, order) for order in range(3))
+    price = np.zeros(n + count)
+    price[driven], price[n:] = 1.0, FORCES
+    nearest = casadi.vertcat(
+        bend + DERIVATIVE * (fast - v) + PROPORTIONAL * (at - q), _value(forces, time, 0) / weight
+    )
+    must = casadi.blockcat(
+        [[mass[free, :] / weight, -rows[:, free].T], [rows, casadi.SX(count, count)]]
+    )
+    right = casadi.vertcat(price * nearest, -force[free] / weight, -moved)
+    none = casadi.SX(must.shape[0], must.shape[0])
+    system = casadi.blockcat([[casadi.diag(casadi.SX(price)), must.T], [must, none]])
+    equations = casadi.densify(casadi.horzcat(system, right).T)  # its columns follow each other
+    return casadi.Function("equations", [time, state, terms, forces], [casadi.cse(equations)])
+
+
+def _value(terms: Any, time: Any, order: int) -> Any:
+    """Value or a derivative of polynomials, the coefficients of which are columns."""
+    total = casadi.SX(terms.shape[0], 1)
+    for k in range(terms.shape[1] - 1, order - 1, -1):
+        total = total * time + math.perm(k, order) * terms[:, k]
+    return total
 
 
 @lru_cache(maxsize=4)

@@ -56,6 +56,8 @@ ROUNDS = 5
 """How often instants are added where limits fail between the Gauss points."""
 FINER = 5
 """Instants between which limits are checked, for each Gauss point."""
+BESIDE = 2
+"""How many of them lie between one at which a limit fails and the next that are added with it."""
 OWN_FINER = 5
 """How many times as many these are for constraints of one's own, which may have corners. Odd: each
 instant of the others is in the middle of some."""
@@ -203,7 +205,7 @@ def optimize_motion(
     report(0.1)
     found = _solved_to_corners(program, warm_start, starts, report)
     if refine:
-        found = _refined(found)
+        found = _fine_enough(_refined(found), report)
         report(0.9)
         found = _held_between(found)
     motion = motion_of(found.program, found.program.polished(found.unknowns), found.optimal)
@@ -535,22 +537,48 @@ def _again(program: MotionProgram, start: Floats, multipliers: Floats | None) ->
 
 
 def _refined(found: _Found) -> _Found:
-    """Double the pieces of phases in which points that stand move between the ends of pieces."""
+    """Halve the pieces of phases in which points that stand move between the ends of pieces.
+
+    They are halved twice at once if, by how much these move, or the motion misses, it would have to
+    be done again.
+    """
     while True:
         program, unknowns = found.program, found.unknowns
-        request, phases = program.request, []
-        for p, phase in enumerate(request.phases):
-            moves = _slip(program, unknowns, p) > STILL
-            more = min(2 * phase.pieces, MOST_PIECES) if moves else 0
-            more = max(more, phase.pieces)
-            phases.append(ContactPhase(*phase.contacts, duration=phase.duration, pieces=more))
-        if [each.pieces for each in phases] == [each.pieces for each in request.phases]:
+        before = [phase.pieces for phase in program.request.phases]
+        slips = np.array([_slip(program, unknowns, p) for p in range(len(before))])
+        moves = slips > STILL
+        if not any(m and own < MOST_PIECES for m, own in zip(moves, before, strict=True)):
             return found
-        finer = replace(
-            program, request=replace(request, phases=tuple(phases)),
-            grids=tuple(looked_at(phase.pieces) for phase in phases), near=CLOSE,
-        )  # fmt: skip
-        found = _again(finer, finer.polished(_resampled(program, unknowns, finer)), None)
+        motion = motion_of(program, program.polished(unknowns), found.optimal)
+        missed = Follower(program.request.robot, motion).missed_by_phases()
+        far = np.isfinite(missed) & (missed > CLOSED * HALVING)
+        far |= slips > STILL * HALVING_SLIP
+        for more in (4, 2) if np.any(far & moves) else (2,):
+            times = [(more if off else 2) if m else 1 for m, off in zip(moves, far, strict=True)]
+            pieces = [
+                max(own, min(by * own, MOST_PIECES)) for own, by in zip(before, times, strict=True)
+            ]
+            finer = _with_pieces(program, pieces)
+            start = finer.polished(_resampled(program, unknowns, finer))
+            try:
+                found = _again(_with_failing(finer, start) or finer, start, None)
+                break
+            except GaitNotFoundError:
+                if more == 2:
+                    raise
+
+
+def _with_pieces(program: MotionProgram, pieces: list[int]) -> MotionProgram:
+    """Return the program with so many pieces, a phase each, for a start that is nearly there."""
+    request = program.request
+    phases = tuple(
+        ContactPhase(*phase.contacts, duration=phase.duration, pieces=count)
+        for phase, count in zip(request.phases, pieces, strict=True)
+    )
+    return replace(
+        program, request=replace(request, phases=phases),
+        grids=tuple(map(looked_at, pieces)), near=CLOSE,
+    )  # fmt: skip
 
 
 def _closed(found: _Found, motion: Motion, report: Callable[[float], None]) -> Motion:
@@ -579,12 +607,44 @@ def _closed(found: _Found, motion: Motion, report: Callable[[float], None]) -> M
     return motion
 
 
+def _fine_enough(found: _Found, report: Callable[[float], None]) -> _Found:
+    """Halve pieces now that would be halved later so that the motion closes.
+
+    But only where that takes another optimum: limits between the instants are then held once.
+    """
+    times = 0
+    while True:
+        times += 1
+        report(0.9 - 0.1 / (times + 1))
+        program = found.program
+        motion = motion_of(program, program.polished(found.unknowns), found.optimal)
+        missed = Follower(program.request.robot, motion).missed_by_phases()
+        if missed.max() <= CLOSED or not np.all(np.isfinite(missed)):
+            return found
+        finer = _halved(program, missed)
+        if finer is None:
+            return found
+        unknowns, holds = _halves(finer, motion)
+        if holds:
+            return found
+        try:
+            found = _again(_with_failing(finer, unknowns) or finer, unknowns, None)
+        except GaitNotFoundError:
+            return found
+
+
+def _halves(finer: MotionProgram, motion: Motion) -> tuple[Floats, bool]:
+    """Unknowns of the same motion on more pieces, and whether it satisfies all constraints."""
+    unknowns = finer.polished(_packed(motion.phases, motion.distance, finer))
+    equations, limits = finer.missing(unknowns)
+    return unknowns, equations <= FEASIBLE and limits <= ALLOWED
+
+
 def _on_halves(finer: MotionProgram, motion: Motion, optimal: bool) -> _Found:
     """Return nearly the same motion on more pieces, its equations satisfied to rounding."""
-    unknowns = finer.polished(_packed(motion.phases, motion.distance, finer))
+    unknowns, holds = _halves(finer, motion)
     found = _Found(finer, unknowns, None, optimal)
-    equations, limits = finer.missing(unknowns)
-    if equations > FEASIBLE or limits > ALLOWED:
+    if not holds:
         found = _again(finer, unknowns, None)
     found = _held_between(found)
     if found.multipliers is None:
@@ -617,14 +677,7 @@ def _halved(program: MotionProgram, missed: Floats) -> MotionProgram | None:
     ]
     if pieces == before:
         return None
-    phases = tuple(
-        ContactPhase(*phase.contacts, duration=phase.duration, pieces=count)
-        for phase, count in zip(request.phases, pieces, strict=True)
-    )
-    return replace(
-        program, request=replace(request, phases=phases),
-        grids=tuple(map(looked_at, pieces)), near=CLOSE,
-    )  # fmt: skip
+    return _with_pieces(program, pieces)
 
 
 def _slip(program: MotionProgram, unknowns: Floats, p: int) -> float:
@@ -672,6 +725,10 @@ PROMISED = 1e-8
 CLOSED = 3e-9
 """Difference (m, rad, m/s, rad/s) within which a motion goes on where it should: a third of what is
 promised, since others integrate otherwise."""
+HALVING = 2.0 ** (2 * STAGES)
+"""By how much halving all pieces divides what a motion misses, by the order of collocation."""
+HALVING_SLIP = 2.0**STAGES
+"""Likewise of the velocity between the ends of pieces of points that stand."""
 OFF_MOST = 0.1
 """Share of the largest error of a phase from which on the pieces of another are halved, too."""
 MOST_HALVED = 192
@@ -712,20 +769,32 @@ def _at(
 def _held_between(found: _Found) -> _Found:
     """Add instants where limits fail between the Gauss points, until none does."""
     for _ in range(ROUNDS):
-        program = found.program
-        more = [_failing(program, found.unknowns, p) for p in range(len(program.grids))]
-        if not any(each.share.size for each in more):
-            break
-        grids = tuple(grid.joined(new) for grid, new in zip(program.grids, more, strict=True))
         prices = found.multipliers
-        finer = replace(program, grids=grids, near=CLOSE if prices is None else CLOSER)
-        priced = None if prices is None else finer.multipliers_of(program, prices)
+        finer = _with_failing(found.program, found.unknowns, CLOSE if prices is None else CLOSER)
+        if finer is None:
+            break
+        priced = None if prices is None else finer.multipliers_of(found.program, prices)
         found = _again(finer, found.unknowns, priced)
     return found
 
 
+def _with_failing(
+    program: MotionProgram, unknowns: Floats, near: float = CLOSE
+) -> MotionProgram | None:
+    """Return the program with the instants at which limits fail, if they do anywhere."""
+    more = [_failing(program, unknowns, p) for p in range(len(program.grids))]
+    if not any(each.share.size for each in more):
+        return None
+    grids = tuple(grid.joined(new) for grid, new in zip(program.grids, more, strict=True))
+    return replace(program, grids=grids, near=near)
+
+
 def _failing(program: MotionProgram, unknowns: Floats, p: int) -> Instants:
-    """Return the instants of a phase at which a limit fails most, one for each piece and limit."""
+    """Return the instants of a phase at which a limit fails most, one for each piece and limit.
+
+    And some on both sides, since next time it fails most a little beside them; but not for
+    constraints of one's own, which may fail all along.
+    """
     own = np.array([row.kind is Kind.OWN for row in program.functions.path_rows])
     fine = _fine(program.grids[p].pieces, OWN_FINER if np.any(own) else 1)
     rows = _rows_at(program, unknowns, p, fine)
@@ -737,8 +806,11 @@ def _failing(program: MotionProgram, unknowns: Floats, p: int) -> Instants:
     missing = np.where(np.isfinite(missing), missing, -np.inf)
     by_piece = missing.reshape(len(rows), fine.pieces, -1)
     fails = by_piece.max(axis=2) > ALLOWED
-    at = by_piece.argmax(axis=2) + np.arange(fine.pieces) * by_piece.shape[2]
-    bad = np.unique(at[fails])
+    count = by_piece.shape[2]
+    worst, beside = by_piece.argmax(axis=2), BESIDE * count // (STAGES * FINER)
+    at = np.clip([worst, worst - beside, worst + beside], 0, count - 1)
+    at += count * np.arange(fine.pieces)
+    bad = np.union1d(at[0, fails], at[1:, fails & ~own[:, None]])
     return Instants(fine.pieces, fine.piece[bad], fine.share[bad], np.zeros(bad.size))
 
 
