@@ -46,7 +46,12 @@ from heelstrike.sim.spatial.candidates import (
     locate_points,
     turn_of_ball,
 )
-from heelstrike.sim.spatial.impact import closes, solve_impact_of, touches_at_end
+from heelstrike.sim.spatial.impact import (
+    asks_for_bounces,
+    closes,
+    solve_impact_of,
+    touches_at_end,
+)
 from heelstrike.sim.spatial.memory import (
     MOST_ITERATIONS,
     SpatialAssembly,
@@ -243,10 +248,12 @@ def left_by(status: int, answer: BlockAnswer) -> float:
 
 @kernel
 def solve_step_of(
-    model: SpatialModel, time: float, step: float, number: int, resolves: bool,
+    model: SpatialModel, time: float, step: float, number: int, resolves: bool, bounces: bool,
     memory: SpatialMemory,
 ) -> float:  # fmt: skip
     """Find the velocity at the end of a step; return the largest residual, zero if certified.
+
+    `resolves` says whether an impact is whole within it, `bounces` whether restitution counts.
 
     ``memory.next_v`` receives the velocity, ``memory.impact.arriving`` that with which positions
     move, ``memory.impact.impulse`` the impulses of the candidates.
@@ -287,7 +294,7 @@ def solve_step_of(
                 impact.happens = 1
                 left = memory.wedge.relaxed == 1
                 status = solve_impact_of(
-                    step, before, left, table, memory.solver, assembly, impact
+                    step, before, left, bounces, table, memory.solver, assembly, impact
                 )  # fmt: skip
                 worst = left_by(status, impact.answer)
                 add_impulses(model, impact.impulse, equations, assembly, next_v)
@@ -421,7 +428,7 @@ def take_step(
             )  # fmt: skip
         number = tally.steps + counts.parts
         left = 0  # whether the impact is left to the next step
-        worst = solve_step_of(model, time + done * step, step, number, resolves, memory)
+        worst = solve_step_of(model, time + done * step, step, number, resolves, True, memory)
         if worst > 0.0 and halvings < HALVINGS_OF_A_STEP:
             counts.halved = 1
             halvings += 1
@@ -430,10 +437,16 @@ def take_step(
             continue
         if worst > 0.0:  # before the run ends, or goes on marked, no effort is too much
             memory.solver.settings.effort = LAST_EFFORT
-            worst = solve_step_of(model, time + done * step, step, number, resolves, memory)
+            worst = solve_step_of(model, time + done * step, step, number, resolves, True, memory)
+            if worst > 0.0 and memory.impact.happens == 1 and asks_for_bounces(memory.impact):
+                # Friction may not let a point bounce (Painlevé's paradox): it stays, then.
+                worst = solve_step_of(
+                    model, time + done * step, step, number, resolves, False, memory
+                )  # fmt: skip
+                left = 1
             if worst > 0.0 and memory.impact.happens == 1:
                 # Between faces that nearly oppose each other an impact may have no answer at all.
-                worst = solve_step_of(model, time + done * step, step, number, False, memory)
+                worst = solve_step_of(model, time + done * step, step, number, False, True, memory)
                 left = 1
             memory.solver.settings.effort = MOST_ITERATIONS
         if not worst <= MARKED_RESIDUAL:
