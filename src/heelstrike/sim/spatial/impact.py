@@ -61,8 +61,8 @@ def pose_impact_of(
 ) -> None:  # fmt: skip
     """Write the problem of the impact: what takes part, without the gaps, with its bounces.
 
-    `relaxed` says that nothing was asked to come out of the ground, `bounces` whether restitution
-    counts.
+    `relaxed` says that nothing that touches was asked to move by its gap, `bounces` whether
+    restitution counts.
     """
     problem, its = assembly.problem, impact.problem
     members = rows = 0
@@ -85,8 +85,8 @@ def pose_impact_of(
         if table.kind[entry] != DRY_JOINT:
             if bounces:
                 impact.bounce[members] = table.restitution[entry] * assembly.before[place]
-            left = 0.0 if relaxed else min(table.gap[entry], 0.0)
-            its.free[rows] -= (max(table.gap[entry], 0.0) + left) / step
+            gap = table.gap[entry]
+            its.free[rows] -= (0.0 if relaxed and gap <= CLOSED_GAP else gap) / step
             its.free[rows] += impact.bounce[members]
         for other in range(members + 1):
             column = problem.first[impact.member[other]]

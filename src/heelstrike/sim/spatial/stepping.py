@@ -178,19 +178,20 @@ def call_what_is_missed(
 
 @kernel
 def forgive_depth(step: float, table: BlockTable, assembly: SpatialAssembly) -> bool:
-    """Ask nothing to come out of the ground; return whether that changes anything.
+    """Ask nothing that touches to move by its gap; return whether that changes anything.
 
-    Points deeper than `LEFT_IN_THE_GROUND` are not left there: nothing changes then.
+    Neither out of the ground, nor down to it by less than counts as touching. Points deeper than
+    `LEFT_IN_THE_GROUND` are not left there: nothing changes then.
     """
     changed = False
     for place in range(assembly.count):
         gap = table.gap[assembly.candidate[place]]
         if gap < -LEFT_IN_THE_GROUND:
             return False
-        changed = changed or gap < 0.0
+        changed = changed or (gap != 0.0 and gap <= CLOSED_GAP)
     for place in range(assembly.count if changed else 0):
         gap = table.gap[assembly.candidate[place]]
-        if gap < 0.0:
+        if gap <= CLOSED_GAP:
             assembly.problem.free[assembly.problem.first[place]] -= gap / step
     return changed
 
@@ -219,8 +220,8 @@ def solve_positions(
     """Solve the problem of the positions; where there is no way out, without asking for one.
 
     Limbs that lie on several points, at the ends of their ranges, find none where each of their
-    points is in the ground by another billionth: each would have to slide its own way. They are
-    left there, and asked again when that is twice as long ago.
+    points is in the ground, or above it, by another billionth: each would have to slide its own
+    way. They are left there, and asked again when that is twice as long ago.
     """
     wedge.relaxed = 0
     at_once = goes_on_wedged(steps, wedge) and forgive_depth(step, table, assembly)
