@@ -147,7 +147,7 @@ class SpatialRows:
             left = np.where(gap < 0.0, -gap / h - moved, 0.0)
             pressed = (force > 0.0) & (gap <= touching)
             left = np.maximum(left, np.where(pressed, np.abs(gap / h + moved), 0.0))
-            closed = bounces & (np.minimum(gap, gap + h * moved) <= touching)
+            closed = bounces & (force > 0.0) & (np.minimum(gap, gap + h * moved) <= touching)
             left = np.maximum(left, np.where(closed, -e * before - after, 0.0))
             short = np.maximum(short, left.max(axis=1, initial=0.0))
         worst = np.argsort(-short)[:count]
