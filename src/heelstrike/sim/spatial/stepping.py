@@ -3,8 +3,8 @@
 The scheme is that of the plane (:mod:`heelstrike.sim.time_stepping.method`): gaps linearised over
 the step, impacts whole within it. A step whose contact problem is not certified is halved, three
 times at most, and then solved with fifty times the effort, in the end without restitution, or
-without the impact, which then takes another step; if that does not help it goes on with a residual of up to 1e-6, marked, and
-above that the run ends.
+without the impact, which then takes another step; if that does not help it goes on with a residual
+of up to 1e-6, marked, and above that the run ends.
 """
 
 from __future__ import annotations
