@@ -13,7 +13,8 @@ PYTHON ?= python3
 WORKERS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
-INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+# Continuous integration compiles what it imports, which is a small part of the packages.
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt $(if $(CI),--no-compile)
 
 OLDEST_NUMBA := $(shell sed -n 's/.*"numba>=\([0-9.]*\)".*/\1/p' pyproject.toml)
 NUMBA_SAMPLE := tests/compiler tests/dynamics/queries/test_c_code.py tests/contact/solvers tests/sim/test_walking.py
@@ -21,7 +22,7 @@ NUMBA_SAMPLE := tests/compiler tests/dynamics/queries/test_c_code.py tests/conta
 CHOSEN ?=
 PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile $(CHOSEN)
 BLAS_KERNELS ?= $(if $(filter x86_64 amd64 AMD64,$(shell uname -m)),Nehalem Haswell,ARMV8 CORTEXA57)
-SAMPLE := tests/compiler/test_plain_code.py tests/contact/solvers
+SAMPLE := tests/compiler/test_plain_code.py::test_this_suite_runs_on_plain_code tests/contact/solvers
 
 # Tests start Python some hundred times: what it makes of the sources is kept, whatever is said elsewhere.
 unexport PYTHONDONTWRITEBYTECODE
@@ -57,10 +58,10 @@ test-blas-%: $(VENV)/installed-dev
 test-perturbed: $(VENV)/installed-dev
 	$(PYTEST) --perturb-gaits 1e-12
 
-# What depends on rounding most, in a few minutes.
+# What depends on rounding most, in a few minutes; by one process, beside which others may test.
 test-sample: export HEELSTRIKE_PLAIN_CODE = 1
 test-sample: $(VENV)/installed-dev
-	$(PYTEST) --perturb-gaits 1e-12 $(SAMPLE)
+	$(PYTEST) -n 1 --perturb-gaits 1e-12 $(SAMPLE)
 
 # The same with the oldest Numba that is allowed, and with what Numba documents only.
 test-numba: $(VENV)-numba/installed-$(OLDEST_NUMBA)

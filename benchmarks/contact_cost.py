@@ -75,7 +75,7 @@ def measure(number: int = 200, repeats: int = 20) -> dict[str, dict[str, float]]
     count = problems[0][1].size // 2
     friction = np.full(count, 0.75)
     work = contact_workspace(count)
-    answer = ContactAnswer.allocate(nc=count)
+    answer = ContactAnswer.allocate(capacity=count)
     cold = np.full(count, OPEN, np.int64)
     figures: dict[str, dict[str, float]] = {}
     for name in ("lemke", "fischer_burmeister", "gauss_seidel", "warm"):

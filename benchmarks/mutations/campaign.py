@@ -186,8 +186,8 @@ class Reached:
             there |= self.lines.get((mutant.file, line), set())
         around = self.functions.get((mutant.file, mutant.function), set())
         if not mutant.function and not there:  # of the module: whatever uses it, and its own tests
-            package, name = mutant.file.split("/")
-            mirrored = f"tests/{package}/test_{name.removesuffix('.py')}"
+            folder, _, name = mutant.file.rpartition("/")
+            mirrored = f"tests/{folder}/test_{name.removesuffix('.py')}"
             around = self.files.get(mutant.file, set())
             around = around | {test for test in self.seconds if test.startswith(mirrored)}
         # What a fixture made was reached in the test that asked first, and matters to all after it.

@@ -19,6 +19,7 @@ from heelstrike.experiments.engine_comparison import (
     PushTable,
     SceneTable,
     search,
+    two_processes,
 )
 from heelstrike.experiments.engines import InvalidRunError
 
@@ -33,6 +34,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         return made_up()
 
     monkeypatch.setattr(engine_comparison, "compare_engines", compare_engines)
+    monkeypatch.setattr(two_processes, "compare_engines", compare_engines)
     return calls
 
 

@@ -6,6 +6,7 @@ import ast
 import os
 import re
 import threading
+from ast import literal_eval
 from pathlib import Path
 
 import numpy as np
@@ -84,31 +85,43 @@ def test_what_has_passed_is_not_tested_again(
         PrivateNumba().test()
 
 
-def private_names() -> list[tuple[str, str]]:
+def private_names() -> dict[str, list[tuple[str, str]]]:
     """Modules and names that modules of ours take from inside Numba."""
-    files = (Path(str(module.__file__)) for module in (private_numba, private_members))
-    return [
-        (node.module, name.name)
-        for file in files
-        for node in ast.walk(ast.parse(file.read_text()))
-        if isinstance(node, ast.ImportFrom)
-        and node.module is not None
-        and node.module.startswith(("numba.core", "numba.np"))
-        for name in node.names
-    ]
+    return {
+        module.__name__.rpartition(".")[2]: [
+            (node.module, name.name)
+            for node in ast.walk(ast.parse(Path(str(module.__file__)).read_text()))
+            if isinstance(node, ast.ImportFrom)
+            and node.module is not None
+            and node.module.startswith(("numba.core", "numba.np"))
+            for name in node.names
+        ]
+        for module in (private_numba, private_members)
+    }
 
 
 GONE = """
 import builtins
-usual = builtins.__import__
+import warnings
+from heelstrike.compiler.compilation import numba_in_use
+
+usual, told = builtins.__import__, []
 
 def without(name, globals=None, locals=None, names=(), level=0):
     ours = (globals or {{}}).get("__name__", "").startswith("heelstrike")
-    if ours and name == {module!r} and {name!r} in (names or ()):
-        raise ImportError("cannot import name " + {name!r})
+    if ours and name == gone[0] and gone[1] in (names or ()):
+        raise ImportError("cannot import name " + gone[1])
     return usual(name, globals, locals, names, level)
 
 builtins.__import__ = without
+for gone in {names!r}:
+    numba_in_use.cache_clear()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        kind = type(numba_in_use()).__name__
+    told.append((kind, [str(each.message) for each in said]))
+numba_in_use.cache_clear()
+print(told)
 """
 
 ANOTHER_MEANING = """
@@ -118,20 +131,21 @@ CompileResult._rebuild = lambda *_: types.SimpleNamespace(entry_point=lambda *_:
 """
 
 
-@pytest.fixture(scope="module")
-def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Machine code by documented names, compiled once."""
-    return tmp_path_factory.mktemp("kept")
-
-
-@pytest.mark.parametrize(("module", "name"), private_names())
+@pytest.mark.parametrize("file", ["private_numba", "private_members"])
 def test_without_any_of_them_kernels_compute_the_same_after_one_warning(
-    kept: Path, module: str, name: str
+    tmp_path: Path, file: str
 ) -> None:
-    out, warnings = told(kept, GONE.format(module=module, name=name))
-    assert out == f"DocumentedNumba {COMPUTED}"
+    """One process tries all names of a module, and compiles without the last."""
+    names = private_names()[file]
+    out, warnings = told(tmp_path, GONE.format(names=names))
+    tried, computed = out.splitlines()
+    heard = "heelstrike does not know the internals of Numba"
+    for name, (kind, said) in zip(names, literal_eval(tried), strict=True):
+        assert kind == "DocumentedNumba", name
+        assert [words[: len(heard)] for words in said] == [heard], name
+    assert computed == f"DocumentedNumba {COMPUTED}"
     assert len(warnings) == 1
-    assert "CompilerWarning: heelstrike does not know the internals" in warnings[0]
+    assert f"CompilerWarning: {heard}" in warnings[0]
 
 
 def test_no_other_module_takes_names_from_inside_numba() -> None:

@@ -58,7 +58,7 @@ def verdict(
     work.settings.skewed = skewed
     problem = contact_problem(mu.size, count=mu.size, delassus=G, free=b, friction=mu)
     problem.set[:] = CONE if sets is None else sets
-    answer = ContactAnswer.allocate(nc=mu.size, impulse=x)
+    answer = ContactAnswer.allocate(capacity=mu.size, impulse=x)
     worst = certify(problem, work.settings, work.scaling, answer)
     error = velocity_error(worst, mu, work.scaling)
     return Verdict(*answer.residual, worst, work.scaling.rounding, answer.velocity, error)

@@ -47,7 +47,7 @@ class Caller:
 
     def __post_init__(self) -> None:
         self.problem = contact_problem(self.capacity)
-        self.answer = ContactAnswer.allocate(nc=self.capacity)
+        self.answer = ContactAnswer.allocate(capacity=self.capacity)
         for name in ("mode", "impulse", "velocity", "residual"):
             setattr(self, name, getattr(self.answer, name))
         self.impulse[:] = self.velocity[:] = 7.0
@@ -312,7 +312,7 @@ def test_many_points_of_two_soles_that_stick(points: int, close: bool) -> None:
     problem = contact_problem(
         points, count=points, delassus=delassus, free=free, friction=np.full(points, 0.8)
     )
-    answer = ContactAnswer.allocate(nc=points, mode=np.full(points, STICK))
+    answer = ContactAnswer.allocate(capacity=points, mode=np.full(points, STICK))
     assert repeat(problem, work.settings, work.sticking, work.scaling, answer)
     # Impulses with the same effect differ by what J takes to zero.
     shortest = np.linalg.pinv(jacobian.T, rcond=1e-12) @ (jacobian.T @ pressed)

@@ -64,7 +64,7 @@ def with_line(seed: int) -> ContactProblem:
 
 
 def solved(problem: ContactProblem, solver: int) -> Floats:
-    work, answer = contact_workspace(4), ContactAnswer.allocate(nc=4)
+    work, answer = contact_workspace(4), ContactAnswer.allocate(capacity=4)
     work.settings.corrections = 0
     assert solve_contact_kernel(np.array([solver]), problem, work, answer) == SOLVED
     return answer.impulse
@@ -110,7 +110,7 @@ def test_a_group_without_a_tangent_has_one_row(solver: int) -> None:
 
 @pytest.mark.parametrize("push", [-0.5, 0.5])
 def test_a_line_that_gives_way_is_not_certified(push: float) -> None:
-    work, answer = contact_workspace(1), ContactAnswer.allocate(nc=1)
+    work, answer = contact_workspace(1), ContactAnswer.allocate(capacity=1)
     problem = one(LINE)
     problem.delassus[0, 0] = 1.0
     problem.free[0] = -1.0
@@ -164,7 +164,7 @@ def test_intervals_against_enumeration(solver: int, slack: int) -> None:
         problem = dry(seed, slack)
         given = (problem.delassus.copy(), problem.free.copy(), problem.friction.copy())
         found = solutions(*given, problem.bound)
-        work, answer = contact_workspace(4), ContactAnswer.allocate(nc=4)
+        work, answer = contact_workspace(4), ContactAnswer.allocate(capacity=4)
         work.settings.corrections = 0
         if solve_contact_kernel(np.array([solver]), problem, work, answer) != SOLVED:
             continue
@@ -184,7 +184,7 @@ def test_intervals_against_enumeration(solver: int, slack: int) -> None:
 )
 def test_certificate_of_an_interval(impulse: float, residual: float) -> None:
     """It moves at 4 rad/s, 2 after 4 N s against it: only all 3 N s there are will do."""
-    work, answer = contact_workspace(1), ContactAnswer.allocate(nc=1)
+    work, answer = contact_workspace(1), ContactAnswer.allocate(capacity=1)
     problem = one(INTERVAL)
     problem.bound[0] = 3.0
     problem.delassus[1, 1], problem.free[1] = 0.5, 4.0

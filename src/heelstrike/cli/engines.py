@@ -183,7 +183,7 @@ def compare_in_engines(
             step_sizes=sizes,
             settings=asked.settings.split(","),
             control_period=asked.period,
-            friction=friction_of(case),
+            friction=case.lowest_friction,
             folder=out / "engines",
             films=asked.films,
             progress=show.doing,
@@ -304,7 +304,7 @@ def pushes_in_engines(
             case.followed,
             engines=asked.names,
             settings=asked.settings.split(","),
-            friction=friction_of(case),
+            friction=case.lowest_friction,
             control_period=asked.period,
             folder=out / "engines",
             processes=processes,
@@ -349,11 +349,6 @@ def check(case: Case) -> None:
         )
 
 
-def friction_of(case: Case) -> float:
-    """Coefficient of friction of the ground, where it is lowest."""
-    return float(case.ground.model().friction.min())
-
-
 def _search(
     case: Case, start: Beginning, asked: InEngines, steps: int, out: Path, *, as_json: bool
 ) -> None:
@@ -372,7 +367,7 @@ def _search(
     assert start.controller is not None
     walk = Walk(
         case.robot, start.controller, case.followed, steps, CONTROL_PERIOD,
-        friction_of(case), 60.0,
+        case.lowest_friction, 60.0,
     )  # fmt: skip
     versions = peers(load=False)
     file = out / "best_settings.json"

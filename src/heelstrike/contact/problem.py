@@ -256,7 +256,7 @@ def run_solvers(
         count, count=count, delassus=matrix, free=offset, friction=friction,
         set=np.full(count, CONE, np.int64) if sets is None else sets,
     )  # fmt: skip
-    answer = ContactAnswer.allocate(nc=count, mode=mode)
+    answer = ContactAnswer.allocate(capacity=count, mode=mode)
     status = SolveStatus(solve_contact_kernel(order, problem, work, answer))
     # The solvers leave in the workspace what belongs to the last candidate, not to the best one.
     worst = certify(problem, work.settings, work.scaling, answer)

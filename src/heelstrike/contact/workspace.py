@@ -20,37 +20,37 @@ Integers = NDArray[np.int64]
 
 
 class ContactProblem(Bundle):
-    """A contact problem of up to nc contacts."""
+    """A contact problem of up to `capacity` contacts."""
 
     count: int = cell(int)
     """Number of contacts; the leading blocks of the arrays are used."""
-    first: Integers = array("nc + 1", of=int)
+    first: Integers = array("capacity + 1", of=int)
     """Row that each contact begins with; after the last, how many rows there are."""
-    delassus: Floats = array("2 nc", "2 nc")
+    delassus: Floats = array("2 capacity", "2 capacity")
     """Delassus matrix, symmetric."""
-    free: Floats = array("2 nc")
+    free: Floats = array("2 capacity")
     """Free velocity (or acceleration), the free term b."""
-    friction: Floats = array("nc")
+    friction: Floats = array("capacity")
     """Friction coefficient of each contact: 1 for an interval, zero for lines and half-lines."""
-    bound: Floats = array("nc")
+    bound: Floats = array("capacity")
     """Largest tangential impulse of each interval."""
-    set: Integers = array("nc", of=int)
+    set: Integers = array("capacity", of=int)
     """Where its impulses may lie; see :mod:`heelstrike.contact.sets`."""
 
 
 def contact_problem(contacts: int, **given: Any) -> ContactProblem:
     """Allocate a problem of so many contacts, each with a normal and a tangent."""
     first = 2 * np.arange(contacts + 1)
-    return ContactProblem.allocate(**{"nc": contacts, "first": first} | given)
+    return ContactProblem.allocate(**{"capacity": contacts, "first": first} | given)
 
 
 class ContactAnswer(Bundle):
     """What contacts do, and the impulses that make them."""
 
-    mode: Integers = array("nc", of=int)
+    mode: Integers = array("capacity", of=int)
     """Contact modes."""
-    impulse: Floats = array("2 nc")
-    velocity: Floats = array("2 nc")
+    impulse: Floats = array("2 capacity")
+    velocity: Floats = array("2 capacity")
     residual: Floats = array(3)
     """Complementarity, cone and penetration, relative (see ``Certificate``)."""
     rest: float = cell(float)
@@ -97,9 +97,9 @@ class Tally(Bundle):
 class Scaling(Bundle):
     """What a certificate measures with, and found out about rounding."""
 
-    slope: Floats = array("nc")
+    slope: Floats = array("capacity")
     """Tangential over normal impulse where sliding is prescribed, else zero."""
-    root: Floats = array("2 nc")
+    root: Floats = array("2 capacity")
     """Root of the diagonal of each row: velocity per unit of scaled impulse."""
     unit: float = cell(float)
     """Size of the data."""
@@ -112,26 +112,26 @@ class Scaling(Bundle):
 class StickingRows(Bundle):
     """The rows that shall have no velocity, where all contacts stick or are open."""
 
-    row: Integers = array("2 nc", of=int)
+    row: Integers = array("2 capacity", of=int)
     """Row of the problem of each equation."""
-    equation: Integers = array("2 nc", of=int)
+    equation: Integers = array("2 capacity", of=int)
     """Equation of each row of the problem, -1 for none."""
-    sharers: Floats = array("2 nc")
+    sharers: Floats = array("2 capacity")
     """How many rows share each equation."""
-    pulled: Integers = array("nc", of=int)
+    pulled: Integers = array("capacity", of=int)
     """Whether each contact would have pulled in an attempt before."""
-    x: Floats = array("2 nc")
-    pivot: Floats = array("2 nc")
+    x: Floats = array("2 capacity")
+    pivot: Floats = array("2 capacity")
     """x, pivot: Solution; pivots, and a right side."""
-    order: Integers = array("2 nc", of=int)
+    order: Integers = array("2 capacity", of=int)
     """The equation that has each place in the elimination."""
-    span: Integers = array("2 nc", of=int)
+    span: Integers = array("2 capacity", of=int)
     """How many columns the row of the factor in each place has."""
-    factor: Floats = array("2 nc", "2 nc")
-    square: Floats = array("2 nc", "2 nc")
+    factor: Floats = array("2 capacity", "2 capacity")
+    square: Floats = array("2 capacity", "2 capacity")
     lower_half: Floats = array("half")
     """Matrix of a small system."""
-    spare: Floats = array("2 nc")
+    spare: Floats = array("2 capacity")
     """Solution in the order of the elimination."""
     programs: Integers = array("sizes", of=int, address=True)
     """Addresses of the programs that solve small systems, by size; zero where there is none."""
@@ -141,21 +141,21 @@ class ReducedProblem(Bundle):
     """The scaled problem that the solvers work on."""
 
     unknowns: int = cell(int)
-    normal: Integers = array("nc", of=int)
-    tangent: Integers = array("nc", of=int)
+    normal: Integers = array("capacity", of=int)
+    tangent: Integers = array("capacity", of=int)
     """normal, tangent: Unknowns of each contact; the tangential one is -1 where there is none."""
-    prescribed: Integers = array("nc", of=int)
+    prescribed: Integers = array("capacity", of=int)
     """The mode the caller prescribes, ``OPEN`` for none."""
-    set: Integers = array("nc", of=int)
+    set: Integers = array("capacity", of=int)
     """Where the impulses of each contact may lie."""
-    cone: Floats = array("nc")
+    cone: Floats = array("capacity")
     """Friction coefficient of the scaled problem."""
-    source: Integers = array("2 nc", of=int)
+    source: Integers = array("2 capacity", of=int)
     """Row of the problem of each unknown."""
-    scale: Floats = array("2 nc")
-    offset: Floats = array("2 nc")
+    scale: Floats = array("2 capacity")
+    offset: Floats = array("2 capacity")
     """scale, offset: Impulse per unit of each unknown; scaled free velocity."""
-    matrix: Floats = array("2 nc", "2 nc")
+    matrix: Floats = array("2 capacity", "2 capacity")
 
 
 class Dictionary(Bundle):
@@ -177,30 +177,30 @@ class Equations(Bundle):
 
     size: int = cell(int)
     """Number of equations."""
-    unknown: Integers = array("2 nc", of=int)
+    unknown: Integers = array("2 capacity", of=int)
     """The unknown that each belongs to."""
-    friction_ratio: Floats = array("2 nc")
+    friction_ratio: Floats = array("2 capacity")
     """Tangential over normal impulse at a slipping contact, else zero."""
-    weight: Floats = array("2 nc")
+    weight: Floats = array("2 capacity")
     """Length of the impulse per unit of its unknown."""
-    point: Floats = array("2 nc")
-    before: Floats = array("2 nc")
+    point: Floats = array("2 capacity")
+    before: Floats = array("2 capacity")
     """point, before: Its unknown, in units of impulse; the same before the last refinement."""
-    tableau: Floats = array("2 nc", "2 nc + 1")
+    tableau: Floats = array("2 capacity", "2 capacity + 1")
     """Constant and coefficients, which elimination turns into the solution."""
-    pivot_row: Integers = array("2 nc", of=int)
+    pivot_row: Integers = array("2 capacity", of=int)
     """The row that holds the unknown of each equation, -1 for none: it is free."""
-    taken: Integers = array("2 nc", of=int)
+    taken: Integers = array("2 capacity", of=int)
     """Whether each row has been pivoted on."""
-    basis: Floats = array("2 nc", "2 nc")
+    basis: Floats = array("2 capacity", "2 capacity")
     """Free directions, one a row."""
-    moves: Integers = array("2 nc", of=int)
+    moves: Integers = array("2 capacity", of=int)
     """Whether each free direction changes a velocity."""
-    image: Floats = array("2 nc", "2 nc")
+    image: Floats = array("2 capacity", "2 capacity")
     """The velocities it causes."""
-    edge: Floats = array("2 nc", "2 nc + 2")
+    edge: Floats = array("2 capacity", "2 capacity + 2")
     """Edges of the cones in terms of the free directions."""
-    step: Floats = array("2 nc")
+    step: Floats = array("2 capacity")
     """A step along them; also scaled velocities."""
     dual: Dictionary = part(Dictionary)
     """Of the least-norm split."""
@@ -211,21 +211,21 @@ class Iteration(Bundle):
 
     number: int = cell(int)
     """Iterations so far."""
-    x: Floats = array("2 nc")
-    speed: Floats = array("2 nc")
+    x: Floats = array("2 capacity")
+    speed: Floats = array("2 capacity")
     """x, speed: Unknowns and their scaled velocities."""
-    value: Floats = array("2 nc")
-    slope: Floats = array("2 nc", "2 nc")
+    value: Floats = array("2 capacity")
+    slope: Floats = array("2 capacity", "2 capacity")
     """value, slope: What is left of the equations, and their Jacobian."""
-    step: Floats = array("2 nc")
-    square: Floats = array("2 nc", "2 nc")
+    step: Floats = array("2 capacity")
+    square: Floats = array("2 capacity", "2 capacity")
     """step, square: Newton's step, and the matrix it is solved with."""
 
 
 class Combinations(Bundle):
     """How far the combinations of modes have been tried."""
 
-    base: Integers = array("nc", of=int)
+    base: Integers = array("capacity", of=int)
     """Modes of the combination that is varied."""
     place: int = cell(int)
     """Number of the next combination, or of the next change of the base."""
@@ -237,7 +237,7 @@ class Combinations(Bundle):
 
 
 class ContactWorkspace(Bundle):
-    """Buffers of the contact kernels for up to nc contacts (d = 2)."""
+    """Buffers of the contact kernels for up to `capacity` contacts (d = 2)."""
 
     settings: Settings = part(Settings)
     tally: Tally = part(Tally)

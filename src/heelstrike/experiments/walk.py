@@ -286,6 +286,11 @@ class Case:
         """Gait that motors follow, if they follow one."""
         return self.gait if isinstance(self.gait, Gait) else None
 
+    @property
+    def lowest_friction(self) -> float:
+        """Friction coefficient of the ground where it is lowest."""
+        return float(self.ground.model().friction.min())
+
     def run(
         self,
         progress: Callable[[float], None] | None = None,

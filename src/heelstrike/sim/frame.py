@@ -16,10 +16,10 @@ acts at once and a simulation can be stopped, kept and taken up again at any ste
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import lru_cache
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from numba import types
 
@@ -40,6 +40,9 @@ from heelstrike.sim.dimension import AnyRobot, dimension_of
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record, RowsAndEvents
 from heelstrike.sim.record.recording import center_height, note_log, note_row_when_due, sound
+
+if TYPE_CHECKING:  # which have the loops that are made here
+    from heelstrike.sim.method import Method
 
 
 class Outcome(enum.IntEnum):
@@ -278,7 +281,8 @@ def frame(kernels: Kernels) -> Callable[..., int]:
 
 PLAIN: Fixed = (
     ("loops", 0), ("couplings", 0), ("latches", 0), ("brakes", 0), ("loop_rows", 0), ("nd", 0),
-    ("segments", 1), ("concave", 0), ("curved", 0), ("constraints", 0), ("ties", 0),
+    ("segments", 1), ("concave", 0), ("curved", 0), ("constraints", 0), ("ties", 0), ("axes", 2),
+    ("components", 2),
 )  # fmt: skip
 """What a robot and a ground without rarer features have none of.
 
@@ -287,15 +291,41 @@ constraints from outside, profiles or curves.
 """
 
 
-def fixed_for(robot: AnyRobot, ground: Any, work: Any, usual: Mapping[str, int]) -> Fixed:
+SEVEN_LINKS = {"nl": 9, "nj": 9, "nq": 9, "nv": 9, "nu": 6, "nc": 4}
+"""Extents of a biped of seven links that stands on heels and toes, as most are.
+
+Most loops of a step are as short as these: where they end costs as much as what they do.
+"""
+
+
+def fixed_for(robot: AnyRobot, ground: Any, work: Any, way: Method) -> Fixed:
     """Return what the loop of a simulation can take for granted: all that is rare, or nothing.
 
-    Two loops a method are enough: each is compiled when it is first needed. In space there is one.
+    So a method has two loops, and a third where it names the usual extents of robots; `way` is the
+    method. Each is compiled when it is first needed. In space there is one.
     """
-    plain = dimension_of(robot).is_plain(robot, ground)
-    if not (plain and all(getattr(work, name) == value for name, value in usual.items())):
+    plain = PLAIN + tuple(way.usual_numbers.items())
+    if not (dimension_of(robot).is_plain(robot, ground) and agrees(work, plain)):
         return ()
-    return PLAIN + tuple(usual.items())
+    extents, seven = robot.model.extents, plain + tuple(way.usual_extents.items())
+    usual = all(extents[name] == size for name, size in way.usual_extents.items())
+    return seven if usual and agrees(work, seven) else plain
+
+
+def agrees(bundle: Any, fixed: Fixed) -> bool:
+    """Whether a bundle and its parts have what is taken for granted of extents and numbers.
+
+    Those of the package have. A method from outside may use the same names for something else.
+    """
+    known, extents = dict(fixed), bundle.extents
+    if any(size != known.get(name, size) for name, size in extents.items()):
+        return False
+    for name, member in bundle.declared.items():
+        if member.role == "part" and not agrees(getattr(bundle, name), fixed):
+            return False
+        if member.role == "number" and name in known and getattr(bundle, name) != known[name]:
+            return False
+    return True
 
 
 @lru_cache

@@ -309,7 +309,7 @@ def _laid_out(robot: Robot) -> Memory:
     assembly = Assembly.allocate(
         extents,
         problem=contact_problem(most),
-        answer=ContactAnswer.allocate(nc=most),
+        answer=ContactAnswer.allocate(capacity=most),
     )
     problem = assembly.problem
     memory = Memory.allocate(

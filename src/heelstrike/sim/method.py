@@ -73,6 +73,9 @@ class Method(ABC):
     usual_numbers: ClassVar[Mapping[str, int]] = {}
     """Whole numbers of its bundle as they mostly are: with these, loops have no code for others."""
 
+    usual_extents: ClassVar[Mapping[str, int]] = {}
+    """Extents of robots as they mostly are: those of these extents have a loop of their own."""
+
     impulses_in_events: ClassVar[bool] = False
     """Whether impulses of impacts are in the events of a run, not in the forces of its rows."""
 

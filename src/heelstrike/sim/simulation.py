@@ -264,7 +264,7 @@ class Simulation:
     def _choose_loop(self) -> float:
         """Take the loop that is made for what this robot, ground and method do not have."""
         way = self._way
-        fixed = fixed_for(self.robot, self._ground.model(), self._work, way.usual_numbers)
+        fixed = fixed_for(self.robot, self._ground.model(), self._work, way)
         self._loop, compile_s = compiled_loop(way.kernels, way.work, fixed)
         return compile_s
 

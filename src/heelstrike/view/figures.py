@@ -6,14 +6,13 @@ import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
 from heelstrike.sim.run import QUANTITIES, Run
 from heelstrike.view import contact_figures, energy_figure, joint_figures, snapshots
-from heelstrike.view.panels import Excerpt
+from heelstrike.view.panels import Excerpt, rows_within
 from heelstrike.view.quantity_figure import draw_quantity
 from heelstrike.view.style import save_figure, styled
 from heelstrike.wording import meant
@@ -80,32 +79,13 @@ def plot(
     """
     if what not in _DRAWINGS and what not in QUANTITIES and what not in run.log:
         raise ViewError(_unknown(what, tuple(run.log)))
-    excerpt = Excerpt(run, _rows(run, span), gait)
+    excerpt = Excerpt(run, rows_within(run, span), gait)
     with styled():
         drawing = _DRAWINGS.get(what)
         figure = draw_quantity(excerpt, what) if drawing is None else drawing(excerpt)
     if path is not None:
         save_figure(figure, path)
     return figure
-
-
-def _rows(run: Run, span: tuple[float, float] | None) -> slice:
-    """Rows of a run within a span of time."""
-    if not len(run.time):
-        raise ViewError(f"there is nothing to draw: the run has no rows ({run.message})")
-    if span is None:
-        return slice(0, len(run.time))
-    try:
-        start, end = (float(t) for t in span)
-    except (TypeError, ValueError):
-        raise ViewError(f"a span is a pair of times in s, got {span!r}") from None
-    first, last = np.searchsorted(run.time, (start - 1e-9, end + 1e-9))
-    if not last > first:
-        raise ViewError(
-            f"there is nothing to draw: the run has no rows from {start} s to {end} s; it lasts "
-            f"from {run.time[0]:g} s to {run.time[-1]:g} s"
-        )
-    return slice(int(first), int(last))
 
 
 def _unknown(what: str, logged: tuple[str, ...]) -> str:

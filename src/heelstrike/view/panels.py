@@ -11,10 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from heelstrike.errors import ViewError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import AnyRun, Run
 from heelstrike.view.style import (
     BOUND,
     GREY,
@@ -38,6 +39,31 @@ ROWS_OF_AN_IMPACT = 3
 controller sees its effect in the row after."""
 
 NOTE = "impacts leave the scale"
+
+
+def rows_within(run: AnyRun, span: tuple[float, float] | None) -> slice:
+    """Return the rows of a run within a span of time, all if none is given.
+
+    Raises
+    ------
+    ViewError
+        If it is no span, or there are no rows in it.
+    """
+    if not len(run.time):
+        raise ViewError(f"there is nothing to draw: the run has no rows ({run.message})")
+    if span is None:
+        return slice(0, len(run.time))
+    try:
+        start, end = (float(t) for t in span)
+    except (TypeError, ValueError):
+        raise ViewError(f"a span is a pair of times in s, got {span!r}") from None
+    first, last = np.searchsorted(run.time, (start - 1e-9, end + 1e-9))
+    if not last > first:
+        raise ViewError(
+            f"there is nothing to draw: the run has no rows from {start} s to {end} s; it lasts "
+            f"from {run.time[0]:g} s to {run.time[-1]:g} s"
+        )
+    return slice(int(first), int(last))
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,7 +67,7 @@ def test_sticking_contacts_are_solved_alike_with_and_without_programs(freedom: i
             problem = contact_problem(
                 count, count=count, delassus=delassus, free=free, friction=np.full(count, 3.0)
             )
-            answer = ContactAnswer.allocate(nc=count, mode=np.full(count, STICK, np.int64))
+            answer = ContactAnswer.allocate(capacity=count, mode=np.full(count, STICK, np.int64))
             assert solve_contact_kernel(solver_order("lemke"), problem, work, answer) == SOLVED
             answers.append((answer.impulse, work.tally.shortcuts))
         (found, quick), (other, slow) = answers

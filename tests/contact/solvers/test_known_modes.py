@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
+
 import heelstrike as hs
+from heelstrike.contact.modes import STICK
+from heelstrike.contact.problem import solve_contact
+from heelstrike.contact.solvers.certified_solve import contact_workspace
+from heelstrike.contact.solvers.known_modes import repeat
+from heelstrike.contact.workspace import ContactAnswer, contact_problem
 
 GENERAL = 0.2
 """Part of the steps that may take the general way; 0.8 did where poor pivots cost digits."""
@@ -24,3 +32,37 @@ def test_what_stands_straight_on_its_stops_takes_no_solver() -> None:
         general += reduced.unknowns > 0
     assert abs(simulation.time - 3.4) < 1e-9
     assert general <= GENERAL * steps
+
+
+@pytest.mark.parametrize("part", [0.3, 0.9, 0.999, 1.001])
+def test_points_of_a_sole_share_friction_as_far_as_their_cones_reach(part: float) -> None:
+    """Two feet on heel and toe each, which press by chance: as the general way shares it.
+
+    `part` is that of the most friction that a foot can hold. Most of them could not hold it in
+    equal shares, and above 1 they slip.
+    """
+    draw, friction, edges = np.random.default_rng(24), 0.6, 0
+    for _ in range(20):
+        jacobian = np.zeros((8, 6))
+        for point, x in enumerate(draw.uniform(-1.0, 1.0, 4)):
+            body = 3 * (point // 2)
+            jacobian[2 * point, body : body + 3] = 0.0, 1.0, -x
+            jacobian[2 * point + 1, body : body + 3] = 1.0, 0.0, -0.5
+        delassus = jacobian @ np.diag([0.5, 0.5, 3.0, 0.7, 0.7, 2.0]) @ jacobian.T
+        pressed = np.zeros((4, 2))
+        pressed[:, 0] = draw.uniform(0.02, 1.0, 4)
+        pressed[:, 1] = part * friction * pressed[:, 0] * np.repeat(draw.choice([-1.0, 1.0], 2), 2)
+        free = -delassus @ pressed.ravel()
+        work = contact_workspace(4)
+        problem = contact_problem(
+            4, count=4, delassus=delassus, free=free, friction=np.full(4, friction)
+        )
+        answer = ContactAnswer.allocate(capacity=4, mode=np.full(4, STICK))
+        held = repeat(problem, work.settings, work.sticking, work.scaling, answer)
+        assert held == (part < 1.0)
+        if held:
+            general = solve_contact(delassus, free, friction).impulse
+            np.testing.assert_allclose(answer.impulse.reshape(4, 2), general, atol=1e-9)
+            halves = pressed[:, 1].reshape(2, 2).mean(axis=1).repeat(2)
+            edges += bool(np.any(np.abs(halves) > friction * pressed[:, 0]))
+    assert edges >= (10 if 0.5 < part < 1.0 else 0)

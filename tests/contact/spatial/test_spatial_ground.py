@@ -7,6 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from heelstrike.compiler.compilation import uncompiled
+from heelstrike.contact.ground import Ground
 from heelstrike.contact.spatial.ground import (
     Box,
     SpatialGround,
@@ -121,3 +123,118 @@ def test_a_ground_is_made_of_its_numbers_again_to_the_last_bit() -> None:
         assert again.boxes == ground.boxes
         for name, values in ground.model().members().items():
             assert np.array_equal(values, getattr(again.model(), name)), name
+
+
+TURNED = Box(center=(0.3, -0.2, 0.5), size=(0.4, 0.6, 0.2), yaw=0.7, pitch=-0.3)
+HALF = np.array([0.2, 0.3, 0.1])
+
+
+def axes_of_turned() -> np.ndarray:
+    """Axes of the box above, one a row: about z by its yaw, then about its own y by its pitch."""
+    c, s = math.cos(0.7), math.sin(0.7)
+    about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    c, s = math.cos(-0.3), math.sin(-0.3)
+    about_y = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    return (about_z @ about_y).T
+
+
+def test_distances_to_a_box_that_is_turned() -> None:
+    """Outside to its nearest point, inside to its nearest face; away from it in either case."""
+    ground = SpatialGround(height=-5.0, boxes=(TURNED,)).model()
+    axes, center = axes_of_turned(), np.array(TURNED.center)
+    assert ground.rotation[0] == pytest.approx(axes.ravel())
+    rng = np.random.default_rng(21)
+    inside = 0
+    for own in rng.uniform(-1.0, 1.0, (200, 3)) * 1.6 * HALF:
+        point = center + own @ axes
+        distance, away = uncompiled(distance_to_box)(ground, 0, tuple(point.tolist()))
+        if np.all(np.abs(own) <= HALF):
+            inside += 1
+            face = int(np.argmax(np.abs(own) - HALF))
+            wanted = np.sign(own[face]) * axes[face]
+            assert distance == pytest.approx(np.max(np.abs(own) - HALF), abs=1e-14)
+        else:
+            off = (own - np.clip(own, -HALF, HALF)) @ axes
+            assert distance == pytest.approx(np.linalg.norm(off), abs=1e-14)
+            wanted = off / np.linalg.norm(off)
+        assert away == pytest.approx(wanted, abs=1e-12)
+        assert uncompiled(distance_to_face)(ground, 1, tuple(point.tolist())) == (distance, away)
+    assert 20 < inside < 180
+
+
+@pytest.mark.parametrize(
+    ("point", "beside"),
+    [
+        ((0.6, 0.0, 0.5), True),  # before the side, below the rim
+        ((0.6, 0.0, 1.0 - 1e-7), False),  # at the rim
+        ((0.6, 0.0, 1.2), False),  # above it
+        ((0.0, 0.0, 1.1), True),  # above the top, which is one face
+        ((0.6, 0.6, 0.5), False),  # before an edge
+        ((0.2, 0.1, 0.5), False),  # inside, behind no face
+        ((0.5, 0.1, 0.5), True),  # on the side
+        ((0.6, 0.0, -0.5e-3), True),  # in the floor, a little
+        ((0.6, 0.0, -2e-3), False),  # below the floor on which the box stands
+    ],
+)
+def test_what_is_beside_a_face_of_a_box(point: tuple[float, float, float], beside: bool) -> None:
+    ground = SpatialGround(boxes=(Box(center=(0.0, 0.0, 0.5), size=(1.0, 1.0, 1.0)),)).model()
+    assert bool(uncompiled(is_beside)(ground, 0, point)) is beside
+
+
+def test_a_box_that_nothing_can_touch_is_as_any_other() -> None:
+    """It lies wholly in another one: points that begin in it are pushed out somewhere."""
+    inner = Box(center=(0.0, 0.0, 0.5), size=(0.2, 0.2, 0.2))
+    outer = Box(center=(0.0, 0.0, 0.5), size=(1.0, 1.0, 1.0))
+    exposed = SpatialGround(boxes=(inner, outer)).model().exposed
+    assert np.array_equal(exposed, [[1] * 6, [1, 1, 1, 1, 1, 0]])
+
+
+def test_boxes_have_friction_and_restitution_of_their_own_or_the_ground_s() -> None:
+    own = Box(center=(0, 0, 1), size=(1, 1, 1), friction=0.0, restitution=1.0)
+    usual = Box(center=(3, 0, 1), size=(1, 1, 1))
+    model = SpatialGround(friction=0.4, restitution=0.2, boxes=(own, usual)).model()
+    assert model.friction.tolist() == [0.4, 0.0, 0.4]
+    assert model.restitution.tolist() == [0.2, 1.0, 0.2]
+    for wrong in ({"friction": -0.1}, {"restitution": -0.1}, {"restitution": 1.1}):
+        (name,) = wrong
+        with pytest.raises(SimulationError, match=f"{name} of the ground cannot be"):
+            SpatialGround(**wrong)
+        with pytest.raises(SimulationError, match=f"{name} of the ground cannot be"):
+            SpatialGround(boxes=(Box(center=(0, 0, 1), size=(1, 1, 1), **wrong),))
+
+
+def test_the_height_of_the_ground_is_where_it_meets_the_z_axis() -> None:
+    ground = SpatialGround(normal=(1.0, 2.0, 2.0), height=0.6).model()
+    assert ground.normal == pytest.approx([1 / 3, 2 / 3, 2 / 3])
+    assert ground.height == pytest.approx(0.4)
+    for normal in ((0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0)):
+        with pytest.raises(SimulationError, match="the last positive"):
+            SpatialGround(normal=normal)
+
+
+def test_stairs_are_made_of_boxes() -> None:
+    """Each as long as all that is left of the flight, one on the other."""
+    ground = SpatialGround.stairs(
+        rise=0.2, tread=0.3, count=2, width=1.5, start=1.0, friction=0.4, restitution=0.1
+    )
+    first, second = ground.boxes
+    assert first.size == pytest.approx((0.6, 1.5, 0.2))
+    assert first.center == pytest.approx((1.3, 0.0, 0.1))
+    assert second.size == pytest.approx((0.3, 1.5, 0.2))
+    assert second.center == pytest.approx((1.45, 0.0, 0.3))
+    assert (ground.friction, ground.restitution) == (0.4, 0.1)
+    good = {"rise": 0.2, "tread": 0.3, "count": 2, "width": 1.0}
+    for name, value in (("rise", 0.0), ("tread", -0.1), ("count", 0), ("width", 0.0)):
+        with pytest.raises(SimulationError, match=f"{name}={value}"):
+            SpatialGround.stairs(**(good | {name: value}))
+
+
+@pytest.mark.parametrize("slope", [-0.3, 0.2])
+def test_a_slope_of_the_plane_climbs_as_it_does_there(slope: float) -> None:
+    ground = SpatialGround.of_plane(Ground(slope=slope, friction=0.3, restitution=0.2))
+    x = 2.0
+    gap, _ = uncompiled(distance_to_face)(ground.model(), 0, (x, 5.0, x * math.tan(slope)))
+    assert gap == pytest.approx(0.0, abs=1e-15)
+    assert (ground.friction, ground.restitution) == (0.3, 0.2)
+    with pytest.raises(SimulationError, match="profile"):
+        SpatialGround.of_plane(Ground.stairs(rise=0.1, tread=0.3, count=2))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import importlib.util
 import pickle
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import campaign_cases as cases
@@ -18,6 +19,7 @@ from scipy import stats
 import heelstrike as hs
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.campaigns import Draw, sending
+from heelstrike.experiments.campaigns.campaign import AHEAD, _by_others
 from heelstrike.experiments.campaigns.workers import dask_client, is_death, process_pool
 
 FRICTION = {"ground.friction": stats.uniform(0.2, 0.6), "state.v.root_x": stats.norm(0.0, 0.3)}
@@ -68,6 +70,29 @@ def test_a_cluster_comes_to_the_same_to_the_last_bit() -> None:
     client = Client()
     assert as_text(made().run(executor=client)) == as_text(made().run(workers=1))
     assert client.submitted == 3  # blocks of 32
+
+
+class AtOnce(ThreadPoolExecutor):
+    """Finishes at once what it is to do, and knows how much that was."""
+
+    submitted = 0
+
+    def submit(self, *_: Any, **__: Any) -> Future[Any]:
+        self.submitted += 1
+        found: Future[Any] = Future()
+        found.set_result([self.submitted])
+        return found
+
+
+def test_only_so_many_blocks_are_submitted_ahead() -> None:
+    """A queue of a cluster does not hold all of a campaign: another block follows each result."""
+    executor, blocks = AtOnce(1), [SimpleNamespace(number=k) for k in range(3 * AHEAD)]
+    done = _by_others(executor, bytes, iter(blocks))
+    for k in range(1, 3 * AHEAD + 1):
+        block, outcomes = next(done)
+        assert (block.number, outcomes) == (k - 1, [k])
+        assert executor.submitted == min(AHEAD + k - 1, 3 * AHEAD)
+    assert list(done) == []
 
 
 def test_of_a_block_that_kills_workers_of_a_cluster_only_the_trial_is_lost() -> None:

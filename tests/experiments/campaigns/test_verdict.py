@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ import pytest
 from scipy import stats
 
 import heelstrike as hs
+from heelstrike.analysis.stability.largest import largest
 from heelstrike.experiments.campaigns import Bounds, Draw, Outcome, proportion, verdict
+from heelstrike.experiments.campaigns.figure import draw_campaign
 from heelstrike.experiments.campaigns.page import save_campaign_page
 from heelstrike.experiments.campaigns.parameters import planned
 from heelstrike.experiments.campaigns.verdict import influences, sobol_orders
@@ -89,6 +92,8 @@ def test_what_the_outcome_hangs_on() -> None:
     assert math.isnan(found["which"].rank)
     told = verdict(results)
     assert "better with less b" in str(told)
+    assert "better with more a:" not in str(told)  # which may be by chance
+    assert "better with less a:" not in str(told)
     assert told.causes[0][0] == "slipped"
     failed = np.flatnonzero(~results.success)
     assert told.worst == tuple(failed[:10].tolist())
@@ -118,6 +123,36 @@ def test_a_page_holds_everything_and_asks_for_nothing(tmp_path: Path) -> None:
     assert "heelstrike campaign x" in text
     with pytest.raises(hs.ViewError, match=r"ends in \.html"):
         save_campaign_page(results, tmp_path / "page.pdf")
+
+
+def test_the_figure_has_parts_of_equally_many_trials() -> None:
+    """Eight of what is drawn from a distribution; of a list each of its numbers, or texts."""
+    results = results_of(
+        {"x": stats.uniform(), "few": [1.0, 2.5], "which": ["one", "two"]},
+        lambda values: values[:, 0] < 0.7, trials=160,
+    )  # fmt: skip
+    panels = {axes.get_title(loc="left"): axes for axes in draw_campaign(results).axes}
+    for name, column in (("x", 0), ("few", 1), ("which", 2)):
+        axes = panels[f"walked on (%) by {name}"]
+        found = sorted(
+            (float(line.get_xdata()[0]), float(line.get_ydata()[0]))
+            for line in axes.lines if line.get_marker() == "o"
+        )  # fmt: skip
+        values = results.values[:, column]
+        parts = np.split(np.sort(values), 8) if name == "x" else np.unique(values)
+        assert [x for x, _ in found] == pytest.approx([np.median(part) for part in parts])
+        if name == "x":
+            assert [y for _, y in found[:5]] == [100.0] * 5
+            assert [y for _, y in found[6:]] == [0.0] * 2
+    labels = panels["walked on (%) by which"].get_xticklabels()
+    assert [label.get_text() for label in labels] == ["one", "two"]
+
+
+def test_margins_are_looked_for_as_finely_as_others() -> None:
+    margin, own = signature(hs.Campaign.margin).parameters, signature(largest).parameters
+    assert {name: margin[name].default for name in ("strides", "halvings")} == {
+        name: own[name].default for name in ("strides", "halvings")
+    }
 
 
 def test_a_margin_lies_between_what_was_stood_and_what_was_not() -> None:

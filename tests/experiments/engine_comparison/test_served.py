@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import runpy
+import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import heelstrike as hs
 from heelstrike.experiments.engines import InvalidRunError, Scenario
+from heelstrike.experiments.engines import served as served_module
+from heelstrike.experiments.engines.genesis_peer import GenesisPeer
 from heelstrike.experiments.engines.peer import flight
 from heelstrike.experiments.engines.served import ServedPeer, other_python, served
 
@@ -67,6 +73,43 @@ def test_what_has_ended_is_not_asked_again(tmp_path: Path) -> None:
 
 def test_a_module_that_no_python_has_is_found_nowhere() -> None:
     assert other_python("no_such_module_of_anybody") == ("", "")
+
+
+@pytest.fixture
+def version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[bytes], bytes]:
+    """What looks for a module in another Python, here where it finds what lies in a folder."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    found: Callable[[bytes], bytes] = runpy.run_path(served_module._LOOKING)["version"]
+    return found
+
+
+def test_a_module_that_is_slow_is_not_imported_for_its_version(
+    tmp_path: Path, version: Callable[[bytes], bytes]
+) -> None:
+    (tmp_path / "genesis.py").write_text("raise RuntimeError('it was imported')\n")
+    assert version(b"genesis") == b""  # some other module of this name
+    told = tmp_path / "genesis_world-1.2.3.dist-info"
+    told.mkdir()
+    (told / "METADATA").write_text("Metadata-Version: 2.1\nName: genesis-world\nVersion: 1.2.3\n")
+    assert version(b"genesis") == b"1.2.3"
+    (tmp_path / "genesis.py").unlink()
+    assert version(b"genesis") == b""
+
+
+def test_genesis_may_compile_for_long_and_then_not_hang(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = tmp_path / "engine.py"
+    text = SCRIPT.format(act="time.sleep(100.0)")
+    script.write_text(
+        text.replace('if do == "go"', 'if do == "make": time.sleep(1.0)\n    if do == "go"')
+    )
+    monkeypatch.setattr(served_module, "other_python", lambda _: (sys.executable, "1"))
+    monkeypatch.setattr(GenesisPeer, "script", str(script))
+    peer: Any = GenesisPeer(flight(hs.load_robot("bravo7")), 1e-3, patience=0.5)
+    peer.restart()
+    with pytest.raises(InvalidRunError, match="hangs"):
+        peer.record(1)
 
 
 def test_mujoco_in_another_process_does_as_in_this_one() -> None:

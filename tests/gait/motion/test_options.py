@@ -5,11 +5,14 @@ from __future__ import annotations
 import casadi
 import numpy as np
 import pytest
+from harness import Cable
 
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.errors import GaitError
 from heelstrike.gait.cost import Instant
+from heelstrike.gait.motion.optimize import checked_request
+from heelstrike.gait.motion.request import MotionRequest
 
 FASTER = 0.5
 """Speed at which points come down, in m/s."""
@@ -156,3 +159,53 @@ def test_a_loop_to_the_world_is_refused() -> None:
 def test_constraints_that_are_none(bravo7: hs.Robot, constraint: object, said: str) -> None:
     with pytest.raises(hs.GaitError, match=said):
         hs.optimize_motion(bravo7, step(), **asked(constraint=constraint))
+
+
+def request_of(robot: hs.Robot, phases: list[hs.ContactPhase], **more: object) -> MotionRequest:
+    usual = {
+        "distance": 0.4, "duration": None, "speed": None, "start": None, "end": None,
+        "friction": 0.75, "clearance": 0.1, "slope": 0.0, "cost": "torque", "force_margin": 20.0,
+        "landing_speed": 0.0, "repeat": "mirrored",
+    }  # fmt: skip
+    return checked_request(robot, phases, **(usual | more))  # type: ignore[arg-type]
+
+
+def test_margins_are_of_soles_that_stand_flat(bravo7: hs.Robot) -> None:
+    """Of both ends of one; a point that stands alone has none, though it may not pull."""
+    heel, toe = bravo7.feet[0].contacts
+    phases = [hs.ContactPhase("right_foot"), hs.ContactPhase(bravo7.contact_names[toe])]
+    request = request_of(bravo7, phases)
+    assert [request.force_margin_of(0, i) for i in (heel, toe)] == [20.0, 20.0]
+    assert request.force_margin_of(1, toe) == 0.0
+
+
+def test_feet_in_the_air_are_asked_for_a_hump_over_all_their_phases(bravo7: hs.Robot) -> None:
+    """From the ground to the ground, half-way the clearance; where a point leaves, nothing yet."""
+    shares = np.array([0.0, 0.5, 1.0])
+    other = bravo7.feet[1].contacts[0]
+    one = request_of(bravo7, [hs.ContactPhase("right_foot")])
+    np.testing.assert_allclose(one.clearance_of(0, other, shares), [-np.inf, 0.1, -np.inf])
+    two = request_of(bravo7, [hs.ContactPhase("right_foot"), hs.ContactPhase("right_foot")])
+    begin, end = (two.clearance_of(p, other, shares) for p in range(2))
+    assert begin[0] == end[2] == -np.inf
+    assert begin[2] == end[0] == pytest.approx(0.1)
+    assert begin[1] == pytest.approx(end[1])
+    assert 0.0 < begin[1] < 0.1
+    heel, toe = bravo7.feet[0].contacts
+    rolls = [hs.ContactPhase("right_foot"), hs.ContactPhase(bravo7.contact_names[toe])]
+    np.testing.assert_allclose(  # the heel lifts, and its foot stands on
+        request_of(bravo7, rolls).clearance_of(1, heel, shares)[:2], [-np.inf, 0.0]
+    )
+
+
+@pytest.mark.parametrize("given", [(0.3, 0.5), 0.4])
+def test_durations_of_a_phase_are_its_bounds(given: object) -> None:
+    phase = hs.ContactPhase("right_foot", duration=given, pieces=3)  # type: ignore[arg-type]
+    assert phase.duration == (given if isinstance(given, tuple) else (0.4, 0.4))
+    assert (phase.contacts, phase.pieces) == (("right_foot",), 3)
+
+
+def test_robots_that_something_else_holds_are_refused(bravo7: hs.Robot) -> None:
+    held = hs.constrained(bravo7, Cable("trunk", length=1.0))
+    with pytest.raises(GaitError, match="does not support constraints from outside"):
+        request_of(held, step())

@@ -110,3 +110,19 @@ def test_forces_plate_by_plate(tmp_path: Path) -> None:
     path = mot(other, list("abcdef"), ROWS)
     with pytest.raises(GaitError, match="no forces"):
         load_forces(path)
+
+
+def test_only_files_of_opensim_have_its_names_and_senses(tmp_path: Path) -> None:
+    """A table of text may call a joint as OpenSim does, and count its angle as it likes."""
+    names = ["time", "hip_flexion_r", "knee_angle_r", "ankle_angle_r"]
+    names += ["hip_flexion_l", "knee_angle_l", "ankle_angle_l"]
+    rows = np.column_stack([0.1 * np.arange(10), ROWS])
+    path = mot(tmp_path, names, rows)
+    assert read_table(path).opensim
+    assert len(load_recorded_motion(path, hs.load_robot("human7")).time) == 10
+    other = tmp_path / "motion.csv"
+    lines = [",".join(repr(float(x)) for x in row) for row in rows]
+    other.write_text("\n".join([",".join(names), *lines]) + "\n")
+    assert not read_table(other).opensim
+    with pytest.raises(GaitError, match="no column for"):
+        load_recorded_motion(other, hs.load_robot("human7"))

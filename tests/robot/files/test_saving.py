@@ -110,7 +110,10 @@ def _changed(robot: Robot, **fields: np.ndarray) -> object:
     return type(robot.model)(**robot.model.members() | fields)
 
 
-@pytest.mark.parametrize("seed", range(200))
+SEEDS = [*range(60), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(60, 200))]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_random_trees_through_all_formats(seed: int, tmp_path: Path) -> None:
     robot = with_all_properties(quiet(random_tree(seed)), seed)
     back = again(robot, tmp_path / "r.xml")

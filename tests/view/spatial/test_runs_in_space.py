@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -16,6 +17,7 @@ import heelstrike as hs
 from heelstrike.errors import ViewError
 from heelstrike.sim.spatial.run import RECORDED
 from heelstrike.view import robot_picture
+from heelstrike.view.spatial import figures
 from heelstrike.view.spatial.camera import Camera
 from heelstrike.view.spatial.film import SpatialFilm
 from heelstrike.view.style import styled
@@ -125,6 +127,8 @@ def test_an_unknown_figure_is_refused_with_what_there_is(run: hs.sim.spatial.Spa
         assert name in str(caught.value)
     with pytest.raises(ViewError, match="no rows from 5"):
         run.plot("gap", span=(5.0, 6.0))
+    with pytest.raises(ViewError, match="a span is a pair of times"):
+        run.plot("gap", span=0.5)
 
 
 def test_a_portrait(robot: hs.SpatialRobot, tmp_path: Path) -> None:
@@ -184,3 +188,31 @@ def test_a_long_run_has_a_page_of_fewer_rows(
     small = run.save_html(tmp_path / "small.html")
     rows = embedded(small)["data"]["rows"]
     assert 10 <= rows <= 12 < embedded(whole)["data"]["rows"]
+
+
+def test_of_many_points_the_lowest_of_each_link_is_drawn(
+    run: hs.sim.spatial.SpatialRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "MOST_NAMED", run.robot.nc - 1)
+    figure = run.plot("gap")
+    (axes,) = figure.axes
+    drawn = {line.get_label(): line.get_ydata() for line in axes.get_lines()}
+    links = np.array([name.rsplit("_", 1)[0] for name in run.robot.contact_names])
+    for link in set(links.tolist()):
+        lowest = run.gap[:, links == link].min(axis=1)
+        np.testing.assert_array_equal(drawn[link.replace("_", " ")], lowest)
+    assert "lowest point of each link" in figure.get_suptitle()
+    assert axes.get_ylabel() == "m"
+
+
+def test_torques_of_hinges_have_one_unit(run: hs.sim.spatial.SpatialRun) -> None:
+    assert run.plot("torque").axes[0].get_ylabel() == "N m"
+
+
+def test_friction_is_used_by_each_foot(run: hs.sim.spatial.SpatialRun) -> None:
+    """Feet that press against each other use friction, though their forces cancel."""
+    force = np.zeros_like(run.contact_force)
+    for foot, sideways in zip(run.robot.feet, (2.0, -2.0), strict=True):
+        force[:, foot.contacts[0]] = 10.0, 0.0, sideways
+    spread = replace(run, contact_force=force)
+    assert spread.summary().friction_use_max == pytest.approx(0.2 / run.ground.friction, rel=1e-12)

@@ -18,6 +18,9 @@ from heelstrike.sim.spatial.run import SpatialRun
 SHORTEST_WAY = 1e-3
 """Distance (m) below which energy a distance means nothing."""
 
+CERTAIN = 9
+"""Decimals of a distance (m) that the tolerance of the contact problems leaves certain."""
+
 MOST_LOOKED_AT = 2000
 """Rows of a run in which the zero moment point is looked for, evenly spread."""
 
@@ -48,8 +51,9 @@ class SpatialSummary(ToldSummary):
     zmp_margin_min_m: float
     """Least distance of the zero moment point to the edges of the support polygon."""
     friction_use_max: float
-    """Largest |f_t| / (μ f_n) of all contact points together, each with the friction of the plane
-    or box under it; rows in which one is at a wall, too, do not count."""
+    """Largest |f_t| / (μ f_n) of any foot, each of its points with the friction of the plane or box
+    under it; of all points, if there are no feet. Rows in which one is at a wall, too, do not
+    count."""
     slip_max_m: float
     """Largest distance that a contact point slid while pressed, over the whole run."""
     penetration_max_m: float
@@ -127,7 +131,7 @@ def summarize_in_space(run: SpatialRun) -> SpatialSummary:
         speed_m_s=distance / duration if duration > 0.0 else UNKNOWN,
         turn_rad=_turn(run),
         touchdowns=sum(event.kind is EventKind.TOUCHDOWN for event in run.events),
-        zmp_margin_min_m=round(float(np.fmin.reduce(margin, initial=UNKNOWN)), 12) + 0.0,
+        zmp_margin_min_m=round(float(np.fmin.reduce(margin, initial=UNKNOWN)), CERTAIN) + 0.0,
         friction_use_max=_friction_use(run),
         slip_max_m=_slip(run),
         penetration_max_m=run.certificates.penetration,
@@ -165,9 +169,11 @@ def _slip(run: SpatialRun) -> float:
 
 
 def _friction_use(run: SpatialRun) -> float:
-    """Largest share of the friction that all points together had."""
-    share, _ = foot_friction(run, face_friction(run), range(run.robot.nc))
-    return float(np.fmax.reduce(share, initial=UNKNOWN))
+    """Largest share of its friction that any foot used; of all points, if there are no feet."""
+    groups = [foot.contacts for foot in run.robot.feet] or [tuple(range(run.robot.nc))]
+    friction = face_friction(run)
+    used = [foot_friction(run, friction, contacts)[0] for contacts in groups]
+    return float(np.fmax.reduce(np.concatenate(used), initial=UNKNOWN))
 
 
 # What a person reads, in letters that the consoles of Windows have.

@@ -329,11 +329,11 @@ def contact_workspace(capacity: int, *, ready: bool = True) -> ContactWorkspace:
     rows = 2 * contacts
     programs = elimination_programs()
     work = ContactWorkspace.allocate(
-        nc=contacts,
+        capacity=contacts,
         sticking=StickingRows.allocate(
-            nc=contacts, half=LARGEST * (LARGEST + 1) // 2, programs=programs
+            capacity=contacts, half=LARGEST * (LARGEST + 1) // 2, programs=programs
         ),
-        equations=Equations.allocate(nc=contacts, dual=Dictionary.allocate(pairs=rows)),
+        equations=Equations.allocate(capacity=contacts, dual=Dictionary.allocate(pairs=rows)),
         lemke=Dictionary.allocate(pairs=2 * rows),
         solvers=try_solvers.address,
     )

@@ -2,9 +2,10 @@
 
 Sticking contacts make one symmetric system. Vertices of one flat foot share their tangential row,
 so that only the sum of their friction is determined; among all splits the equal one has the least
-norm. Rows may depend on each other otherwise, as those of two feet under straight legs do. Whatever
-is less usual - slip, or friction that this split cannot hold - is left to the general way, and the
-certificate decides as always.
+norm. Where a vertex cannot hold its share, the others hold what is left, as far as their cones
+reach. Rows may depend on each other otherwise, as those of two feet under straight legs do.
+Whatever is less usual, as slip is, is left to the general way, and the certificate decides as
+always.
 """
 
 from __future__ import annotations
@@ -93,18 +94,19 @@ def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) 
 
 
 @dissolved_kernel
-def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> int:
+def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> tuple[int, int]:
     """Like :func:`solve_equations` for few equations, as they are listed, by straight-line code.
 
     Returns ``FAILS``, ``HOLDS``, or ``MAY_DRIFT`` where a poor pivot may have cost digits: the
-    other elimination leaves it for the end. A row that nearly depends on those before it is tried
-    once more as the last: the toe under a straight leg, whose heel tells as much, and better.
+    other elimination leaves it for the end; and the rank. A row that nearly depends on those before
+    it is tried once more as the last: the toe under a straight leg, whose heel tells as much, and
+    better.
     """
     if size >= rows.programs.shape[0] or rows.programs[size] == 0:
-        return FAILS
+        return FAILS, 0
     delassus, source, matrix = problem.delassus, rows.row, rows.lower_half
     x, pivot = rows.x, rows.pivot
-    outcome = FAILS
+    outcome, rank = FAILS, 0
     for attempt in range(2):
         place = 0
         for i in range(size):
@@ -132,7 +134,7 @@ def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> int
         list_last(late, size, problem.first[problem.count], rows)
     if outcome != FAILS and rank < size:
         leave_out_idle(size, rows)
-    return outcome
+    return outcome, rank
 
 
 @kernel
@@ -189,8 +191,8 @@ def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -
 
 
 @dissolved_kernel
-def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> bool:
-    """Solve ``G x = -b`` over the listed rows, of least norm; return success.
+def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> int:
+    """Solve ``G x = -b`` over the listed rows, of least norm; return the rank, or -1 to give up.
 
     Elimination, G = L D Lᵀ with 1/D on the diagonal. Rows that depend on others are put off to the
     end of the list and bring no column to L: their number costs little. Neighbours among many
@@ -232,7 +234,7 @@ def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> b
             for i in range(rank):
                 matrix[rest, i] = matrix[rank, i]
         else:
-            return False
+            return -1
         if poor and rank == rest:
             poor = False
             least = POOR_PIVOT
@@ -246,7 +248,7 @@ def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> b
         shorten(rank, size, rows)
     for place in range(size):
         rows.x[order[place]] = x[place]
-    return True
+    return rank
 
 
 @kernel
@@ -294,11 +296,15 @@ def shorten(rank: int, size: int, rows: StickingRows) -> None:
 
 
 @dissolved_kernel
-def share_impulses(problem: ContactProblem, rows: StickingRows, answer: ContactAnswer) -> int:
+def share_impulses(
+    problem: ContactProblem, alone: bool, rows: StickingRows, answer: ContactAnswer
+) -> int:
     """Write the solution out to all rows in equal shares; return how many contacts would pull.
 
-    Their modes become open. -1 is returned where friction is not held. What pulls no more than
-    rounding may explain is cut off, and the certificate decides.
+    Their modes become open. What pulls no more than rounding may explain is cut off, and the
+    certificate decides. Where one of those that share friction cannot hold its part, others may;
+    `alone` tells that no other solution has the same effect. -1 is returned where friction is not
+    held.
     """
     impulse, first = answer.impulse, problem.first
     largest = 0.0
@@ -321,8 +327,42 @@ def share_impulses(problem: ContactProblem, rows: StickingRows, answer: ContactA
                 continue
             impulse[row], across = projected(problem, contact, impulse[row], impulse[row + 1])
             if across != impulse[row + 1]:
-                return -1
+                place = rows.equation[row + 1]
+                if not alone or place < 0 or not share_within_cones(problem, place, rows, answer):
+                    return -1
     return pulling
+
+
+@kernel
+def share_within_cones(
+    problem: ContactProblem, place: int, rows: StickingRows, answer: ContactAnswer
+) -> bool:
+    """Share friction among the rows of one equation as evenly as cones allow; return success.
+
+    Where the normal impulses are given, the shares of least norm are all at one level, but for
+    those whose cones do not reach it: these are at their edges. The level rises until it brings no
+    other cone to its edge.
+    """
+    impulse, first, total = answer.impulse, problem.first, abs(rows.x[place])
+    level, higher = 0.0, total / rows.sharers[place]
+    while higher > level:
+        level = higher
+        rest, sharers = total, 0.0
+        for contact in range(problem.count):
+            row = row_of(contact, first)
+            if row_of(contact + 1, first) > row + 1 and rows.equation[row + 1] == place:
+                _, edge = projected(problem, contact, impulse[row], level)
+                rest -= edge if edge < level else 0.0
+                sharers += edge >= level
+        if sharers == 0.0:
+            return False
+        higher = rest / sharers
+    for contact in range(problem.count):
+        row = row_of(contact, first)
+        if row_of(contact + 1, first) > row + 1 and rows.equation[row + 1] == place:
+            _, share = projected(problem, contact, impulse[row], level)
+            impulse[row + 1] = share if rows.x[place] > 0.0 else -share
+    return True
 
 
 @dissolved_kernel
@@ -377,10 +417,12 @@ def repeat(
         size = list_equations(problem, answer.mode, rows)
         if size < 0:
             return False
-        solved = FAILS if drifts else solve_at_once(size, problem, rows)
-        if solved == FAILS and not solve_equations(size, problem, rows):
-            return False
-        changed = share_impulses(problem, rows, answer)
+        solved, rank = (FAILS, 0) if drifts else solve_at_once(size, problem, rows)
+        if solved == FAILS:
+            rank = solve_equations(size, problem, rows)
+            if rank < 0:
+                return False
+        changed = share_impulses(problem, rank == size, rows, answer)
         if changed < 0:
             return False
         if changed == 0:

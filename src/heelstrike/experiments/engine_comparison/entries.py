@@ -143,6 +143,23 @@ ENTRIES: dict[str, Entry] = {
             "docstring of SolverSteel)"
         ),
     ),
+    "genesis": Entry(
+        "Genesis", "genesis",
+        bounces=False,
+        choices={
+            "constraint_timeconst": (0.005, 0.0),
+            "friction_cone": ("elliptic",),
+            "noslip_iterations": (5,),
+            "iterations": (100,),
+            "integrator": ("implicitfast", "Euler"),
+        },
+        advice=(
+            "the elliptic cone, which Genesis pairs with its resolution 'signorini' and an "
+            "impratio of 100, where contacts slide or must not creep; five iterations of noslip "
+            "where slip is a problem; a time constant of two steps or more (genesis-world, "
+            "docstrings of RigidOptions, friction_cone and contact_resolution)"
+        ),
+    ),
     "siconos": Entry(
         "Siconos", "siconos",
         choices={"theta": (0.75, 1.0), "solver": ("nsgs",), "tolerance": (1e-12,)},
@@ -173,12 +190,6 @@ ABSENT: dict[str, str] = {
         "Bullet and ODE have rows"
     ),
     "OpenHRP/Choreonoid": "no package for Python; its engine is its own",
-    "Genesis": (
-        "genesis-world 1.4.5 on a CPU, in double precision, carries the robot from its MJCF file, "
-        "if the contact points are spheres of 0.1 mm (of 1e-12 m: IndexError in get_sdf_grid), and "
-        "bears its weight at 0.34 ms a step (2026-11-27), but has no adapter yet: the first scene "
-        "takes 112 s of processor time to compile, later ones 7 s"
-    ),
 }
 """Simulators of the paper's Table 1 and others that are not run here, and why."""
 

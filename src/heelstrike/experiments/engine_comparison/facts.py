@@ -93,6 +93,13 @@ FACTS: dict[str, Facts] = {
         "hard, Gauss-Seidel, single precision", "cone, as far as iterations go", "yes", "none",
         "metadata and README of the newton wheel",
     ),
+    "genesis": Facts(
+        "Python", "own", "OpenGL, ray tracing", "Apache-2.0", "Linux, macOS, Windows", "yes",
+        "yes",
+        "soft constraints, a convex problem", "regularised pyramid: it creeps", "by damping",
+        "none",
+        "LICENSE, METADATA and README of the genesis-world wheel",
+    ),
     "siconos": Facts(
         "C++, Python", "own", "VTK", "Apache-2.0", "Linux, macOS", "yes", "yes",
         "hard, Moreau-Jean", "exact", "yes", "residual of the solver",

@@ -47,6 +47,9 @@ PACKAGES = {
         "Simbody", "opensim", "opensim", "simbody_peer", elsewhere=True, raced=False
     ),
     "newton": Package("Newton", "newton", "newton", "newton_peer", raced=False),
+    "genesis": Package(
+        "Genesis", "genesis", "genesis-world", "genesis_peer", elsewhere=True, raced=False
+    ),
     "ode": Package("ODE", "ode", "python3-pyode", "ode_peer", elsewhere=True, raced=False),
     "siconos": Package(
         "Siconos", "siconos", "python3-siconos", "siconos_peer", elsewhere=True, raced=False

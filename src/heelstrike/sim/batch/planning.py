@@ -127,7 +127,7 @@ def compile_all(method: Method, plans: Sequence[Plan]) -> float:
     found = set()
     for setting in settings.values():
         work = work_of(method, setting.robot)
-        found.add(fixed_for(setting.robot, setting.ground.model(), work, method.usual_numbers))
+        found.add(fixed_for(setting.robot, setting.ground.model(), work, method))
     for fixed in found:
         seconds += compiled_loop(method.kernels, method.work, fixed)[1]
     for plan in {plan.law.function: plan for plan in plans}.values():

@@ -137,7 +137,7 @@ def allocate_impact(robot: Robot, *, bounded: bool = False) -> Impact:
         wedged=NEVER,
         bounded=int(bounded),
         problem=contact_problem(entries),
-        answer=ContactAnswer.allocate(nc=entries),
+        answer=ContactAnswer.allocate(capacity=entries),
     )
 
 

@@ -97,7 +97,14 @@ from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCIT
 from heelstrike.sim.contacts.writers import Writers, rate_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.frame import DIVERGED, DONE, SOLVER_FAILED, Kernels, Scene
+from heelstrike.sim.frame import (
+    DIVERGED,
+    DONE,
+    SEVEN_LINKS,
+    SOLVER_FAILED,
+    Kernels,
+    Scene,
+)
 from heelstrike.sim.memory import (
     Assembly,
     Directions,
@@ -1065,4 +1072,5 @@ def move(
 
 TimeStepping.work = Stepping
 TimeStepping.usual_numbers = {"scheme": IMPACT_RESOLVED}
+TimeStepping.usual_extents = SEVEN_LINKS
 TimeStepping.kernels = Kernels(None, prepare, decide, None, move)

@@ -86,6 +86,29 @@ def document(
     )
 
 
+def player(title: str, parts: Mapping[str, str], content: Any, script: str) -> str:
+    """One HTML file that plays a run.
+
+    Parameters
+    ----------
+    title : str
+        Of the page, as plain text.
+    parts : mapping of str to str
+        Markup of what stands around the player, by the names that ``player.html`` has for it.
+    content : Any
+        What the script shows, as JSON has it.
+    script : str
+        What draws it.
+    """
+    body = shipped("player.html")
+    for name, part in parts.items():
+        body = body.replace(f"<!--{name}-->", part)
+    script += shipped("player.js")
+    return document(
+        title, body + data_block("run", content), style=shipped("page.css"), script=script
+    )
+
+
 def _digest(text: str) -> str:
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 

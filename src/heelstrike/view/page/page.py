@@ -16,7 +16,7 @@ from heelstrike.sim.run import Event, Run
 from heelstrike.view.page.columns import TOLERANCE, packed
 from heelstrike.view.page.curves import plots
 from heelstrike.view.page.events import contact_of, impulse_of, kind_in_words, place_of
-from heelstrike.view.page.markup import data_block, document, escaped, shipped, table
+from heelstrike.view.page.markup import escaped, player, shipped, table
 from heelstrike.view.page.motion import frames
 from heelstrike.view.page.provenance import provenance
 from heelstrike.view.page.rows import IMPACTS, shown_rows
@@ -98,20 +98,16 @@ def page(run: Run, gait: Gait | None = None, *, command: str = "") -> str:
     if not len(run.time):
         raise ViewError(f"there is nothing to show: the run has no rows ({run.message})")
     summary = summarize(run, gait=gait)
-    title = f"{run.robot.name}: {run.message}"
-    body = shipped("player.html")
     parts = {
         "title": escaped(run.robot.name),
         "headline": escaped(judge(run, gait).headline),
         "summary": table(dict(summary.lines()), "Summary"),
         "certificates": table(certificates(run), "Certificates: worst values over all steps"),
         "provenance": table(provenance(run, gait, command=command), "Where this comes from"),
+        "camera": "",
     }
-    for name, part in (parts | {"camera": ""}).items():
-        body = body.replace(f"<!--{name}-->", part)
-    body += data_block("run", contents(run, gait))
-    script = "".join(map(shipped, ("drawing.js", "recording.js", "player.js")))
-    return document(title, body, style=shipped("page.css"), script=script)
+    script = "".join(map(shipped, ("drawing.js", "recording.js")))
+    return player(f"{run.robot.name}: {run.message}", parts, contents(run, gait), script)
 
 
 def certificates(run: Run) -> dict[str, str]:

@@ -20,6 +20,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.sim.files.settings import settings
 from heelstrike.sim.run import Run
 from heelstrike.sim.setting import model_digest
+from heelstrike.sim.spatial.run import SpatialRun
 
 COMPUTING = ("numpy", "numba", "llvmlite")
 """Packages whose versions decide about the last digits of a run."""
@@ -42,7 +43,7 @@ def provenance(run: Run, gait: Gait | None = None, *, command: str = "") -> dict
     found |= {
         "robot": _robot(run.robot),
         "ground": ground_in_words(run.ground),
-        "method": _method(run),
+        "method": method_in_words(run),
     }
     if gait is not None:
         found["gait"] = (
@@ -107,7 +108,8 @@ def _robot(robot: Robot) -> str:
     )
 
 
-def _method(run: Run) -> str:
+def method_in_words(run: Run | SpatialRun) -> str:
+    """Say by which method a run was simulated, with its settings."""
     found = settings("", run.method)
     return f"{run.method.name}: " + ", ".join(
         f"{name.strip('_').replace('_', ' ')} {value}" for name, value in found.items()

@@ -34,6 +34,12 @@ PIXELS = 110
 FILMS = 1_000_000
 """Bytes that the films of a page take together, about."""
 
+LIMITS_REACHED = (
+    "It did not fall, and its contact certificates hold. It reached limits, listed below: whether "
+    "they matter depends on what it was meant to do"
+)
+"""What is said of a good run without advice that reached a limit."""
+
 
 @takes(ViewError)
 def report(
@@ -274,11 +280,12 @@ def _advice(named: Mapping[str, Account]) -> Iterator[str]:
         verdict = account.verdict
         label = f"<p>{escaped(name)}:</p>" if len(named) > 1 else ""
         items = "".join(f"<li>{escaped(each)}</li>" for each in verdict.advice)
-        nothing = (
-            f"<p>{' '.join(filter(None, (f'{NOTHING_TO_CHANGE}.', account.withstands)))}</p>"
-            if verdict.good
-            else "<p>No change is known that would help.</p>"
-        )
+        nothing = "No change is known that would help."
+        if verdict.good:
+            reached = any(limit.used >= REACHED for limit in verdict.limits)
+            checked = LIMITS_REACHED if reached else NOTHING_TO_CHANGE
+            nothing = " ".join(filter(None, (f"{checked}.", account.withstands)))
+        nothing = f"<p>{nothing}</p>"
         yield label + (f"<ol>{items}</ol>" if items else nothing)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, cast
 
 import numpy as np
@@ -18,7 +18,7 @@ from heelstrike.sim.files.spatial import IN_SPACE
 from heelstrike.sim.run import Run
 from heelstrike.sim.spatial.run import RECORDED, SpatialRun
 from heelstrike.view.comparison_figure import COLORS, STROKES
-from heelstrike.view.panels import THIN, Curve, Excerpt, Panel, draw_panels
+from heelstrike.view.panels import THIN, Curve, Excerpt, Panel, draw_panels, rows_within
 from heelstrike.view.style import foot_color, in_words, save_figure, styled
 from heelstrike.wording import meant
 
@@ -54,6 +54,28 @@ def _forces(run: SpatialRun) -> tuple[str, list[Panel]]:
     return "contact forces on the robot", panels
 
 
+def _gaps(run: SpatialRun) -> tuple[str, list[Panel]]:
+    """Distance of the contact points to the ground; of many points, the lowest of each link."""
+    robot = run.robot
+    if robot.nc <= MOST_NAMED:
+        return _quantity(run, "gap")
+    links = robot.model.contact_link
+    label, unit = RECORDED["gap"].label, RECORDED["gap"].unit
+    curves = [
+        Curve(
+            np.nanmin(run.gap[:, links == link], axis=1),
+            in_words(robot.link_names[link]),
+            _look(number),
+        )
+        for number, link in enumerate(np.unique(links).tolist())
+    ]
+    panels = [
+        Panel(unit, curves[first : first + OF_A_PANEL])
+        for first in range(0, len(curves), OF_A_PANEL)
+    ]
+    return f"{label}, the lowest point of each link", panels
+
+
 def _zero_moment_point(run: SpatialRun) -> tuple[str, list[Panel]]:
     """Zero moment point in the world, and how far inside the support polygon it is."""
     found = spatial_zero_moment_point(run)
@@ -75,6 +97,7 @@ def _zero_moment_point(run: SpatialRun) -> tuple[str, list[Panel]]:
 _DRAWINGS: dict[str, Callable[[SpatialRun], tuple[str, list[Panel]]]] = {
     "forces": _forces,
     "zmp": _zero_moment_point,
+    "gap": _gaps,
 }
 
 FIGURES = tuple(_DRAWINGS)
@@ -115,7 +138,7 @@ def plot_in_space(
     """
     if what not in _DRAWINGS and what not in RECORDED:
         raise ViewError(_unknown(what))
-    rows = _rows(run, span)
+    rows = rows_within(run, span)
     with styled():
         drawing = _DRAWINGS.get(what)
         title, panels = _quantity(run, what) if drawing is None else drawing(run)
@@ -163,12 +186,13 @@ def _quantity(run: SpatialRun, name: str) -> tuple[str, list[Panel]]:
     along = names[dims[0]]
     if not along:
         raise ViewError(f"robot {run.robot.name!r} has no {dims[0]}s: there is nothing to show")
+    unit = IN_SPACE.unit_along(run.robot, dims[0], len(along), quantity.unit)
     components = COMPONENTS[dims[1]] if len(dims) > 1 else ("",)
     table: Floats = values.reshape(len(run.time), len(along), -1)
     together = OF_A_PANEL if len(along) <= MOST_NAMED else len(along)
     panels = [
         Panel(
-            quantity.unit,
+            unit,
             [
                 Curve(table[:, i, k], in_words(along[i]), _look(i - first))
                 for i in range(first, min(first + together, len(along)))
@@ -185,22 +209,6 @@ def _look(number: int) -> dict[str, Any]:
     """Look of a curve: a colour of the palette, and other strokes when all have been used."""
     stroke = STROKES[number // len(COLORS) % len(STROKES)]
     return {"linewidth": THIN, "color": COLORS[number % len(COLORS)], "linestyle": stroke}
-
-
-def _rows(run: SpatialRun, span: Sequence[float] | None) -> slice:
-    """Rows of a run within a span of time."""
-    if not len(run.time):
-        raise ViewError(f"there is nothing to draw: the run has no rows ({run.message})")
-    if span is None:
-        return slice(0, len(run.time))
-    start, end = span
-    first, last = np.searchsorted(run.time, (start - 1e-9, end + 1e-9))
-    if not last > first:
-        raise ViewError(
-            f"there is nothing to draw: the run has no rows from {start} s to {end} s; it lasts "
-            f"from {run.time[0]:g} s to {run.time[-1]:g} s"
-        )
-    return slice(int(first), int(last))
 
 
 def _unknown(what: str) -> str:

@@ -16,9 +16,9 @@ from heelstrike.errors import ViewError
 from heelstrike.sim.spatial.record import SpatialEventKind
 from heelstrike.sim.spatial.run import SpatialEvent, SpatialRun
 from heelstrike.view.page.columns import TOLERANCE, packed
-from heelstrike.view.page.markup import data_block, document, escaped, shipped, table
+from heelstrike.view.page.markup import data_block, escaped, player, shipped, table
 from heelstrike.view.page.page import MOST_EVENTS, MOST_PHASES, check_page
-from heelstrike.view.page.provenance import versions
+from heelstrike.view.page.provenance import method_in_words, versions
 from heelstrike.view.page.rows import MOST_ROWS, Rows, rows_about
 from heelstrike.view.page.verdict import Verdict, happened
 from heelstrike.view.spatial.events import OF_POINTS
@@ -97,13 +97,9 @@ def page_in_space(run: SpatialRun, *, command: str = "") -> str:
         "provenance": table(provenance_in_space(run, command), "Where this comes from"),
         "camera": escaped(CAMERA),
     }
-    body = shipped("player.html")
-    for name, part in parts.items():
-        body = body.replace(f"<!--{name}-->", part)
-    script = drawing_script() + shipped("player.js")
-    title = f"{run.robot.name}: {run.message}"
-    block = data_block("run", contents_within(run, LARGEST - len(script)))
-    return document(title, body + block, style=shipped("page.css"), script=script)
+    script = drawing_script()
+    content = contents_within(run, LARGEST - len(script) - len(shipped("player.js")))
+    return player(f"{run.robot.name}: {run.message}", parts, content, script)
 
 
 def drawing_script() -> str:
@@ -214,7 +210,7 @@ def certificates_in_space(run: SpatialRun) -> dict[str, str]:
 def provenance_in_space(run: SpatialRun, command: str = "") -> dict[str, str]:
     """Say where a run comes from, label by label."""
     robot, ground = run.robot, run.ground
-    normal = ", ".join(f"{float(value):.4g}" for value in np.asarray(ground.normal))
+    normal = ", ".join(f"{float(value) + 0.0:.4g}" for value in np.asarray(ground.normal))
     return {
         **({"command": command} if command else {}),
         **versions(),
@@ -222,7 +218,7 @@ def provenance_in_space(run: SpatialRun, command: str = "") -> dict[str, str]:
         f"actuators, {robot.nc} contact points",
         "ground": f"plane with normal ({normal}), {len(ground.boxes)} boxes, friction "
         f"{ground.friction:g}, restitution {ground.restitution:g}",
-        "method": repr(run.method),
+        "method": method_in_words(run),
         "record": f"{run.steps} steps, {len(run.time)} rows from {run.time[0]:.6g} s to "
         f"{run.time[-1]:.6g} s, {len(run.events)} events",
     }

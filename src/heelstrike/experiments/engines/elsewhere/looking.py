@@ -5,6 +5,12 @@ from __future__ import annotations
 import importlib
 import subprocess
 from contextlib import suppress
+from importlib import metadata
+from importlib.util import find_spec
+
+SLOW = {"genesis": "genesis-world"}
+"""Modules that take ten seconds or more to be imported, and the distributions they come in. They
+are only looked up."""
 
 DEBIAN = {"ode": "python3-pyode", "siconos": "python3-siconos"}
 """Modules that do not know their version, and the packages of Debian they come in."""
@@ -19,6 +25,10 @@ def version(order: bytes) -> bytes:
         Name of the module.
     """
     name = order.decode()
+    if name in SLOW:
+        with suppress(metadata.PackageNotFoundError):
+            return metadata.version(SLOW[name]).encode() if find_spec(name) else b""
+        return b""
     try:
         module = importlib.import_module(name)
     except ImportError:
