@@ -519,7 +519,9 @@ def test_the_impact_is_of_what_touches_with_its_bounces(posed: Posed) -> None:
     np.testing.assert_allclose(its.free[:7], wanted, atol=1e-12)
     np.testing.assert_array_equal(its.delassus[:7, :7], problem.delassus[np.ix_(kept, kept)])
     assert its.bound[2] == pytest.approx(0.4 * STEP)
-    uncompiled(pose_impact_of)(STEP, 3, True, True, table, assembly, impact)  # not asked to come out
+    uncompiled(pose_impact_of)(
+        STEP, 3, True, True, table, assembly, impact
+    )  # not asked to come out
     assert its.free[3] == pytest.approx(free[3] + 0.25 * -2.0)
     uncompiled(pose_impact_of)(STEP, 3, False, False, table, assembly, impact)  # no bounces
     assert its.free[3] == pytest.approx(free[3] + 3e-4 / STEP)
