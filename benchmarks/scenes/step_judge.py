@@ -252,7 +252,7 @@ class _Steps:
         least, near = self.bound(self.gap, before, rows.measured.restitution[:-1], mine)
         # Of the force of two faces only where it acts is known, and what it does. What is asked of
         # either face is: to push out of the ground, and to bounce.
-        came = np.linalg.norm(rates(self.jacobian, self.before), axis=-1)
+        came = rows.fastest(np.linalg.norm(rates(self.jacobian, self.before), axis=-1), self.before)
         asked = rows.measured.restitution[:-1] * came
         if self.scheme in BOUND:
             asked = asked + np.maximum(-self.gap, 0.0) / self.h

@@ -94,3 +94,37 @@ def test_what_is_in_the_floor_meets_the_wall_that_stands_on_it(made: Maker) -> N
     ground = hs.SpatialGround(friction=0.0, boxes=(box,))
     run = hs.simulate(robot, state=state, duration=0.05, ground=ground)
     assert np.max(run.position[:, 0]) <= 0.3 + 1e-6
+
+
+def test_points_that_are_in_the_floor_and_in_a_wall_come_out_of_both(made: Maker) -> None:
+    """Deeper in the floor, 50 µm, than in the wall that stands on it, 30 µm: not downwards."""
+    robot = made(FEELER)
+    box = hs.Box(center=(0.7, 0.0, 0.1), size=(0.4, 2.0, 0.2))
+    q = robot.reference_state().q.copy()
+    q[0], q[2] = 0.3 + 3e-5, 0.1 - 5e-5
+    run = hs.simulate(
+        robot, state=hs.State(q, np.zeros(6)), duration=0.02,
+        ground=hs.SpatialGround(friction=0.0, boxes=(box,)),
+    )  # fmt: skip
+    assert run.position[-1, 0] <= 0.3 + 1e-9
+    assert run.position[-1, 2] == pytest.approx(0.1, abs=1e-9)
+
+
+def test_a_ball_in_a_corner_touches_all_three_faces(made: Maker) -> None:
+    """It comes to rest where floor and two walls meet, and is in none of them on its way."""
+    robot = made(
+        "<body name='ball' pos='0.2 0.25 0.1'><freejoint/>"
+        "<geom type='sphere' size='0.1' mass='1'/></body>"
+    )
+    walls = (
+        hs.Box(center=(0.7, 0.0, 0.2), size=(0.4, 2.0, 0.4)),
+        hs.Box(center=(0.0, 0.7, 0.2), size=(2.0, 0.4, 0.4)),
+    )
+    state = hs.State(robot.reference_state().q, np.r_[1.3, 1.1, np.zeros(4)])
+    run = hs.simulate(
+        robot, state=state, duration=0.3, ground=hs.SpatialGround(friction=0.0, boxes=walls)
+    )
+    assert np.max(run.position[:, :2]) <= 0.4 + 1e-9
+    assert np.min(run.position[:, 2]) >= 0.1 - 1e-9
+    assert run.position[-1, :3] == pytest.approx([0.4, 0.4, 0.1], abs=1e-9)
+    assert run.velocity[-1] == pytest.approx(np.zeros(6), abs=1e-9)

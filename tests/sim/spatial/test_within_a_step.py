@@ -150,10 +150,10 @@ def test_the_table_has_what_may_hold_the_robot(made: Maker) -> None:
     nc = robot.nc
     for walls in (False, True):
         table = lay_out_table(robot, walls=walls)
-        kinds = [POINT] * nc + [WALL] * nc * walls + [STOP, STOP, BALL_STOP, DRY_JOINT]
+        kinds = [POINT] * nc + [WALL] * 2 * nc * walls + [STOP, STOP, BALL_STOP, DRY_JOINT]
         assert table.kind.tolist() == kinds
-        points = nc * (1 + walls)
-        assert table.owner[:points].tolist() == [*range(nc)] * (1 + walls)
+        points = nc * (1 + 2 * walls)
+        assert table.owner[:points].tolist() == [*range(nc)] * (1 + 2 * walls)
         first = robot.model.first_velocity
         shoulder, neck = (robot.joint_names.index(name) for name in ("shoulder", "neck"))
         assert table.owner[points:].tolist() == [shoulder, shoulder, neck, first[shoulder]]
@@ -507,7 +507,7 @@ def test_the_impact_is_of_what_touches_with_its_bounces(posed: Posed) -> None:
     table.touching[:] = NEVER_TOUCHED
     table.restitution[:3] = [0.5, 0.25, 0.5]
     assert uncompiled(closes)(STEP, 3, table, assembly)
-    uncompiled(pose_impact_of)(STEP, 3, False, table, assembly, impact)
+    uncompiled(pose_impact_of)(STEP, 3, False, True, table, assembly, impact)
     its = impact.problem
     assert its.count == 3
     assert impact.member[:3].tolist() == [0, 1, 3]
@@ -519,8 +519,12 @@ def test_the_impact_is_of_what_touches_with_its_bounces(posed: Posed) -> None:
     np.testing.assert_allclose(its.free[:7], wanted, atol=1e-12)
     np.testing.assert_array_equal(its.delassus[:7, :7], problem.delassus[np.ix_(kept, kept)])
     assert its.bound[2] == pytest.approx(0.4 * STEP)
-    uncompiled(pose_impact_of)(STEP, 3, True, table, assembly, impact)  # not asked to come out
+    uncompiled(pose_impact_of)(
+        STEP, 3, True, True, table, assembly, impact
+    )  # not asked to come out
     assert its.free[3] == pytest.approx(free[3] + 0.25 * -2.0)
+    uncompiled(pose_impact_of)(STEP, 3, False, False, table, assembly, impact)  # no bounces
+    assert its.free[3] == pytest.approx(free[3] + 3e-4 / STEP)
     # What touched in the step before, with no new one, makes no impact.
     listed(posed, {0: 2e-4}, np.zeros(posed.robot.nv))
     problem.free[0], assembly.answer.velocity[0], table.touching[0] = -0.5, 0.0, 3

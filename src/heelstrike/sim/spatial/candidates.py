@@ -81,32 +81,60 @@ def meet_face(
 
 
 @kernel
+def wall_beside(
+    model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, contact: int,
+    below: int, normal: Vector, wall: int, across: Vector,
+) -> tuple[int, float, Vector]:  # fmt: skip
+    """Return the nearest face that a contact meets beside others, its gap and normal.
+
+    The others are the face below it, and if it is not -1 a wall, with their normals; one parallel
+    to either is none beside it. -1 if there is none.
+    """
+    is_ball = model.contact_radius[contact] > 0.0 and model.contact_rim[contact] == 0.0
+    found, least, way = -1, math.inf, normal
+    for face in range(ground.half.shape[0] + 1):
+        if face in (below, wall):
+            continue
+        point, gap, away = meet_face(model, ground, tree, contact, face)
+        probe = point if model.contact_rim[contact] > 0.0 else contact_center(model, tree, contact)
+        at_edge = is_ball and dot(away, normal) < KERB
+        if face > 0 and not (at_edge or is_beside(ground, face - 1, probe)):
+            continue
+        alike = max(dot(away, normal), dot(away, across) if wall >= 0 else -1.0)
+        if gap < least and alike < PARALLEL:
+            found, least, way = face, gap, away
+    return found, least, way
+
+
+@kernel
 def faces_of(
     model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, contact: int
-) -> tuple[int, int]:
-    """Return the face that a contact meets, and the wall beside it; -1 if there is none.
+) -> tuple[int, int, int]:
+    """Return the face that a contact meets, and two walls beside it; -1 if there is none.
 
     In a corner the first is the one that points more upwards. A ball that lies on one face may meet
     the edge of another box, too, as of a kerb; rolling from box to box of one height it does not.
     """
     best, distance, normal = 0, math.inf, (0.0, 0.0, 1.0)
-    is_ball = model.contact_radius[contact] > 0.0 and model.contact_rim[contact] == 0.0
     for face in range(ground.half.shape[0] + 1):
         _, gap, away = meet_face(model, ground, tree, contact, face)
         if gap < distance:
             best, distance, normal = face, gap, away
-    wall, least, across = -1, math.inf, normal
-    for face in range(ground.half.shape[0] + 1):
-        point, gap, away = meet_face(model, ground, tree, contact, face)
-        probe = point if model.contact_rim[contact] > 0.0 else contact_center(model, tree, contact)
-        at_edge = is_ball and dot(away, normal) < KERB
-        if face == best or (face > 0 and not (at_edge or is_beside(ground, face - 1, probe))):
-            continue
-        if gap < least and dot(away, normal) < PARALLEL:
-            wall, least, across = face, gap, away
-    if wall >= 0 and least <= distance + BESIDE and across[2] > normal[2]:
-        return wall, best
-    return best, wall
+    if ground.half.shape[0] == 0:
+        return best, -1, -1
+    wall, least, across = wall_beside(
+        model, ground, tree, contact, best, normal, -1, normal
+    )  # fmt: skip
+    if wall < 0:
+        return best, -1, -1
+    other, farther, aside = wall_beside(
+        model, ground, tree, contact, best, normal, wall, across
+    )  # fmt: skip
+    if least <= distance + BESIDE and across[2] > normal[2]:
+        best, wall, normal = wall, best, across
+    if other >= 0 and farther <= distance + BESIDE and aside[2] > normal[2]:
+        best, other = other, best
+    return best, wall, other
 
 
 @kernel
@@ -126,7 +154,7 @@ def locate_points(
 ) -> None:  # fmt: skip
     """Find where the contact points are, and the ground that is nearest to each."""
     for contact in range(model.nc):
-        face, wall = faces_of(model, ground, tree, contact)
+        face, wall, other = faces_of(model, ground, tree, contact)
         point, gap, normal = meet_face(model, ground, tree, contact, face)
         for k in range(3):
             position[contact, k] = point[k]
@@ -138,16 +166,17 @@ def locate_points(
         bounces = model.restitution_scale[contact] * ground.restitution[face]
         table.restitution[contact] = min(bounces, 1.0)
         if table.wall[contact] >= 0:
-            locate_wall(model, ground, tree, contact, wall, table, feet)
+            entry = table.wall[contact]
+            locate_wall(model, ground, tree, contact, wall, entry, table, feet)
+            locate_wall(model, ground, tree, contact, other, entry + model.nc, table, feet)
 
 
 @kernel
 def locate_wall(
     model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, contact: int,
-    wall: int, table: BlockTable, feet: SpatialFeet,
+    wall: int, entry: int, table: BlockTable, feet: SpatialFeet,
 ) -> None:  # fmt: skip
-    """Find how far a contact point is from the wall beside it, infinitely if there is none."""
-    entry = table.wall[contact]
+    """Find how far a contact point is from a wall beside it, infinitely if there is none."""
     table.gap[entry] = math.inf
     if wall < 0:
         return

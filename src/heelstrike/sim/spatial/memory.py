@@ -28,7 +28,13 @@ from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import CommonTally
 from heelstrike.sim.push import Push, Pushes, pushes_on
-from heelstrike.sim.spatial.table import NEVER_TOUCHED, BlockTable, lay_out_table, most_rows_of
+from heelstrike.sim.spatial.table import (
+    NEVER_TOUCHED,
+    WALLS,
+    BlockTable,
+    lay_out_table,
+    most_rows_of,
+)
 
 KNOWN_SPEED = 1e-12
 """Velocity times the root of a mass (m/s kg^(1/2)) below which nothing is known of free velocities:
@@ -87,7 +93,7 @@ class SpatialFeet(Bundle):
     """The contact points of an instant beside what controllers see."""
 
     foot: Floats = array("feet", 3)
-    """Projection of each point onto the ground, then onto its wall: where its rows are taken."""
+    """Projection of each point onto the ground, then onto its walls: where its rows are taken."""
     frame: Floats = array("feet", 9)
     """Normals and tangents, row by row."""
 
@@ -267,7 +273,7 @@ def _laid_out(robot: SpatialRobot, *, walls: bool) -> SpatialMemory:
     nothing = spatial_scratch(0, 0, [robot.model])
     extents = {
         **robot.model.extents, "entries": len(table.kind), "axes": 3, "components": 3,
-        "feet": (2 if walls else 1) * robot.model.nc,
+        "feet": (1 + WALLS if walls else 1) * robot.model.nc,
     }  # fmt: skip
     memory = SpatialMemory.allocate(
         extents, command=guarded(np.zeros(robot.nu)), blocks=table, pushes=pushes_on(robot, ()),

@@ -2,9 +2,9 @@
 
 The scheme is that of the plane (:mod:`heelstrike.sim.time_stepping.method`): gaps linearised over
 the step, impacts whole within it. A step whose contact problem is not certified is halved, three
-times at most, and then solved with fifty times the effort, in the end without the impact, which
-then takes another step; if that does not help it goes on with a residual of up to 1e-6, marked, and
-above that the run ends.
+times at most, and then solved with fifty times the effort, in the end without restitution, or
+without the impact, which then takes another step; if that does not help it goes on with a residual
+of up to 1e-6, marked, and above that the run ends.
 """
 
 from __future__ import annotations
@@ -46,7 +46,12 @@ from heelstrike.sim.spatial.candidates import (
     locate_points,
     turn_of_ball,
 )
-from heelstrike.sim.spatial.impact import closes, solve_impact_of, touches_at_end
+from heelstrike.sim.spatial.impact import (
+    asks_for_bounces,
+    closes,
+    solve_impact_of,
+    touches_at_end,
+)
 from heelstrike.sim.spatial.memory import (
     MOST_ITERATIONS,
     SpatialAssembly,
@@ -173,19 +178,20 @@ def call_what_is_missed(
 
 @kernel
 def forgive_depth(step: float, table: BlockTable, assembly: SpatialAssembly) -> bool:
-    """Ask nothing to come out of the ground; return whether that changes anything.
+    """Ask nothing that touches to move by its gap; return whether that changes anything.
 
-    Points deeper than `LEFT_IN_THE_GROUND` are not left there: nothing changes then.
+    Neither out of the ground, nor down to it by less than counts as touching. Points deeper than
+    `LEFT_IN_THE_GROUND` are not left there: nothing changes then.
     """
     changed = False
     for place in range(assembly.count):
         gap = table.gap[assembly.candidate[place]]
         if gap < -LEFT_IN_THE_GROUND:
             return False
-        changed = changed or gap < 0.0
+        changed = changed or (gap != 0.0 and gap <= CLOSED_GAP)
     for place in range(assembly.count if changed else 0):
         gap = table.gap[assembly.candidate[place]]
-        if gap < 0.0:
+        if gap <= CLOSED_GAP:
             assembly.problem.free[assembly.problem.first[place]] -= gap / step
     return changed
 
@@ -214,8 +220,8 @@ def solve_positions(
     """Solve the problem of the positions; where there is no way out, without asking for one.
 
     Limbs that lie on several points, at the ends of their ranges, find none where each of their
-    points is in the ground by another billionth: each would have to slide its own way. They are
-    left there, and asked again when that is twice as long ago.
+    points is in the ground, or above it, by another billionth: each would have to slide its own
+    way. They are left there, and asked again when that is twice as long ago.
     """
     wedge.relaxed = 0
     at_once = goes_on_wedged(steps, wedge) and forgive_depth(step, table, assembly)
@@ -243,10 +249,12 @@ def left_by(status: int, answer: BlockAnswer) -> float:
 
 @kernel
 def solve_step_of(
-    model: SpatialModel, time: float, step: float, number: int, resolves: bool,
+    model: SpatialModel, time: float, step: float, number: int, resolves: bool, bounces: bool,
     memory: SpatialMemory,
 ) -> float:  # fmt: skip
     """Find the velocity at the end of a step; return the largest residual, zero if certified.
+
+    `resolves` says whether an impact is whole within it, `bounces` whether restitution counts.
 
     ``memory.next_v`` receives the velocity, ``memory.impact.arriving`` that with which positions
     move, ``memory.impact.impulse`` the impulses of the candidates.
@@ -287,7 +295,7 @@ def solve_step_of(
                 impact.happens = 1
                 left = memory.wedge.relaxed == 1
                 status = solve_impact_of(
-                    step, before, left, table, memory.solver, assembly, impact
+                    step, before, left, bounces, table, memory.solver, assembly, impact
                 )  # fmt: skip
                 worst = left_by(status, impact.answer)
                 add_impulses(model, impact.impulse, equations, assembly, next_v)
@@ -421,7 +429,7 @@ def take_step(
             )  # fmt: skip
         number = tally.steps + counts.parts
         left = 0  # whether the impact is left to the next step
-        worst = solve_step_of(model, time + done * step, step, number, resolves, memory)
+        worst = solve_step_of(model, time + done * step, step, number, resolves, True, memory)
         if worst > 0.0 and halvings < HALVINGS_OF_A_STEP:
             counts.halved = 1
             halvings += 1
@@ -430,10 +438,16 @@ def take_step(
             continue
         if worst > 0.0:  # before the run ends, or goes on marked, no effort is too much
             memory.solver.settings.effort = LAST_EFFORT
-            worst = solve_step_of(model, time + done * step, step, number, resolves, memory)
+            worst = solve_step_of(model, time + done * step, step, number, resolves, True, memory)
+            if worst > 0.0 and memory.impact.happens == 1 and asks_for_bounces(memory.impact):
+                # Friction may not let a point bounce (Painlevé's paradox): it stays, then.
+                worst = solve_step_of(
+                    model, time + done * step, step, number, resolves, False, memory
+                )  # fmt: skip
+                left = 1
             if worst > 0.0 and memory.impact.happens == 1:
                 # Between faces that nearly oppose each other an impact may have no answer at all.
-                worst = solve_step_of(model, time + done * step, step, number, False, memory)
+                worst = solve_step_of(model, time + done * step, step, number, False, True, memory)
                 left = 1
             memory.solver.settings.effort = MOST_ITERATIONS
         if not worst <= MARKED_RESIDUAL:
