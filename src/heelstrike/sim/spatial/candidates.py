@@ -301,10 +301,9 @@ def write_rows_of(
 def assemble(
     model: SpatialModel, step: float, table: BlockTable, feet: SpatialFeet, q: Floats, v: Floats,
     next_v: Floats, tree: SpatialWorkspace, factor: TreeFactor, count: int, candidate: Integers,
-    first_row: Integers, chain_end: Integers, rows: Floats, free: Floats,
-    delassus: Floats, before: Floats,
+    first_row: Integers, chain_end: Integers, rows: Floats, free: Floats, before: Floats,
 ) -> None:  # fmt: skip
-    """Write the contact problem of the candidates, gaps linearised over the step.
+    """Write the rows of the candidates, whitened, and free velocities with gaps over the step.
 
     v is the velocity as the step begins, next_v the free one at its end; `chain_end` is the last
     velocity of the chain of each candidate. Receives the normal velocities `before`.
@@ -320,4 +319,14 @@ def assemble(
         if table.kind[entry] != DRY_JOINT:
             free[first] += table.gap[entry] / step
         whiten_rows(model, factor, last, first, size, rows)
-    write_delassus(model, count, first_row, chain_end, rows, delassus)
+
+
+@kernel
+def complete(model: SpatialModel, assembly: SpatialAssembly) -> None:
+    """Write the Delassus matrix of the problem, unless it is there."""
+    if assembly.complete == 0:
+        first, rows = assembly.problem.first, assembly.rows
+        write_delassus(
+            model, assembly.count, first, assembly.last, rows, assembly.problem.delassus
+        )  # fmt: skip
+        assembly.complete = 1

@@ -39,6 +39,7 @@ from heelstrike.sim.push import Pushes, share_over_step
 from heelstrike.sim.spatial.candidates import (
     NO_ANGLE,
     assemble,
+    complete,
     entry_speed,
     is_far,
     list_candidates,
@@ -46,12 +47,14 @@ from heelstrike.sim.spatial.candidates import (
     locate_points,
     turn_of_ball,
 )
+from heelstrike.sim.spatial.holding import goes_on_holding
 from heelstrike.sim.spatial.impact import closes, solve_impact_of, touches_at_end
 from heelstrike.sim.spatial.memory import (
     MOST_ITERATIONS,
     SpatialAssembly,
     SpatialEquations,
     SpatialFeet,
+    SpatialHolding,
     SpatialMemory,
     SpatialStep,
     SpatialWedge,
@@ -208,8 +211,8 @@ def note_relaxed(steps: int, wedge: SpatialWedge) -> None:
 
 @kernel
 def solve_positions(
-    step: float, steps: int, table: BlockTable, solver: BlockWorkspace,
-    assembly: SpatialAssembly, wedge: SpatialWedge,
+    model: SpatialModel, step: float, steps: int, table: BlockTable, holding: SpatialHolding,
+    solver: BlockWorkspace, assembly: SpatialAssembly, wedge: SpatialWedge,
 ) -> int:  # fmt: skip
     """Solve the problem of the positions; where there is no way out, without asking for one.
 
@@ -217,8 +220,11 @@ def solve_positions(
     points is in the ground by another billionth: each would have to slide its own way. They are
     left there, and asked again when that is twice as long ago.
     """
-    wedge.relaxed = 0
+    wedge.relaxed = assembly.complete = 0
     at_once = goes_on_wedged(steps, wedge) and forgive_depth(step, table, assembly)
+    if not at_once and goes_on_holding(model, assembly, holding, solver):
+        return SOLVED
+    complete(model, assembly)
     if at_once:
         note_relaxed(steps, wedge)
     status = solve_block_problem(assembly.problem, solver, assembly.answer)
@@ -274,10 +280,10 @@ def solve_step_of(
             assemble(
                 model, step, table, memory.feet, memory.q, v, next_v, equations.tree,
                 equations.factor, assembly.count, assembly.candidate, problem.first,
-                assembly.last, assembly.rows, problem.free, problem.delassus, assembly.before,
+                assembly.last, assembly.rows, problem.free, assembly.before,
             )  # fmt: skip
             status = solve_positions(
-                step, number, table, memory.solver, assembly, memory.wedge
+                model, step, number, table, memory.holding, memory.solver, assembly, memory.wedge
             )  # fmt: skip
             worst = left_by(status, assembly.answer)
             add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
@@ -286,6 +292,7 @@ def solve_step_of(
             if resolves and worst == 0.0 and closes(step, before, table, assembly):
                 impact.happens = 1
                 left = memory.wedge.relaxed == 1
+                complete(model, assembly)
                 status = solve_impact_of(
                     step, before, left, table, memory.solver, assembly, impact
                 )  # fmt: skip
