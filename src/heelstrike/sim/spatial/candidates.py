@@ -262,14 +262,23 @@ def list_candidates(
         problem.bound[count] = 0.0
         if table.kind[entry] == DRY_JOINT:
             problem.bound[count] = step * model.dry_friction[table.owner[entry]]
-        assembly.answer.mode[count] = table.mode[entry]
-        for i in range(table.size[entry]):
-            assembly.answer.impulse[rows + i] = table.impulse[entry, i]
         rows += table.size[entry]
         count += 1
     problem.first[count] = rows
     problem.count = count
     assembly.count = count
+    begin_as_before(table, assembly)
+
+
+@kernel
+def begin_as_before(table: BlockTable, assembly: SpatialAssembly) -> None:
+    """Let the candidates begin with modes and impulses of the last step."""
+    answer, first = assembly.answer, assembly.problem.first
+    for place in range(assembly.count):
+        entry = assembly.candidate[place]
+        answer.mode[place] = table.mode[entry]
+        for i in range(table.size[entry]):
+            answer.impulse[first[place] + i] = table.impulse[entry, i]
 
 
 @kernel

@@ -17,9 +17,9 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF
+from heelstrike.contact.sets import INTERVAL
 from heelstrike.contact.spatial.certificate import judge_blocks, weigh_blocks
 from heelstrike.contact.spatial.certified_solve import begin_from
-from heelstrike.contact.spatial.iterates import measure
 from heelstrike.contact.spatial.modes import LAST_MODES, STICK
 from heelstrike.contact.spatial.scaling import give_impulses, scale_data
 from heelstrike.contact.spatial.sticking import (
@@ -40,14 +40,35 @@ from heelstrike.contact.spatial.workspace import (
     BlockWorkspace,
     ScaledBlocks,
 )
-from heelstrike.dynamics.spatial.equations import factorize, solve_factorized
+from heelstrike.dynamics.spatial.equations import (
+    factorize,
+    solve_factorized,
+    solve_lower,
+    solve_upper,
+)
 from heelstrike.dynamics.spatial.rows import add_row_forces, along_rows, write_diagonal
+from heelstrike.dynamics.spatial.workspace import TreeFactor
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.spatial.memory import SpatialAssembly, SpatialHolding
 
-LEAST_ROWS = 18
-"""Rows that stick from which on the equations of the velocities are the cheaper ones."""
+SURE = 1e-6
+"""Velocities that are left, of data of size one, from which one more refinement is known to do."""
+
+
+@kernel
+def is_worthwhile(model: SpatialModel, size: int) -> bool:
+    """Whether the matrix of the velocities has fewer entries than that of so many rows."""
+    entries = model.nv
+    for k in range(model.nv):
+        entries += model.depth[k]
+    return size * size >= entries
+
+
+@kernel
+def rubs(problem: BlockProblem) -> bool:
+    """Whether dry friction takes part; it comes last."""
+    return problem.count > 0 and problem.set[problem.count - 1] == INTERVAL
 
 
 @kernel
@@ -82,95 +103,112 @@ def gather_held(
 
 @kernel
 def take_along(
-    model: SpatialModel, problem: BlockProblem, last: Integers, rows: Floats, impulse: Floats,
-    along: Floats,
+    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
+    impulse: Floats, along: Floats,
 ) -> None:  # fmt: skip
-    """Write Yᵀ λ of whitened rows."""
+    """Write Yᵀ λ of whitened rows. That of dry friction, all at once, is D^(-1/2) L⁻ᵀ λ."""
     for k in range(model.nv):
         along[k] = 0.0
+    if rubs(problem):
+        for block in range(problem.count):
+            if problem.set[block] == INTERVAL:
+                along[last[block]] = impulse[problem.first[block]]
+        solve_upper(model, factor, along)
+        for k in range(model.nv):
+            along[k] *= factor.root[k]
     for block in range(problem.count):
-        r = problem.first[block]
-        size = problem.first[block + 1] - r
-        add_row_forces(model, last[block], r, size, rows, impulse, along)
+        if problem.set[block] != INTERVAL:
+            r = problem.first[block]
+            size = problem.first[block + 1] - r
+            add_row_forces(model, last[block], r, size, rows, impulse, along)
+
+
+@kernel
+def change_along(model: SpatialModel, factor: TreeFactor, along: Floats, change: Floats) -> None:
+    """Write the change of the velocities L⁻¹ D^(-1/2) z."""
+    for k in range(model.nv):
+        change[k] = factor.root[k] * along[k]
+    solve_lower(model, factor, change)
 
 
 @kernel
 def give_along(
-    model: SpatialModel, problem: BlockProblem, last: Integers, rows: Floats, along: Floats,
-    velocity: Floats,
+    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
+    along: Floats, change: Floats, velocity: Floats,
 ) -> None:  # fmt: skip
-    """Write Y z of whitened rows."""
+    """Write Y z of whitened rows. That of dry friction is a change of velocity, kept, too."""
+    if rubs(problem):
+        change_along(model, factor, along, change)
     for block in range(problem.count):
         r = problem.first[block]
-        along_rows(model, last[block], r, problem.first[block + 1] - r, rows, along, velocity)
-
-
-@kernel
-def find_velocities_along(
-    model: SpatialModel, problem: BlockProblem, scaled: ScaledBlocks, last: Integers,
-    rows: Floats, x: Floats, holding: SpatialHolding, u: Floats,
-) -> None:  # fmt: skip
-    """Write the velocities that scaled impulses give, in units of the problem."""
-    count, weighted = problem.first[problem.count], holding.weighted
-    for row in range(count):
-        weighted[row] = scaled.weight[row] * x[row]
-    take_along(model, problem, last, rows, weighted, holding.along)
-    give_along(model, problem, last, rows, holding.along, u)
-    for row in range(count):
-        u[row] = scaled.offset[row] + scaled.weight[row] * u[row]
+        if problem.set[block] == INTERVAL:
+            velocity[r] = change[last[block]]
+        else:
+            size = problem.first[block + 1] - r
+            along_rows(model, last[block], r, size, rows, along, velocity)
 
 
 @kernel
 def hold_along(
-    model: SpatialModel, problem: BlockProblem, scaled: ScaledBlocks, mode: Integers,
-    last: Integers, rows: Floats, holding: SpatialHolding, x: Floats, u: Floats,
+    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, scaled: ScaledBlocks,
+    mode: Integers, last: Integers, rows: Floats, holding: SpatialHolding, u: Floats, x: Floats,
 ) -> None:  # fmt: skip
-    """Find the impulses of least norm that hold what sticks, and the velocities they give."""
+    """Find the impulses of least norm that hold what sticks; u is scratch."""
     gather_held(model, problem, scaled, mode, last, rows, holding.tree.matrix)
     factorize(model, holding.tree)
-    pull, weighted, weight = holding.along, holding.weighted, scaled.weight
+    along, weighted, weight = holding.along, holding.weighted, scaled.weight
     before = math.inf
     for _ in range(REFINEMENTS):
-        find_velocities_along(model, problem, scaled, last, rows, x, holding, u)
+        for row in range(problem.first[problem.count]):
+            weighted[row] = weight[row] * x[row]
+        take_along(model, factor, problem, last, rows, weighted, along)
+        give_along(model, factor, problem, last, rows, along, holding.change, u)
         left = 0.0
         for block in range(problem.count):
             for row in range(problem.first[block], problem.first[block + 1]):
                 weighted[row] = 0.0
                 if mode[block] == STICK:
+                    u[row] = scaled.offset[row] + weight[row] * u[row]
                     left = max(left, abs(u[row]))
                     weighted[row] = weight[row] * u[row]
         if left <= REFINED or left > STAGNANT * before:
             return
         before = left
-        take_along(model, problem, last, rows, weighted, pull)
-        solve_factorized(model, holding.tree, pull)
-        give_along(model, problem, last, rows, pull, weighted)
+        take_along(model, factor, problem, last, rows, weighted, along)
+        solve_factorized(model, holding.tree, along)
+        give_along(model, factor, problem, last, rows, along, holding.change, weighted)
         for block in range(problem.count):
             if mode[block] == STICK:
                 for row in range(problem.first[block], problem.first[block + 1]):
                     x[row] -= (u[row] - weight[row] * weighted[row]) / FIRM
-    find_velocities_along(model, problem, scaled, last, rows, x, holding, u)
+        if left <= SURE:
+            return
 
 
 @kernel
 def certify_along(
-    model: SpatialModel, problem: BlockProblem, scaled: ScaledBlocks, last: Integers,
-    rows: Floats, holding: SpatialHolding, answer: BlockAnswer,
+    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
+    scaled: ScaledBlocks, holding: SpatialHolding, answer: BlockAnswer,
 ) -> float:  # fmt: skip
     """Certify impulses by the velocities that the rows give; return the residual with rounding.
 
     Scaled rows have the length one at most. So, relative to the data, no velocity is off by more
-    than rounding of as many terms of the size of all scaled impulses together.
+    than rounding of as many terms of the size of all scaled impulses together. The change of the
+    velocities of the robot is kept.
     """
     count = problem.first[problem.count]
-    take_along(model, problem, last, rows, answer.impulse, holding.along)
-    give_along(model, problem, last, rows, holding.along, answer.velocity)
+    take_along(model, factor, problem, last, rows, answer.impulse, holding.along)
+    give_along(
+        model, factor, problem, last, rows, holding.along, holding.change, answer.velocity
+    )  # fmt: skip
+    if not rubs(problem):
+        change_along(model, factor, holding.along, holding.change)
     size = 1.0
     for row in range(count):
         answer.velocity[row] += problem.free[row]
         if scaled.weight[row] > 0.0:
             size += abs(answer.impulse[row]) / (scaled.weight[row] * scaled.unit)
-    terms = count + model.longest + 2.0
+    terms = count + 2.0 * model.longest + 2.0
     return judge_blocks(problem, terms * UNIT_ROUNDOFF * size, scaled, answer)
 
 
@@ -186,31 +224,38 @@ def note_shortcut(tally: BlockTally) -> None:
 
 @kernel
 def goes_on_holding(
-    model: SpatialModel, assembly: SpatialAssembly, holding: SpatialHolding,
+    model: SpatialModel, factor: TreeFactor, assembly: SpatialAssembly, holding: SpatialHolding,
     solver: BlockWorkspace,
 ) -> bool:  # fmt: skip
-    """Solve the problem of a step if what touches goes on sticking; return if it is certified."""
+    """Solve the problem of a step if what touches goes on sticking; return if it is certified.
+
+    The answer is changed in any case.
+    """
     problem, answer, last, rows = assembly.problem, assembly.answer, assembly.last, assembly.rows
-    scaled, iterate = solver.scaled, solver.iterate
+    scaled, iterate, newton = solver.scaled, solver.iterate, solver.newton
+    for block in range(problem.count):
+        iterate.mode[block] = answer.mode[block]
+        scaled.scale[block] = 1.0  # not known yet; what nothing moves counts as well
+    if not is_worthwhile(model, max(list_sticking_rows(problem, scaled, iterate.mode, newton), 0)):
+        return False
     write_diagonal(model, problem.count, problem.first, last, rows, problem.delassus)
     weigh_blocks(problem, solver.settings, scaled)
     scale_data(problem, scaled)
     begin_from(problem, scaled, answer, iterate)
     for _ in range(ROUNDS_OF_OPENING):
-        if list_sticking_rows(problem, scaled, iterate.mode, solver.newton) < LEAST_ROWS:
+        if list_sticking_rows(problem, scaled, iterate.mode, newton) < 0:
             return False
         begin_at_bounds(problem, scaled, iterate)
         hold_along(
-            model, problem, scaled, iterate.mode, last, rows, holding, iterate.x, iterate.u
+            model, factor, problem, scaled, iterate.mode, last, rows, holding, iterate.u, iterate.x
         )  # fmt: skip
-        iterate.worst, iterate.square = measure(problem, scaled, iterate.x, iterate.u)
-        if iterate.worst <= STUCK:
-            give_impulses(problem, scaled, iterate.x, answer)
-            residual = certify_along(model, problem, scaled, last, rows, holding, answer)
-            if residual <= solver.settings.tolerance:
-                note_shortcut(solver.tally)
-                return True
-            return False
+        give_impulses(problem, scaled, iterate.x, answer)
+        residual = certify_along(model, factor, problem, last, rows, scaled, holding, answer)
+        if answer.residual <= STUCK and residual <= solver.settings.tolerance:
+            note_shortcut(solver.tally)
+            return True
+        for row in range(problem.first[problem.count]):
+            iterate.u[row] = answer.velocity[row] * scaled.weight[row] / scaled.unit
         if correct_modes(problem, scaled, iterate) == 0:
             return False
     return False

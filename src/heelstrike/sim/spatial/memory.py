@@ -121,6 +121,8 @@ class SpatialHolding(Bundle):
     """Their matrix and its factor."""
     along: Floats = array("nv")
     """Impulses along the velocities."""
+    change: Floats = array("nv")
+    """Change of the velocities that impulses make."""
     weighted: Floats = array("capacity")
     """Impulses, or velocities, of the rows in other units."""
 

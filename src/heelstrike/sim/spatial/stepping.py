@@ -31,7 +31,7 @@ from heelstrike.dynamics.spatial.kinematics import (
     point_velocity,
 )
 from heelstrike.dynamics.spatial.rows import velocity_change
-from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
+from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.controller.interface import Contacts
@@ -39,6 +39,7 @@ from heelstrike.sim.push import Pushes, share_over_step
 from heelstrike.sim.spatial.candidates import (
     NO_ANGLE,
     assemble,
+    begin_as_before,
     complete,
     entry_speed,
     is_far,
@@ -211,8 +212,9 @@ def note_relaxed(steps: int, wedge: SpatialWedge) -> None:
 
 @kernel
 def solve_positions(
-    model: SpatialModel, step: float, steps: int, table: BlockTable, holding: SpatialHolding,
-    solver: BlockWorkspace, assembly: SpatialAssembly, wedge: SpatialWedge,
+    model: SpatialModel, step: float, steps: int, table: BlockTable, factor: TreeFactor,
+    holding: SpatialHolding, solver: BlockWorkspace, assembly: SpatialAssembly,
+    wedge: SpatialWedge,
 ) -> int:  # fmt: skip
     """Solve the problem of the positions; where there is no way out, without asking for one.
 
@@ -222,8 +224,9 @@ def solve_positions(
     """
     wedge.relaxed = assembly.complete = 0
     at_once = goes_on_wedged(steps, wedge) and forgive_depth(step, table, assembly)
-    if not at_once and goes_on_holding(model, assembly, holding, solver):
+    if not at_once and goes_on_holding(model, factor, assembly, holding, solver):
         return SOLVED
+    begin_as_before(table, assembly)
     complete(model, assembly)
     if at_once:
         note_relaxed(steps, wedge)
@@ -283,10 +286,15 @@ def solve_step_of(
                 assembly.last, assembly.rows, problem.free, assembly.before,
             )  # fmt: skip
             status = solve_positions(
-                model, step, number, table, memory.holding, memory.solver, assembly, memory.wedge
+                model, step, number, table, equations.factor, memory.holding, memory.solver,
+                assembly, memory.wedge,
             )  # fmt: skip
             worst = left_by(status, assembly.answer)
-            add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
+            if assembly.complete == 0:  # the change of velocity is known
+                for k in range(model.nv):
+                    impact.arriving[k] += memory.holding.change[k]
+            else:
+                add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
             for row in range(assembly.problem.first[assembly.count]):
                 impact.impulse[row] = assembly.answer.impulse[row]
             if resolves and worst == 0.0 and closes(step, before, table, assembly):
