@@ -322,10 +322,12 @@ def assemble(
         first, last = first_row[place], chain_end[place]
         size = first_row[place + 1] - first
         write_rows_of(model, tree, entry, first, table, feet, q, rows)
-        along_rows(model, last, first, 1, rows, v, free)
-        before[place] = free[first]
-        along_rows(model, last, first, size, rows, next_v, free)
-        if table.kind[entry] != DRY_JOINT:
+        if table.kind[entry] == DRY_JOINT:
+            before[place], free[first] = v[last], next_v[last]
+        else:
+            along_rows(model, last, first, 1, rows, v, free)
+            before[place] = free[first]
+            along_rows(model, last, first, size, rows, next_v, free)
             free[first] += table.gap[entry] / step
         whiten_rows(model, factor, last, first, size, rows)
 

@@ -56,13 +56,18 @@ SURE = 1e-6
 """Velocities that are left, of data of size one, from which one more refinement is known to do."""
 
 
+WORTHWHILE = 2
+"""How many times more entries the matrix of the rows that stick has where that of the velocities
+takes less time: both were timed with robots of 18 and 35 velocities."""
+
+
 @kernel
 def is_worthwhile(model: SpatialModel, size: int) -> bool:
-    """Whether the matrix of the velocities has fewer entries than that of so many rows."""
+    """Whether so many rows that stick are solved faster in the velocities."""
     entries = model.nv
     for k in range(model.nv):
         entries += model.depth[k]
-    return size * size >= entries
+    return size * size >= WORTHWHILE * entries
 
 
 @kernel
@@ -120,7 +125,11 @@ def take_along(
         if problem.set[block] != INTERVAL:
             r = problem.first[block]
             size = problem.first[block + 1] - r
-            add_row_forces(model, last[block], r, size, rows, impulse, along)
+            some = 0.0
+            for row in range(r, r + size):
+                some = max(some, abs(impulse[row]))
+            if some > 0.0:
+                add_row_forces(model, last[block], r, size, rows, impulse, along)
 
 
 @kernel
