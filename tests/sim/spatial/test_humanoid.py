@@ -13,10 +13,10 @@ from heelstrike.sim.spatial.run import SpatialRun
 JOINT = (("yaw", "0 0 1"), ("roll", "1 0 0"), ("pitch", "0 1 0"))
 
 
-def leg(side: str, y: float) -> str:
-    """Hip of three axes, knee, ankle of two; a foot on four small spheres."""
+def leg(side: str, y: float, more: str = "") -> str:
+    """Hip of three axes, knee, ankle of two, all with `more`; a foot on four small spheres."""
     hips = "".join(
-        f"<joint name='{side}_hip_{name}' axis='{axis}' range='-1.5 1.5' limited='true'/>"
+        f"<joint name='{side}_hip_{name}' axis='{axis}' range='-1.5 1.5' limited='true' {more}/>"
         for name, axis in JOINT
     )
     spheres = "".join(
@@ -28,16 +28,16 @@ def leg(side: str, y: float) -> str:
       <body name='{side}_thigh' pos='0 {y} -0.1'>{hips}
         <inertial pos='0 0 -0.15' mass='4' diaginertia='0.05 0.05 0.01'/>
         <body name='{side}_shin' pos='0 0 -0.35'>
-          <joint name='{side}_knee' axis='0 1 0' range='-0.1 2.5' limited='true'/>
+          <joint name='{side}_knee' axis='0 1 0' range='-0.1 2.5' limited='true' {more}/>
           <inertial pos='0 0 -0.15' mass='2' diaginertia='0.03 0.03 0.004'/>
           <body name='{side}_foot' pos='0 0 -0.35'>
-            <joint name='{side}_ankle_pitch' axis='0 1 0'/>
-            <joint name='{side}_ankle_roll' axis='1 0 0'/>
+            <joint name='{side}_ankle_pitch' axis='0 1 0' {more}/>
+            <joint name='{side}_ankle_roll' axis='1 0 0' {more}/>
             <inertial pos='0.03 0 -0.03' mass='0.8' diaginertia='0.001 0.003 0.003'/>{spheres}
           </body></body></body>"""
 
 
-def biped(made: Maker, base: str = "<freejoint/>") -> hs.SpatialRobot:
+def biped(made: Maker, *, base: str = "<freejoint/>", more: str = "") -> hs.SpatialRobot:
     names = [
         f"{side}_{joint}"
         for side in ("left", "right")
@@ -49,7 +49,7 @@ def biped(made: Maker, base: str = "<freejoint/>") -> hs.SpatialRobot:
     )
     trunk = (
         "<body name='trunk' pos='0 0 0.85'>" + base + "<inertial pos='0 0 0.15' mass='18' "
-        f"diaginertia='0.6 0.5 0.2'/>{leg('left', 0.1)}{leg('right', -0.1)}</body>"
+        f"diaginertia='0.6 0.5 0.2'/>{leg('left', 0.1, more)}{leg('right', -0.1, more)}</body>"
     )
     return made(trunk, f"<actuator>{motors}</actuator>")
 
@@ -106,7 +106,7 @@ def test_it_stands_for_a_minute(made: Maker) -> None:
 
 def test_dry_friction_of_the_base_bears_weight(made: Maker) -> None:
     """As in files whose default class of joints has `frictionloss`: what the feet do not bear."""
-    robot = biped(made, "<joint type='free' frictionloss='0.1'/>")
+    robot = biped(made, base="<joint type='free' frictionloss='0.1'/>")
     run = stand(robot, 6.0)
     has_stood(run, robot, 1e-7)
     feet = np.sum(run.contact_force[-1, :, 0])

@@ -171,7 +171,18 @@ def certify_blocks(
     velocity.
     """
     weigh_blocks(problem, settings, scaled)
-    rounding = sum_blocks(problem, scaled, answer)
+    return judge_blocks(problem, sum_blocks(problem, scaled, answer), scaled, answer)
+
+
+@kernel
+def judge_blocks(
+    problem: BlockProblem, rounding: float, scaled: ScaledBlocks, answer: BlockAnswer
+) -> float:
+    """Compute the residual of impulses and the velocity that they give; see `certify_blocks`.
+
+    `rounding` says how far off the velocities may be, relative to the data; `scaled` has the
+    weights.
+    """
     unit = scaled.unit
     worst, most, nothing = 0.0, 0.0, 0.0
     impulse, velocity = answer.impulse, answer.velocity

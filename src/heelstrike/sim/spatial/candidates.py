@@ -291,14 +291,23 @@ def list_candidates(
         problem.bound[count] = 0.0
         if table.kind[entry] == DRY_JOINT:
             problem.bound[count] = step * model.dry_friction[table.owner[entry]]
-        assembly.answer.mode[count] = table.mode[entry]
-        for i in range(table.size[entry]):
-            assembly.answer.impulse[rows + i] = table.impulse[entry, i]
         rows += table.size[entry]
         count += 1
     problem.first[count] = rows
     problem.count = count
     assembly.count = count
+    begin_as_before(table, assembly)
+
+
+@kernel
+def begin_as_before(table: BlockTable, assembly: SpatialAssembly) -> None:
+    """Let the candidates begin with modes and impulses of the last step."""
+    answer, first = assembly.answer, assembly.problem.first
+    for place in range(assembly.count):
+        entry = assembly.candidate[place]
+        answer.mode[place] = table.mode[entry]
+        for i in range(table.size[entry]):
+            answer.impulse[first[place] + i] = table.impulse[entry, i]
 
 
 @kernel
@@ -330,10 +339,9 @@ def write_rows_of(
 def assemble(
     model: SpatialModel, step: float, table: BlockTable, feet: SpatialFeet, q: Floats, v: Floats,
     next_v: Floats, tree: SpatialWorkspace, factor: TreeFactor, count: int, candidate: Integers,
-    first_row: Integers, chain_end: Integers, rows: Floats, free: Floats,
-    delassus: Floats, before: Floats,
+    first_row: Integers, chain_end: Integers, rows: Floats, free: Floats, before: Floats,
 ) -> None:  # fmt: skip
-    """Write the contact problem of the candidates, gaps linearised over the step.
+    """Write the rows of the candidates, whitened, and free velocities with gaps over the step.
 
     v is the velocity as the step begins, next_v the free one at its end; `chain_end` is the last
     velocity of the chain of each candidate. Receives the normal velocities `before`.
@@ -343,10 +351,22 @@ def assemble(
         first, last = first_row[place], chain_end[place]
         size = first_row[place + 1] - first
         write_rows_of(model, tree, entry, first, table, feet, q, rows)
-        along_rows(model, last, first, 1, rows, v, free)
-        before[place] = free[first]
-        along_rows(model, last, first, size, rows, next_v, free)
-        if table.kind[entry] != DRY_JOINT:
+        if table.kind[entry] == DRY_JOINT:
+            before[place], free[first] = v[last], next_v[last]
+        else:
+            along_rows(model, last, first, 1, rows, v, free)
+            before[place] = free[first]
+            along_rows(model, last, first, size, rows, next_v, free)
             free[first] += table.gap[entry] / step
         whiten_rows(model, factor, last, first, size, rows)
-    write_delassus(model, count, first_row, chain_end, rows, delassus)
+
+
+@kernel
+def complete(model: SpatialModel, assembly: SpatialAssembly) -> None:
+    """Write the Delassus matrix of the problem, unless it is there."""
+    if assembly.complete == 0:
+        first, rows = assembly.problem.first, assembly.rows
+        write_delassus(
+            model, assembly.count, first, assembly.last, rows, assembly.problem.delassus
+        )  # fmt: skip
+        assembly.complete = 1

@@ -111,11 +111,26 @@ class SpatialAssembly(Bundle):
     """Normal velocity of each as the step begins."""
     rows: Floats = array("capacity", "longest")
     """Rows of the candidates, whitened."""
+    complete: int = cell(int)
+    """Whether the Delassus matrix of the problem has been written."""
     change: Floats = array("nv")
     """What impulses do to the velocity."""
     problem: BlockProblem = part(BlockProblem)
     answer: BlockAnswer = part(BlockAnswer)
     """problem, answer: The problem of the positions."""
+
+
+class SpatialHolding(Bundle):
+    """The equations of what holds as in the step before, in the velocities."""
+
+    tree: TreeFactor = part(TreeFactor)
+    """Their matrix and its factor."""
+    along: Floats = array("nv")
+    """Impulses along the velocities."""
+    change: Floats = array("nv")
+    """Change of the velocities that impulses make."""
+    weighted: Floats = array("capacity")
+    """Impulses, or velocities, of the rows in other units."""
 
 
 class SpatialWedge(Bundle):
@@ -200,6 +215,7 @@ class SpatialMemory(Bundle):
     """What is decided of the step that follows."""
     wedge: SpatialWedge = part(SpatialWedge)
     assembly: SpatialAssembly = part(SpatialAssembly, address=True)
+    holding: SpatialHolding = part(SpatialHolding, address=True)
     impact: SpatialImpact = part(SpatialImpact, address=True)
     solver: BlockWorkspace = part(BlockWorkspace, address=True)
     settings: BlockSettings = part(BlockSettings)
@@ -216,11 +232,13 @@ class SpatialScratch(NamedTuple):
     Attributes
     ----------
     assembly : SpatialAssembly
+    holding : SpatialHolding
     impact : SpatialImpact
     solver : BlockWorkspace
     """
 
     assembly: SpatialAssembly
+    holding: SpatialHolding
     impact: SpatialImpact
     solver: BlockWorkspace
 
@@ -236,6 +254,7 @@ def spatial_scratch(entries: int, rows: int, models: Sequence[SpatialModel]) -> 
 
     return SpatialScratch(
         SpatialAssembly.allocate(extents, **both()),
+        SpatialHolding.allocate(extents),
         SpatialImpact.allocate(extents, **both()),
         block_workspace(blocks, most, ready=False),
     )
@@ -254,7 +273,8 @@ def allocate_spatial_memory(
 def beside_scratch(memory: SpatialMemory, scratch: SpatialScratch) -> SpatialMemory:
     """Return a memory whose solvers scribble there."""
     solver = scratch.solver.replaced(settings=memory.settings, tally=memory.solves)
-    return memory.replaced(assembly=scratch.assembly, impact=scratch.impact, solver=solver)
+    parts = {**scratch._asdict(), "solver": solver}
+    return memory.replaced(**parts)
 
 
 def spatial_mold(robot: SpatialRobot, *, walls: bool) -> Mold[SpatialMemory]:

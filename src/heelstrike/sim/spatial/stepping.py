@@ -31,7 +31,7 @@ from heelstrike.dynamics.spatial.kinematics import (
     point_velocity,
 )
 from heelstrike.dynamics.spatial.rows import velocity_change
-from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
+from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.controller.interface import Contacts
@@ -39,6 +39,8 @@ from heelstrike.sim.push import Pushes, share_over_step
 from heelstrike.sim.spatial.candidates import (
     NO_ANGLE,
     assemble,
+    begin_as_before,
+    complete,
     entry_speed,
     is_far,
     list_candidates,
@@ -46,6 +48,7 @@ from heelstrike.sim.spatial.candidates import (
     locate_points,
     turn_of_ball,
 )
+from heelstrike.sim.spatial.holding import goes_on_holding
 from heelstrike.sim.spatial.impact import (
     asks_for_bounces,
     closes,
@@ -57,6 +60,7 @@ from heelstrike.sim.spatial.memory import (
     SpatialAssembly,
     SpatialEquations,
     SpatialFeet,
+    SpatialHolding,
     SpatialMemory,
     SpatialStep,
     SpatialWedge,
@@ -213,9 +217,19 @@ def note_relaxed(steps: int, wedge: SpatialWedge) -> None:
 
 
 @kernel
+def solve_completed(
+    model: SpatialModel, assembly: SpatialAssembly, solver: BlockWorkspace
+) -> int:  # fmt: skip
+    """Solve the problem of the positions by its Delassus matrix."""
+    complete(model, assembly)
+    return solve_block_problem(assembly.problem, solver, assembly.answer)
+
+
+@kernel
 def solve_positions(
-    step: float, steps: int, table: BlockTable, solver: BlockWorkspace,
-    assembly: SpatialAssembly, wedge: SpatialWedge,
+    model: SpatialModel, step: float, steps: int, table: BlockTable, factor: TreeFactor,
+    holding: SpatialHolding, solver: BlockWorkspace, assembly: SpatialAssembly,
+    wedge: SpatialWedge,
 ) -> int:  # fmt: skip
     """Solve the problem of the positions; where there is no way out, without asking for one.
 
@@ -223,14 +237,17 @@ def solve_positions(
     points is in the ground, or above it, by another billionth: each would have to slide its own
     way. They are left there, and asked again when that is twice as long ago.
     """
-    wedge.relaxed = 0
+    wedge.relaxed = assembly.complete = 0
     at_once = goes_on_wedged(steps, wedge) and forgive_depth(step, table, assembly)
+    if not at_once and goes_on_holding(model, factor, assembly, holding, solver):
+        return SOLVED
+    begin_as_before(table, assembly)
     if at_once:
         note_relaxed(steps, wedge)
-    status = solve_block_problem(assembly.problem, solver, assembly.answer)
+    status = solve_completed(model, assembly, solver)
     if status != SOLVED and not at_once and forgive_depth(step, table, assembly):
         note_relaxed(steps, wedge)
-        status = solve_block_problem(assembly.problem, solver, assembly.answer)
+        status = solve_completed(model, assembly, solver)
     return status
 
 
@@ -282,20 +299,25 @@ def solve_step_of(
             assemble(
                 model, step, table, memory.feet, memory.q, v, next_v, equations.tree,
                 equations.factor, assembly.count, assembly.candidate, problem.first,
-                assembly.last, assembly.rows, problem.free, problem.delassus, assembly.before,
+                assembly.last, assembly.rows, problem.free, assembly.before,
             )  # fmt: skip
             status = solve_positions(
-                step, number, table, memory.solver, assembly, memory.wedge
+                model, step, number, table, equations.factor, memory.holding, memory.solver,
+                assembly, memory.wedge,
             )  # fmt: skip
             worst = left_by(status, assembly.answer)
-            add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
+            if assembly.complete == 0:  # the change of velocity is known
+                for k in range(model.nv):
+                    impact.arriving[k] += memory.holding.change[k]
+            else:
+                add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
             for row in range(assembly.problem.first[assembly.count]):
                 impact.impulse[row] = assembly.answer.impulse[row]
             if resolves and worst == 0.0 and closes(step, before, table, assembly):
                 impact.happens = 1
                 left = memory.wedge.relaxed == 1
                 status = solve_impact_of(
-                    step, before, left, bounces, table, memory.solver, assembly, impact
+                    model, step, before, left, bounces, table, memory.solver, assembly, impact
                 )  # fmt: skip
                 worst = left_by(status, impact.answer)
                 add_impulses(model, impact.impulse, equations, assembly, next_v)
