@@ -56,7 +56,12 @@ class Rows:
         Loops, couplings, brakes and latches.
     smooth : (T, n) float
         Generalised force of motors, springs and dampers, less H; pushes are not in it.
+    speed_in_wedge, deepest_in_wedge : float
+        Normal speed (m/s) that is enough in a wedge, and the largest depth (m) that it may leave;
+        in the plane the record tells which steps they are, and nothing is asked of them.
     """
+
+    speed_in_wedge, deepest_in_wedge = -np.inf, np.inf
 
     def __init__(self, run: Any, corners: float = -np.inf, *, instants: bool = False) -> None:
         model = run.robot.model

@@ -159,6 +159,27 @@ def test_as_many_steps_stay_in_the_ground_as_the_run_counts(
     assert np.flatnonzero(SpatialRows(told, terrain).wedges(1e-9)).tolist() == [row]
 
 
+def test_a_step_that_is_excused_may_not_do_anything(sliding: tuple[SpaceSetting, Any]) -> None:
+    """Of a run that tells of one step: 1 m/s into the ground is seen, and 1 mm that is left in."""
+    setting, run = sliding
+    told = dataclasses.replace(run.certificates, relaxed=1)
+    pressed = (run.contact_force[1:-1, :, 0] > 1.0) & (np.abs(run.gap[1:-1]) < 1e-9)
+    row, contact = (
+        int(each[0]) + shift for each, shift in zip(np.nonzero(pressed), (1, 0), strict=True)
+    )
+    rows = SpatialRows(run, setting.scene.terrain())
+    down = rows.jacobian[row, contact, 0]
+    gap, velocity = run.gap.copy(), run.velocity.copy()
+    gap[row, contact] = -1e-3
+    velocity[row + 1] -= down / (down @ down)
+    for wrong in ({"gap": gap}, {"velocity": velocity}):
+        broken = setting.judge(dataclasses.replace(run, certificates=told, **wrong)).broken()
+        assert "contact: force without touch" in broken
+    gap[row, contact] = -5e-10
+    excused = dataclasses.replace(run, certificates=told, gap=gap)
+    assert not setting.judge(excused).broken()
+
+
 def test_a_ball_that_spins_comes_to_a_wall_with_another_speed_than_to_the_floor() -> None:
     """Scene 369: its bounce off a wall asks for more energy than the speed at the floor tells."""
     setting = SpaceSetting.of(random_space_scene(369))

@@ -38,6 +38,10 @@ def frames(normal: Array) -> Array:
     return np.stack((normal, first, np.cross(normal, first)), axis=-2)
 
 
+LEFT_IN_THE_GROUND = 1e-4
+"""What is no deeper in the ground than this (m) may be left there where there is no way out."""
+
+
 class SpatialRows:
     """The rows of a run in space with the mechanics of each, by this package alone.
 
@@ -52,7 +56,12 @@ class SpatialRows:
     ----------
     cornered : (T, nc) bool
         Where the force of a contact point may be that of two faces.
+    speed_in_wedge, deepest_in_wedge : float
+        Normal speed (m/s) that is enough in a step which is excused, and the largest depth (m) that
+        it may leave: what touches need not bounce or come out, but must not go in.
     """
+
+    speed_in_wedge, deepest_in_wedge = 0.0, LEFT_IN_THE_GROUND
 
     def __init__(self, run: Any, terrain: Terrain) -> None:
         model = run.robot.model
@@ -124,7 +133,7 @@ class SpatialRows:
         """Steps (T − 1,) that need not close gaps of what touches, or bounce.
 
         A run in space only counts them. As many are taken as it counts, those that are farthest
-        from the speed that gaps and restitution ask for.
+        from the speed that gaps and restitution ask for. How much that excuses is bounded.
         """
         found = np.zeros(len(self.time) - 1, dtype=bool)
         count = int(self.run.certificates.relaxed)

@@ -685,7 +685,7 @@ def test_solvers_have_room_for_the_largest_of_a_batch(made: Maker) -> None:
         ([(small, plane)], 1, 3, small.nv),
         ([(small, plane), (large, plane)], nc + 4, 3 * nc + 4, large.nv),
         ([(large, plane), (small, plane)], nc + 4, 3 * nc + 4, large.nv),
-        ([(large, plane), (large, WALLS), (small, plane)], 2 * nc + 4, 6 * nc + 4, large.nv),
+        ([(large, plane), (large, WALLS), (small, plane)], 3 * nc + 4, 9 * nc + 4, large.nv),
     ):
         scratch = SPACE.scratch([SimpleNamespace(robot=r, ground=g) for r, g in settings])
         assert scratch.assembly.candidate.shape == (entries,)

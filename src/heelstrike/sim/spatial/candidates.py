@@ -16,6 +16,7 @@ from heelstrike.contact.spatial.ground import (
     distance_to_face,
     is_beside,
 )
+from heelstrike.contact.spatial.modes import OPEN
 from heelstrike.dynamics.spatial.algebra import Vector, dot, spatial, velocity_at
 from heelstrike.dynamics.spatial.configurations import turn_between
 from heelstrike.dynamics.spatial.kinematics import place_of
@@ -34,7 +35,15 @@ from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.spatial.memory import SpatialAssembly, SpatialFeet
-from heelstrike.sim.spatial.table import BALL_STOP, DRY_JOINT, POINT, STOP, WALL, BlockTable
+from heelstrike.sim.spatial.table import (
+    BALL_STOP,
+    DRY_JOINT,
+    NEVER_TOUCHED,
+    POINT,
+    STOP,
+    WALL,
+    BlockTable,
+)
 
 CLOSING = 5.0
 """Speed (m/s) at which what closes within a step takes part; or at twice its free speed."""
@@ -81,14 +90,35 @@ def meet_face(
 
 
 @kernel
+def is_hidden(
+    ground: SpatialGroundModel, face: int, place: Vector, depth: float, normal: Vector,
+    away: Vector,
+) -> bool:  # fmt: skip
+    """Whether a wall that a point is in shows only within what it is deeper in.
+
+    Lifted out of that, it meets another face of the box, or none: where two boxes of one height
+    cross, their sides within each other are no walls.
+    """
+    gap, _ = distance_to_face(ground, face, place)
+    if gap >= 0.0:  # the middle of a ball
+        return False
+    lifted = (
+        place[0] + depth * normal[0], place[1] + depth * normal[1], place[2] + depth * normal[2]
+    )  # fmt: skip
+    gap, there = distance_to_face(ground, face, lifted)
+    return gap > 0.0 or dot(there, away) < PARALLEL
+
+
+@kernel
 def wall_beside(
     model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, contact: int,
-    below: int, normal: Vector, wall: int, across: Vector,
+    below: int, normal: Vector, depth: float, wall: int, across: Vector,
 ) -> tuple[int, float, Vector]:  # fmt: skip
     """Return the nearest face that a contact meets beside others, its gap and normal.
 
-    The others are the face below it, and if it is not -1 a wall, with their normals; one parallel
-    to either is none beside it. -1 if there is none.
+    The others are the face below it, in which it is by a depth, and if it is not -1 a wall, with
+    their normals; one parallel to either is none beside it, and neither is what a ball meets at the
+    seam of a floor or wall of several boxes. -1 if there is none.
     """
     is_ball = model.contact_radius[contact] > 0.0 and model.contact_rim[contact] == 0.0
     found, least, way = -1, math.inf, normal
@@ -97,11 +127,15 @@ def wall_beside(
             continue
         point, gap, away = meet_face(model, ground, tree, contact, face)
         probe = point if model.contact_rim[contact] > 0.0 else contact_center(model, tree, contact)
-        at_edge = is_ball and dot(away, normal) < KERB
+        beside_both = max(dot(away, normal), dot(away, across) if wall >= 0 else -1.0)
+        at_edge = is_ball and beside_both < KERB
         if face > 0 and not (at_edge or is_beside(ground, face - 1, probe)):
             continue
-        alike = max(dot(away, normal), dot(away, across) if wall >= 0 else -1.0)
-        if gap < least and alike < PARALLEL:
+        if face > 0 and gap < 0.0 and depth > 0.0 and is_hidden(
+            ground, face, probe, depth, normal, away
+        ):  # fmt: skip
+            continue
+        if gap < least and beside_both < PARALLEL:
             found, least, way = face, gap, away
     return found, least, way
 
@@ -123,12 +157,12 @@ def faces_of(
     if ground.half.shape[0] == 0:
         return best, -1, -1
     wall, least, across = wall_beside(
-        model, ground, tree, contact, best, normal, -1, normal
+        model, ground, tree, contact, best, normal, -distance, -1, normal
     )  # fmt: skip
     if wall < 0:
         return best, -1, -1
     other, farther, aside = wall_beside(
-        model, ground, tree, contact, best, normal, wall, across
+        model, ground, tree, contact, best, normal, -distance, wall, across
     )  # fmt: skip
     if least <= distance + BESIDE and across[2] > normal[2]:
         best, wall, normal = wall, best, across
@@ -159,16 +193,69 @@ def locate_points(
         for k in range(3):
             position[contact, k] = point[k]
             normals[contact, k] = normal[k]
+        if table.wall[contact] >= 0:
+            entry = table.wall[contact]
+            slots = contact, entry, entry + model.nc
+            if (wall >= 0 and wall == table.face[slots[2]]) or (
+                other >= 0 and other == table.face[slots[1]]
+            ):
+                wall, other = other, wall
+            faces = face, wall, other
+            for i in range(3):
+                if faces[i] >= 0:
+                    _, _, way = meet_face(model, ground, tree, contact, faces[i])
+                    go_on_at(slots[i], faces[i], way, slots, table, feet)
+            keep_faces(slots, faces, table)
+            locate_wall(model, ground, tree, contact, wall, entry, table, feet)
+            locate_wall(model, ground, tree, contact, other, entry + model.nc, table, feet)
         keep_foot(contact, point, gap, normal, feet)
         gaps[contact] = gap
         table.gap[contact] = gap
         table.friction[contact] = model.friction_scale[contact] * ground.friction[face]
         bounces = model.restitution_scale[contact] * ground.restitution[face]
         table.restitution[contact] = min(bounces, 1.0)
-        if table.wall[contact] >= 0:
-            entry = table.wall[contact]
-            locate_wall(model, ground, tree, contact, wall, entry, table, feet)
-            locate_wall(model, ground, tree, contact, other, entry + model.nc, table, feet)
+
+
+@kernel
+def go_on_at(
+    entry: int, face: int, normal: Vector, slots: tuple[int, int, int], table: BlockTable,
+    feet: SpatialFeet,
+) -> None:  # fmt: skip
+    """Let an entry go on at a face that its point was not at before, if it goes the same way.
+
+    So does a point that moves from one box to the next in one floor or wall.
+    """
+    for i in range(3):
+        if table.face[slots[i]] == face:
+            return
+    before = feet.frame[entry, 0], feet.frame[entry, 1], feet.frame[entry, 2]
+    if table.face[entry] >= 0 and dot(before, normal) >= PARALLEL:
+        table.face[entry] = face
+
+
+@kernel
+def keep_faces(
+    entries: tuple[int, int, int], faces: tuple[int, int, int], table: BlockTable
+) -> None:
+    """Let what is kept of entries of one point go with its faces; of new faces nothing is known."""
+    for i in range(3):
+        for j in range(3):
+            one, two = entries[i], entries[j]
+            if faces[i] >= 0 and table.face[one] != faces[i] and table.face[two] == faces[i]:
+                table.face[one], table.face[two] = table.face[two], table.face[one]
+                table.mode[one], table.mode[two] = table.mode[two], table.mode[one]
+                touched = table.touching[one]
+                table.touching[one], table.touching[two] = table.touching[two], touched
+                for k in range(3):
+                    impulse = table.impulse[one, k]
+                    table.impulse[one, k], table.impulse[two, k] = table.impulse[two, k], impulse
+    for i in range(3):
+        one = entries[i]
+        if table.face[one] != faces[i]:
+            table.face[one], table.mode[one] = faces[i], OPEN
+            table.touching[one] = NEVER_TOUCHED
+            for k in range(3):
+                table.impulse[one, k] = 0.0
 
 
 @kernel

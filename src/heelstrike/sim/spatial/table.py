@@ -33,6 +33,8 @@ class BlockTable(Bundle):
     wall: Integers = array("entries", of=int)
     """Of a contact point the entry of its nearest wall; −1 of all else, and where there are no
     walls. That of the other wall is as many entries later as there are points."""
+    face: Integers = array("entries", of=int)
+    """Which face points and walls are at, where there are walls: what is kept of them is of it."""
     side: Floats = array("entries")
     """Of a stop 1 for the lower end of the range, −1 for the upper."""
     last: Integers = array("entries", of=int)
@@ -88,6 +90,7 @@ def lay_out_table(robot: SpatialRobot, *, walls: bool) -> BlockTable:
         kind=kind,
         owner=owner,
         wall=wall,
+        face=np.full(len(entries), -1),
         side=column(2, np.float64),
         last=column(3, np.int64),
         set=column(4, np.int64),
