@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-ON_IT, FARTHER_DOWN = 1e-9, 1e-2
-"""A block stands on what its bottom is in, to so much (m), and so far (m) below it is still."""
+ON_IT, FARTHER_DOWN, PIECES = 1e-9, 1e-3, 100
+"""A block stands on what its bottom is in, to so much (m); it goes on so far (m) at most, and is
+looked at in so many pieces of that."""
 
 
 @dataclass(frozen=True)
@@ -84,9 +85,13 @@ class Terrain:
 
         blocks = []
         for block in self.blocks:
-            longer = block.lengthened(FARTHER_DOWN)
-            stands = is_within(block, np.concatenate((block.bottom(), longer.bottom())))
-            blocks.append(longer if stands else block)
+            stands = block
+            for piece in range(PIECES + 1):
+                longer = block.lengthened(FARTHER_DOWN * piece / PIECES)
+                if not is_within(block, longer.bottom()):
+                    break
+                stands = longer
+            blocks.append(stands)
         return Terrain(self.normal, self.height, tuple(blocks))
 
     def distances(self, point: Array) -> tuple[Array, Array]:

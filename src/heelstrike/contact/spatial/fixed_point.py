@@ -32,8 +32,8 @@ GUESSES = 600
 """How often slip speeds are guessed."""
 
 GRADIENT_STEPS = 60
-"""Steps towards the answer of each convex problem; together they cost about as much as a step of
-Newton's method."""
+"""Steps towards the answer of each convex problem. Each counts as an iteration, as sweeps do: all
+of them multiply by the matrix once."""
 
 SHARE_OF_THE_WAY = 0.5
 """How far slip speeds go from a guess to the answer."""
@@ -123,7 +123,7 @@ def guess_slips(
     for _ in range(GUESSES):
         if tally.iterations >= settings.effort or least <= settings.tolerance:
             break
-        tally.iterations += 1
+        tally.iterations += GRADIENT_STEPS
         for block in range(problem.count):
             if problem.set[block] == CONE:
                 scaled.offset[first[block]] += problem.friction[block] * anchor.diagonal[block]

@@ -30,8 +30,8 @@ COVERED = 1e-9
 """Distance (m) up to which a face that touches something lies on it."""
 
 DOWNWARDS, UNDER = -0.5, 1e-3
-"""Vertical part of the normal of a face on which a box stands, and how far (m) the box goes on into
-what it stands on, so that a point that is in the floor meets the walls of the box, not its bottom.
+"""Vertical part of the normal of a face on which a box stands, and how far (m) at most the box goes
+on into what it stands on, so that a point that is in the floor meets the walls of the box, not its bottom.
 """
 
 BESIDE = 1e-6
@@ -329,25 +329,43 @@ def _laid(boxes: tuple[Box, ...], normal: Floats, height: float) -> tuple[Floats
     center = np.array([each.center for each in boxes], dtype=float).reshape(-1, 3)
     half = 0.5 * np.array([each.size for each in boxes], dtype=float).reshape(-1, 3)
 
-    def covered(box: int, corners: Floats) -> bool:
-        within = [np.all(corners @ normal <= height + COVERED)]
+    def covered(box: int, corners: Floats, way: Floats, most: float) -> float:
+        """How far corners that go some way stay in one other thing; -1 if they are in none."""
+        farthest = -1.0
+        if np.all(corners @ normal <= height + COVERED):
+            farthest = most if way @ normal <= 0.0 else 0.0
         for other in range(len(boxes)):
-            if other != box:
-                there = np.abs((corners - center[other]) @ axes[other].T)
-                within.append(np.all(there <= half[other] + COVERED))
-        return bool(np.any(within))
+            there = np.abs((corners - center[other]) @ axes[other].T)
+            if other == box or not np.all(there <= half[other] + COVERED):
+                continue
+            own, along = (corners - center[other]) @ axes[other].T, axes[other] @ way
+            room = half[other] + COVERED - own * np.sign(along)
+            moving = np.abs(along) > 0.0
+            far = np.min(room[:, moving] / np.abs(along[moving]), initial=most)
+            farthest = max(farthest, float(far))
+        return farthest
+
+    def reach_down(box: int, corners: Floats, way: Floats) -> float:
+        """How far a box goes on into what it stands on, thing by thing."""
+        reach = 0.0
+        while reach < UNDER:
+            more = covered(box, corners + reach * way, way, UNDER - reach)
+            if more <= COVERED:
+                break
+            reach += more
+        return reach
 
     longer, moved = half.copy(), center.copy()
     for box in range(len(boxes)):
         for face in range(6):
             corners = _corners(center[box], axes[box], half[box], face)
-            if not covered(box, corners):
+            outwards = axes[box, face % 3] * (1.0 if face < 3 else -1.0)
+            if covered(box, corners, outwards, UNDER) < 0.0:
                 continue
             exposed[box, face] = 0.0
-            outwards = axes[box, face % 3] * (1.0 if face < 3 else -1.0)
-            if outwards[2] < DOWNWARDS and covered(box, corners + UNDER * outwards):
-                longer[box, face % 3] += 0.5 * UNDER
-                moved[box] += 0.5 * UNDER * outwards
+            reach = reach_down(box, corners, outwards) if outwards[2] < DOWNWARDS else 0.0
+            longer[box, face % 3] += 0.5 * reach
+            moved[box] += 0.5 * reach * outwards
         if not exposed[box].any():  # nothing can touch it
             exposed[box] = 1.0
             longer[box], moved[box] = half[box], center[box]

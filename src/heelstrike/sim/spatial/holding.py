@@ -8,7 +8,8 @@ Contacts and dry friction that stick make the equations (A + ε I) x = −b of
 
 The matrix in brackets has a row for each velocity, however many contacts and joints hold, and
 nothing where the mass matrix has nothing: it is factored along the tree, and no Delassus matrix is
-needed. Impulses, modes and certificate are those of the solvers, to rounding.
+needed. Modes and certificate are those of the solvers, velocities to 1e-12, impulses to 1e-6 of
+their size: along what moves nothing both are only as good as rounding over ε.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from heelstrike.contact.spatial.workspace import (
     BlockProblem,
     BlockTally,
     BlockWorkspace,
+    Iterate,
     ScaledBlocks,
 )
 from heelstrike.dynamics.spatial.equations import (
@@ -52,13 +54,14 @@ from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.spatial.memory import SpatialAssembly, SpatialHolding
 
-SURE = 1e-6
-"""Velocities that are left, of data of size one, from which one more refinement is known to do."""
-
-
 WORTHWHILE = 2
 """How many times more entries the matrix of the rows that stick has where that of the velocities
-takes less time: both were timed with robots of 18 and 35 velocities."""
+takes less time: steps of robots of 18 and 35 velocities that stand were timed with each
+(``python benchmarks/spatial_speed.py``)."""
+
+WELL_ROUNDED = STUCK
+"""Rounding of velocities, of data of size one, above which the solvers, which can sum up without
+any, take over."""
 
 
 @kernel
@@ -109,12 +112,16 @@ def gather_held(
 @kernel
 def take_along(
     model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
-    impulse: Floats, along: Floats,
+    impulse: Floats, by_rows: bool, along: Floats,
 ) -> None:  # fmt: skip
-    """Write Yᵀ λ of whitened rows. That of dry friction, all at once, is D^(-1/2) L⁻ᵀ λ."""
+    """Write Yᵀ λ of whitened rows.
+
+    That of dry friction, unless it is asked for `by_rows`, is D^(-1/2) L⁻ᵀ λ, all at once.
+    """
     for k in range(model.nv):
         along[k] = 0.0
-    if rubs(problem):
+    at_once = rubs(problem) and not by_rows
+    if at_once:
         for block in range(problem.count):
             if problem.set[block] == INTERVAL:
                 along[last[block]] = impulse[problem.first[block]]
@@ -122,7 +129,7 @@ def take_along(
         for k in range(model.nv):
             along[k] *= factor.root[k]
     for block in range(problem.count):
-        if problem.set[block] != INTERVAL:
+        if problem.set[block] != INTERVAL or not at_once:
             r = problem.first[block]
             size = problem.first[block + 1] - r
             some = 0.0
@@ -143,14 +150,18 @@ def change_along(model: SpatialModel, factor: TreeFactor, along: Floats, change:
 @kernel
 def give_along(
     model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
-    along: Floats, change: Floats, velocity: Floats,
+    along: Floats, by_rows: bool, change: Floats, velocity: Floats,
 ) -> None:  # fmt: skip
-    """Write Y z of whitened rows. That of dry friction is a change of velocity, kept, too."""
-    if rubs(problem):
+    """Write Y z of whitened rows.
+
+    That of dry friction, unless it is asked for `by_rows`, is a change of velocity, kept, too.
+    """
+    at_once = rubs(problem) and not by_rows
+    if at_once:
         change_along(model, factor, along, change)
     for block in range(problem.count):
         r = problem.first[block]
-        if problem.set[block] == INTERVAL:
+        if problem.set[block] == INTERVAL and at_once:
             velocity[r] = change[last[block]]
         else:
             size = problem.first[block + 1] - r
@@ -170,27 +181,29 @@ def hold_along(
     for _ in range(REFINEMENTS):
         for row in range(problem.first[problem.count]):
             weighted[row] = weight[row] * x[row]
-        take_along(model, factor, problem, last, rows, weighted, along)
-        give_along(model, factor, problem, last, rows, along, holding.change, u)
+        take_along(model, factor, problem, last, rows, weighted, False, along)
+        give_along(model, factor, problem, last, rows, along, False, holding.change, u)
         left = 0.0
         for block in range(problem.count):
             for row in range(problem.first[block], problem.first[block + 1]):
                 weighted[row] = 0.0
-                if mode[block] == STICK:
+                if mode[block] == STICK and weight[row] > 0.0:  # else nothing moves it
                     u[row] = scaled.offset[row] + weight[row] * u[row]
                     left = max(left, abs(u[row]))
                     weighted[row] = weight[row] * u[row]
         if left <= REFINED or left > STAGNANT * before:
             return
+        is_last = before < math.inf and left * left <= STUCK * before  # as much less again
         before = left
-        take_along(model, factor, problem, last, rows, weighted, along)
+        take_along(model, factor, problem, last, rows, weighted, False, along)
         solve_factorized(model, holding.tree, along)
-        give_along(model, factor, problem, last, rows, along, holding.change, weighted)
+        give_along(model, factor, problem, last, rows, along, False, holding.change, weighted)
         for block in range(problem.count):
             if mode[block] == STICK:
                 for row in range(problem.first[block], problem.first[block + 1]):
-                    x[row] -= (u[row] - weight[row] * weighted[row]) / FIRM
-        if left <= SURE:
+                    if weight[row] > 0.0:
+                        x[row] -= (u[row] - weight[row] * weighted[row]) / FIRM
+        if is_last:
             return
 
 
@@ -201,24 +214,37 @@ def certify_along(
 ) -> float:  # fmt: skip
     """Certify impulses by the velocities that the rows give; return the residual with rounding.
 
-    Scaled rows have the length one at most. So, relative to the data, no velocity is off by more
-    than rounding of as many terms of the size of all scaled impulses together. The change of the
+    Scaled rows, those of dry friction as well, have the length one at most. So, relative to the
+    data, no velocity is off by more than rounding of as many terms of the size of all scaled
+    impulses together; infinite is returned if that is more than `WELL_ROUNDED`. The change of the
     velocities of the robot is kept.
     """
     count = problem.first[problem.count]
-    take_along(model, factor, problem, last, rows, answer.impulse, holding.along)
+    take_along(model, factor, problem, last, rows, answer.impulse, True, holding.along)
     give_along(
-        model, factor, problem, last, rows, holding.along, holding.change, answer.velocity
+        model, factor, problem, last, rows, holding.along, True, holding.change, answer.velocity
     )  # fmt: skip
-    if not rubs(problem):
-        change_along(model, factor, holding.along, holding.change)
+    change_along(model, factor, holding.along, holding.change)
     size = 1.0
     for row in range(count):
         answer.velocity[row] += problem.free[row]
         if scaled.weight[row] > 0.0:
             size += abs(answer.impulse[row]) / (scaled.weight[row] * scaled.unit)
     terms = count + 2.0 * model.longest + 2.0
-    return judge_blocks(problem, terms * UNIT_ROUNDOFF * size, scaled, answer)
+    rounding = terms * UNIT_ROUNDOFF * size
+    residual = judge_blocks(problem, rounding, scaled, answer)
+    return residual if rounding <= WELL_ROUNDED else math.inf
+
+
+@kernel
+def is_held(problem: BlockProblem, iterate: Iterate) -> bool:
+    """Whether all that sticks by its mode does so by its scaled velocity."""
+    worst = 0.0
+    for block in range(problem.count):
+        if iterate.mode[block] == STICK:
+            for row in range(problem.first[block], problem.first[block + 1]):
+                worst = max(worst, abs(iterate.u[row]))
+    return worst <= STUCK
 
 
 @kernel
@@ -238,10 +264,12 @@ def goes_on_holding(
 ) -> bool:  # fmt: skip
     """Solve the problem of a step if what touches goes on sticking; return if it is certified.
 
-    The answer is changed in any case.
+    The answer is changed in any case. ``solver.iterate.tried`` says whether the solvers would try
+    the same in vain: what sticks was held, and impulses left their cones.
     """
     problem, answer, last, rows = assembly.problem, assembly.answer, assembly.last, assembly.rows
     scaled, iterate, newton = solver.scaled, solver.iterate, solver.newton
+    iterate.tried = 0
     for block in range(problem.count):
         iterate.mode[block] = answer.mode[block]
         scaled.scale[block] = 1.0  # not known yet; what nothing moves counts as well
@@ -266,5 +294,6 @@ def goes_on_holding(
         for row in range(problem.first[problem.count]):
             iterate.u[row] = answer.velocity[row] * scaled.weight[row] / scaled.unit
         if correct_modes(problem, scaled, iterate) == 0:
+            iterate.tried = int(is_held(problem, iterate) and residual < math.inf)
             return False
     return False

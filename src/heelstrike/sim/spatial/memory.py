@@ -55,7 +55,8 @@ class SpatialTally(CommonTally):
     halved: int = cell(int)
     relaxed: int = cell(int)
     """uncertified, halved, relaxed: Steps that went on with a residual above the tolerance; that
-    were halved; that were not asked to leave the ground, or left their impact to the next."""
+    were halved; that were not asked to leave the ground, or whose impact did not bounce or was left
+    to the next."""
     energy_gain: float = cell(float)
     """Kinetic energy that restitution made (J)."""
 

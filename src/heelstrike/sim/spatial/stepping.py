@@ -315,9 +315,9 @@ def solve_step_of(
                 impact.impulse[row] = assembly.answer.impulse[row]
             if resolves and worst == 0.0 and closes(step, before, table, assembly):
                 impact.happens = 1
-                left = memory.wedge.relaxed == 1
+                relaxed = memory.wedge.relaxed == 1
                 status = solve_impact_of(
-                    model, step, before, left, bounces, table, memory.solver, assembly, impact
+                    model, step, before, relaxed, bounces, table, memory.solver, assembly, impact
                 )  # fmt: skip
                 worst = left_by(status, impact.answer)
                 add_impulses(model, impact.impulse, equations, assembly, next_v)
@@ -450,7 +450,7 @@ def take_step(
                 memory.contacts, memory.feet,
             )  # fmt: skip
         number = tally.steps + counts.parts
-        left = 0  # whether the impact is left to the next step
+        conceded = 0  # whether the impact has no restitution, or is left to the next step
         worst = solve_step_of(model, time + done * step, step, number, resolves, True, memory)
         if worst > 0.0 and halvings < HALVINGS_OF_A_STEP:
             counts.halved = 1
@@ -466,11 +466,11 @@ def take_step(
                 worst = solve_step_of(
                     model, time + done * step, step, number, resolves, False, memory
                 )  # fmt: skip
-                left = 1
+                conceded = 1
             if worst > 0.0 and memory.impact.happens == 1:
                 # Between faces that nearly oppose each other an impact may have no answer at all.
                 worst = solve_step_of(model, time + done * step, step, number, False, True, memory)
-                left = 1
+                conceded = 1
             memory.solver.settings.effort = MOST_ITERATIONS
         if not worst <= MARKED_RESIDUAL:
             tally.unsolved = reaction.residual = worst
@@ -487,7 +487,7 @@ def take_step(
             tally.residual = max(tally.residual, reaction.residual)
         if memory.impact.happens == 1:
             tally.residual = max(tally.residual, residual_of(memory.impact.answer))
-        if left == 1 or memory.wedge.relaxed == 1:
+        if conceded == 1 or memory.wedge.relaxed == 1:
             counts.relaxed = 1
         if done + 1 == parts:
             find_slip(
