@@ -31,8 +31,8 @@ COVERED = 1e-9
 
 DOWNWARDS, UNDER = -0.5, 1e-3
 """Vertical part of the normal of a face on which a box stands, and how far (m) at most the box goes
-on into what it stands on, so that a point that is in the floor meets the walls of the box, not its bottom.
-"""
+on into what it stands on, so that a point that is in the floor meets the walls of the box, not its
+bottom."""
 
 BESIDE = 1e-6
 """Depth (m) below the rim of a face from which on a point meets it as a wall."""
