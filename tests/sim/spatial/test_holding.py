@@ -131,8 +131,7 @@ def test_its_certificate_is_that_of_the_matrix(made: Maker) -> None:
     """Of a solution, and of impulses that are none, by 1e-6, 1e-3 and all of their size."""
     robot = biped(made, more=DRY)
     memory = posed(robot)
-    assembly, solver, answer = memory.assembly, memory.solver, memory.assembly.answer
-    problem = assembly.problem
+    answer, problem = memory.assembly.answer, memory.assembly.problem
     assert goes_on(robot, memory)
     solution = answer.impulse.copy()
     rng = np.random.default_rng(7)
