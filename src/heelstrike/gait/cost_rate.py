@@ -124,7 +124,7 @@ def own_expression(what: str, function: Callable[[Instant], Any], now: Instant) 
     except Exception as error:
         raise GaitError(f"the {what} function failed: {type(error).__name__}: {error}") from error
     known = casadi.vertcat(now.position, now.velocity, now.torque, now.force)
-    for each in (now.acceleration, now.time):
+    for each in (now.acceleration, now.time, now.stands, now.share, now.torque_rate):
         if each is not None:
             known = casadi.vertcat(known, each)
     unknown = {s.name() for s in casadi.symvar(found)} - {s.name() for s in casadi.symvar(known)}

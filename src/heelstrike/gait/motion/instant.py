@@ -54,10 +54,19 @@ class MotionFunctions:
     ----------
     path : Block
         Variables are positions and two of their derivatives by the share of a piece, (nv,) each,
-        forces of all contact points and loops, (forces,), places where the points stand, (nc,),
-        duration of a piece (s), distance (m), time since the beginning of the motion (s). The cost
-        is its rate times the duration of a piece.
+        forces of all contact points and loops, (forces,), places where the points stand, (nc,), and
+        which do, (nc,), duration of a piece (s), distance (m), time since the beginning of the
+        motion (s), share of the phase that has gone by; then, if `rated`, the third derivative of
+        positions, (nv,), and the first of forces, (forces,), by the share of a piece. The cost is
+        its rate times the duration of a piece.
     path_rows : list of Row
+        What its constraints mean.
+    rated : bool
+        Whether the cost or a constraint of one's own depends on the rates of torques.
+    joining : Block or None
+        If so, of the variables of the path at the end of a piece and then at the beginning of the
+        next. The constraints are equations: the torques are the same.
+    joining_rows : list of Row
         What its constraints mean.
     spending : Block or None
         For costs with corners, as |P| has one: variables are those of the path and, for each of the
@@ -104,12 +113,10 @@ class MotionFunctions:
     def _build_path(self) -> None:
         robot, model = self.robot, self.robot.model
         n, weight = robot.nv, robot.weight
-        y = casadi.SX.sym("y", 3 * n + self.forces + robot.nc + 3)
-        places = y[-3 - robot.nc : -3]
-        q, first, second, force = casadi.vertsplit(
-            y[: -3 - robot.nc], [0, n, 2 * n, 3 * n, 3 * n + self.forces]
-        )
-        duration, distance, time = y[-3], y[-2], y[-1]
+        sizes = [n, n, n, self.forces, robot.nc, robot.nc, 4, n, self.forces]
+        parts = [casadi.SX.sym("y", size) for size in sizes]
+        q, first, second, force, places, stands, times, third, force_rate = parts
+        duration, distance, time, share = casadi.vertsplit(times)
         v, a = first / duration, symbols(second / duration**2)
         dynamics = TracedDynamics(robot, symbols(q), symbols(v))
         heights, jacobian, bias = point_rows(dynamics, self.up, self.along)
@@ -153,7 +160,14 @@ class MotionFunctions:
             acceleration=expression(a),
             time=time,
             points=casadi.horzcat(expression(centers @ self.along), expression(heights)),
-        )
+            point_force=casadi.horzcat(expression(pushes[1::2]), expression(pushes[0::2])),
+            stands=stands,
+            share=share,
+            torque_rate=casadi.jtimes(
+                expression(torque), casadi.vertcat(q, first, second, force),
+                casadi.vertcat(first, second, third, force_rate),
+            ) / duration,
+        )  # fmt: skip
         if self.constraint is not None:
             own = own_expression("constraint", self.constraint, now)
             for k, value in enumerate(casadi.vertsplit(casadi.vec(own)), start=1):
@@ -162,10 +176,30 @@ class MotionFunctions:
         by = duration / (casadi.fabs(distance) if self.per_metre else 1.0)
         parameters = casadi.vertcat(self.slope, self.friction)
         cost = by * smooth_rate_of(self.cost, now)
-        self.path = Block("path", y, parameters, cost, casadi.vertcat(*rows.expressions))
+        limits = casadi.vertcat(*rows.expressions)
+        self.rated = bool(
+            casadi.depends_on(casadi.vertcat(cost, limits), casadi.vertcat(third, force_rate))
+        )
+        y = casadi.vertcat(*(parts if self.rated else parts[:-2]))
+        self.path = Block("path", y, parameters, cost, limits)
+        self._build_joining(y, parameters, now.torque)
         self._build_spending(y, parameters, by, now)
         effort = duration * casadi.sumsqr(now.torque)
         self.effort = casadi.Function("effort", [y, parameters], [effort])
+
+    def _build_joining(self, y: Any, parameters: Any, torque: Any) -> None:
+        """Let torques go on from one piece to the next."""
+        robot, rows = self.robot, Rows()
+        before, after = (casadi.SX.sym("y", y.numel()) for _ in range(2))
+        torques = casadi.Function("torque", [y, parameters], [torque])
+        jump = torques(before, parameters) - torques(after, parameters)
+        for i, j in enumerate(robot.model.actuator_joint.tolist()):
+            unit = robot.weight * (self.length if robot.model.axis[j, 0] else 1.0)
+            rows.add(Kind.JOIN, jump[i], subject=robot.joint_names[j], upper=0.0, unit=unit)
+        self.joining, self.joining_rows = None, rows.rows
+        if self.rated:
+            given, jumps = casadi.vertcat(before, after), casadi.vertcat(*rows.expressions)
+            self.joining = Block("joining", given, parameters, casadi.SX(0), jumps)
 
     def _build_spending(self, y: Any, parameters: Any, by: Any, now: Instant) -> None:
         """Bound what motors spend; `by` is what a rate counts."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -59,6 +60,17 @@ def lagrange(share: Floats) -> Floats:
     )
 
 
+def lagrange_rates(share: Floats) -> Floats:
+    """Derivatives of those of :func:`lagrange` by the share, (STAGES, N)."""
+    nodes, _ = gauss(STAGES)
+    found = []
+    for k, node in enumerate(nodes):
+        rest = np.delete(nodes, k)
+        parts = [np.prod(share[:, None] - np.delete(rest, j), axis=1) for j in range(rest.size)]
+        found.append(np.sum(parts, axis=0) / np.prod(node - rest))
+    return np.array(found)
+
+
 @dataclass(frozen=True, eq=False)
 class PhaseUnknowns:
     """Expressions of the unknowns of a phase, affine in all unknowns."""
@@ -77,6 +89,10 @@ class PhaseUnknowns:
     """(powers, COUNTED K) Bounds of what the motors spend; none if no cost has corners."""
     duration: Any
     """Duration of the phase (s)."""
+    stands: Floats
+    """(nc,) 1 for points that stand, 0 for others."""
+    rated: bool
+    """Whether rates of torques matter."""
 
     @property
     def lengths(self) -> Floats:
@@ -85,16 +101,21 @@ class PhaseUnknowns:
 
     def along(self, grid: Instants) -> tuple[Any, Any, Any]:
         """Positions and derivatives by the share of a piece at instants, (nv, N) each."""
-        values = casadi.horzcat(self.q[:, :-1], self.v, self.a)
-        first, second, third = (
-            values @ casadi.sparsify(casadi.DM(grid.matrix(DEGREE, order))) for order in range(3)
-        )
+        first, second, third = (self._derivative(grid, order) for order in range(3))
         return first, second, third
 
-    def forces(self, grid: Instants) -> Any:
+    def rates(self, grid: Instants) -> tuple[Any, Any]:
+        """Derivatives of accelerations and forces by the share of a piece, (nv | forces, N)."""
+        return self._derivative(grid, 3), self.forces(grid, lagrange_rates)
+
+    def _derivative(self, grid: Instants, order: int) -> Any:
+        values = casadi.horzcat(self.q[:, :-1], self.v, self.a)
+        return values @ casadi.sparsify(casadi.DM(grid.matrix(DEGREE, order)))
+
+    def forces(self, grid: Instants, basis: Callable[[Floats], Floats] = lagrange) -> Any:
         """Forces at instants, (forces, N)."""
         values = np.zeros((self.force.shape[1], grid.share.size))
-        shares = lagrange(grid.share)
+        shares = basis(grid.share)
         for k in range(STAGES):
             values[STAGES * grid.piece + k, np.arange(grid.share.size)] = shares[k]
         return self.force @ casadi.sparsify(casadi.DM(values))
@@ -105,9 +126,10 @@ def path_variables(phases: list[PhaseUnknowns], p: int, grid: Instants, distance
     own, count = phases[p], grid.share.size
     step = casadi.DM(own.lengths[grid.piece]).T * own.duration
     places, far = (casadi.repmat(each, 1, count) for each in (own.places, distance))
-    begun = sum(each.duration for each in phases[:p])
-    time = begun + casadi.DM(phases_of(grid)).T * own.duration
-    return casadi.vertcat(*own.along(grid), own.forces(grid), places, step, far, time)
+    begun, shares = sum(each.duration for each in phases[:p]), casadi.DM(phases_of(grid)).T
+    time, stands = begun + shares * own.duration, casadi.repmat(casadi.DM(own.stands), 1, count)
+    path = [*own.along(grid), own.forces(grid), places, stands, step, far, time, shares]
+    return casadi.vertcat(*path, *(own.rates(grid) if own.rated else ()))
 
 
 def breakpoints(pieces: int) -> Floats:
@@ -240,6 +262,8 @@ class MotionProgram:
                     places=self._placed(stands) @ mine[4],
                     spent=casadi.reshape(mine[5], self.powers, COUNTED * pieces),
                     duration=mine[6],
+                    stands=np.isin(np.arange(robot.nc), list(stands.points)).astype(np.float64),
+                    rated=self.functions.rated,
                 )
             )
             start = q[:, -1]
@@ -303,6 +327,21 @@ class MotionProgram:
             upper.append(high[used])
             kept.append(used)
             self.labels += [(functions.landing_rows[k], p, 1.0) for k in np.flatnonzero(used)]
+        if functions.joining is not None:
+            for p, phase in enumerate(request.phases):
+                joins = phase.pieces - 1
+                if not joins:
+                    continue
+                y = casadi.vertcat(
+                    path_variables(phases, p, endings(phase.pieces), distance)[:, :-1],
+                    path_variables(phases, p, beginnings(phase.pieces), distance)[:, 1:],
+                )
+                copies.append(Copies.of(functions.joining, np.zeros(joins), x, y, numbers))
+                rows = functions.joining_rows * joins
+                lower.append(np.zeros(len(rows)))
+                upper.append(np.zeros(len(rows)))
+                kept.append(np.full(len(rows), True))
+                self.labels += [(row, p, 1.0) for row in rows]
         spending = functions.rounded if self.rounded else functions.spending
         if spending is not None:
             for p, phase in enumerate(request.phases):

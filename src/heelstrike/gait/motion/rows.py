@@ -24,6 +24,7 @@ class Kind(rows.Kind):
     RANGE = ("joint range", "rad")
     SPEED = ("joint speed limit", "rad/s")
     OWN = ("constraint of your own", "")
+    JOIN = ("torque that does not jump within a phase", "N or N m")
     POWER = ("power that a motor spends", "W")
     MOMENTUM = ("momentum through the impact", "N s or N m s")
     TOUCH = ("contact point on the ground at touchdown", "m")
