@@ -170,7 +170,7 @@ def test_distances_to_a_box_that_is_turned() -> None:
         ((0.6, 0.0, 1.2), False),  # above it
         ((0.0, 0.0, 1.1), True),  # above the top, which is one face
         ((0.6, 0.6, 0.5), False),  # before an edge
-        ((0.2, 0.1, 0.5), False),  # inside, behind no face
+        ((0.2, 0.1, 0.5), True),  # inside: it has to get out
         ((0.5, 0.1, 0.5), True),  # on the side
         ((0.6, 0.0, -0.5e-3), True),  # in the floor, a little
         ((0.6, 0.0, -2e-3), False),  # below the floor on which the box stands

@@ -235,10 +235,10 @@ def test_steps_take_this_way(made: Maker) -> None:
     assert assembly.count > 8
     assert assembly.complete == 0
     kept = simulation.snapshot()
-    simulation.advance(0.05)
+    simulation.advance(0.25)
     after = simulation.state
     other = hs.Simulation(robot, law, state=state)
     other.restore(kept)
-    other.advance(0.05)
+    other.advance(0.25)
     assert np.array_equal(other.state.q, after.q)
     assert np.array_equal(other.state.v, after.v)

@@ -290,10 +290,11 @@ def goes_on_holding(
         residual = certify_along(model, factor, problem, last, rows, scaled, holding, answer)
         if answer.residual <= STUCK and residual <= solver.settings.tolerance:
             note_shortcut(solver.tally)
+            iterate.tried = 0
             return True
         for row in range(problem.first[problem.count]):
             iterate.u[row] = answer.velocity[row] * scaled.weight[row] / scaled.unit
+        iterate.tried = int(is_held(problem, iterate) and residual < math.inf)
         if correct_modes(problem, scaled, iterate) == 0:
-            iterate.tried = int(is_held(problem, iterate) and residual < math.inf)
             return False
     return False
