@@ -210,17 +210,8 @@ def test_few_rows_are_left_to_the_solvers(made: Maker) -> None:
     memory.assembly.answer.mode[3] = STICK
     memory.assembly.answer.mode[8:] = SLIP
     assert not goes_on(robot, memory)
-    assert memory.solver.iterate.tried == 0
     assert not uncompiled(is_worthwhile)(robot.model, 3)
     assert uncompiled(is_worthwhile)(robot.model, 3 * 8 + 6)
-
-
-def test_what_cannot_go_on_sticking_is_not_tried_twice(made: Maker) -> None:
-    """Feet that glide do not stop within a step: the solvers are told so."""
-    robot = biped(made, more=DRY)
-    memory = posed(robot, speed=1.0)
-    assert not goes_on(robot, memory)
-    assert memory.solver.iterate.tried == 1
 
 
 def test_steps_take_this_way(made: Maker) -> None:

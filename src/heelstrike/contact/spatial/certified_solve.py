@@ -93,12 +93,7 @@ def try_last_modes(problem: BlockProblem, answer: BlockAnswer, work: BlockWorksp
     scaled, settings, tally = work.scaled, work.settings, work.tally
     iterate, newton = work.iterate, work.newton
     slipping, sliding = count_slips(problem, answer)
-    tried, iterate.tried = iterate.tried, 0
-    if slipping == 0 and tried == 1:
-        look(problem, scaled, iterate)
-        if sliding == 0:
-            return
-    elif slipping == 0:
+    if slipping == 0:
         tally.iterations += 1
         if try_sticking(problem, scaled, iterate, newton) or sliding == 0:
             return

@@ -39,7 +39,6 @@ from heelstrike.contact.spatial.workspace import (
     BlockProblem,
     BlockTally,
     BlockWorkspace,
-    Iterate,
     ScaledBlocks,
 )
 from heelstrike.dynamics.spatial.equations import (
@@ -237,17 +236,6 @@ def certify_along(
 
 
 @kernel
-def is_held(problem: BlockProblem, iterate: Iterate) -> bool:
-    """Whether all that sticks by its mode does so by its scaled velocity."""
-    worst = 0.0
-    for block in range(problem.count):
-        if iterate.mode[block] == STICK:
-            for row in range(problem.first[block], problem.first[block + 1]):
-                worst = max(worst, abs(iterate.u[row]))
-    return worst <= STUCK
-
-
-@kernel
 def note_shortcut(tally: BlockTally) -> None:
     """Count a solve whose answer is that of the last modes."""
     tally.solves += 1
@@ -264,12 +252,11 @@ def goes_on_holding(
 ) -> bool:  # fmt: skip
     """Solve the problem of a step if what touches goes on sticking; return if it is certified.
 
-    The answer is changed in any case. ``solver.iterate.tried`` says whether the solvers would try
-    the same in vain: what sticks was held, and impulses left their cones.
+    The answer is changed in any case. Where it is not certified the solvers try the same again:
+    their answer, which is none either, is where Newton's method begins well.
     """
     problem, answer, last, rows = assembly.problem, assembly.answer, assembly.last, assembly.rows
     scaled, iterate, newton = solver.scaled, solver.iterate, solver.newton
-    iterate.tried = 0
     for block in range(problem.count):
         iterate.mode[block] = answer.mode[block]
         scaled.scale[block] = 1.0  # not known yet; what nothing moves counts as well
@@ -290,11 +277,9 @@ def goes_on_holding(
         residual = certify_along(model, factor, problem, last, rows, scaled, holding, answer)
         if answer.residual <= STUCK and residual <= solver.settings.tolerance:
             note_shortcut(solver.tally)
-            iterate.tried = 0
             return True
         for row in range(problem.first[problem.count]):
             iterate.u[row] = answer.velocity[row] * scaled.weight[row] / scaled.unit
-        iterate.tried = int(is_held(problem, iterate) and residual < math.inf)
         if correct_modes(problem, scaled, iterate) == 0:
             return False
     return False
