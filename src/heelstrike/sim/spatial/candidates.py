@@ -204,7 +204,7 @@ def locate_points(
             for i in range(3):
                 if faces[i] >= 0:
                     _, _, way = meet_face(model, ground, tree, contact, faces[i])
-                    go_on_at(slots[i], faces[i], way, slots, table, feet)
+                    go_on_at(slots[i], faces[i], way, slots, feet, table)
             keep_faces(slots, faces, table)
             locate_wall(model, ground, tree, contact, wall, entry, table, feet)
             locate_wall(model, ground, tree, contact, other, entry + model.nc, table, feet)
@@ -218,8 +218,8 @@ def locate_points(
 
 @kernel
 def go_on_at(
-    entry: int, face: int, normal: Vector, slots: tuple[int, int, int], table: BlockTable,
-    feet: SpatialFeet,
+    entry: int, face: int, normal: Vector, slots: tuple[int, int, int], feet: SpatialFeet,
+    table: BlockTable,
 ) -> None:  # fmt: skip
     """Let an entry go on at a face that its point was not at before, if it goes the same way.
 

@@ -218,7 +218,7 @@ def note_relaxed(steps: int, wedge: SpatialWedge) -> None:
 
 @kernel
 def solve_completed(
-    model: SpatialModel, assembly: SpatialAssembly, solver: BlockWorkspace
+    model: SpatialModel, solver: BlockWorkspace, assembly: SpatialAssembly
 ) -> int:  # fmt: skip
     """Solve the problem of the positions by its Delassus matrix."""
     complete(model, assembly)
@@ -244,10 +244,10 @@ def solve_positions(
     begin_as_before(table, assembly)
     if at_once:
         note_relaxed(steps, wedge)
-    status = solve_completed(model, assembly, solver)
+    status = solve_completed(model, solver, assembly)
     if status != SOLVED and not at_once and forgive_depth(step, table, assembly):
         note_relaxed(steps, wedge)
-        status = solve_completed(model, assembly, solver)
+        status = solve_completed(model, solver, assembly)
     return status
 
 
