@@ -111,15 +111,27 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("coarse")
-@pytest.mark.parametrize("why", ["at the limit of pieces", "no motion on more pieces"])
+@pytest.mark.parametrize(
+    "why", ["at the limit of pieces", "no motion on more pieces", "no optimum on more pieces"]
+)
 def test_one_that_does_not_close_is_told(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its closes_to is by how much it misses, and it is the last one that was found."""
 
+    failed = list[bool]()
+
     def fails(*_: Any) -> None:
+        failed.append(True)
         raise hs.GaitNotFoundError("no such motion")
 
+    def only_on_two(program: MotionProgram, *more: Any) -> Any:
+        coarse = all(phase.pieces == 2 for phase in program.request.phases)
+        return again(program, *more) if coarse else fails()
+
+    again = optimize._again
     if why == "at the limit of pieces":
         monkeypatch.setattr(optimize, "MOST_HALVED", 2)
+    elif why == "no optimum on more pieces":
+        monkeypatch.setattr(optimize, "_again", only_on_two)
     else:
         monkeypatch.setattr(optimize, "_fine_enough", lambda found, _: found)
         monkeypatch.setattr(optimize, "_on_halves", fails)
@@ -129,6 +141,8 @@ def test_one_that_does_not_close_is_told(why: str, monkeypatch: pytest.MonkeyPat
     assert pieces_of(motion) == [2, 2]
     assert CLOSED < motion.closes_to < SKETCHY
     assert motion.closes_to == pytest.approx(Follower(rabbit, motion).missed(), rel=1e-6)
+    # The third fails before limits between instants are held, and then again.
+    assert len(failed) == ["at the", "no motion", "no optimum"].index(" ".join(why.split()[:2]))
 
 
 @pytest.mark.slow
