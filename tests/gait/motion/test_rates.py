@@ -32,6 +32,9 @@ SOFT = 0.02
 """Time (s) that weighs rates of torques beside torques."""
 COUNTED = 0.02
 """Share by which sums over Gauss points may differ from those over many instants."""
+SLOWER = 0.35
+"""Share of the usual rates that is allowed. Rates are then greatest where pieces begin: 4 % more
+than this if they are limited in the pieces and at their ends only."""
 KEPT = 1e-6
 """Share by which a limit may be exceeded at instants at which it holds."""
 BETWEEN = 1.05
@@ -92,19 +95,18 @@ def slower(most: float) -> Callable[[Instant], casadi.SX]:
 
 def test_rates_of_torques_are_limited(rabbit: hs.Robot, usual: hs.Motion) -> None:
     before = max(np.abs(each).max() for each in rates(rabbit, usual))
-    most = 0.5 * before
+    most = SLOWER * before
     motion = hs.optimize_motion(rabbit, PHASES, **ASKED, constraint=slower(most), warm_start=usual)
     # Were torques to jump between pieces, differences over so short a time would be far larger.
     assert max(np.abs(each).max() for each in rates(rabbit, motion)) < BETWEEN * most
     assert motion.cost / motion.distance > usual.cost / usual.distance
     # Rates jump where pieces join, so that they are limited on both sides.
-    begun = np.abs(rates_where_pieces_begin(rabbit, motion)).max()
-    assert begun == pytest.approx(most, rel=KEPT)
+    assert np.abs(rates_where_pieces_begin(rabbit, motion)).max() < (1.0 + KEPT) * most
 
 
 @pytest.mark.slow
 def test_limited_rates_are_refined(rabbit: hs.Robot, usual: hs.Motion) -> None:
-    most = 0.5 * max(np.abs(each).max() for each in rates(rabbit, usual))
+    most = SLOWER * max(np.abs(each).max() for each in rates(rabbit, usual))
     asked = ASKED | {"refine": True}
     motion = hs.optimize_motion(rabbit, PHASES, **asked, constraint=slower(most), warm_start=usual)
     assert motion.closes_to < CLOSED
@@ -124,7 +126,7 @@ def test_rates_that_nobody_asks_for_are_not_traced(rabbit: hs.Robot, monkeypatch
 
 
 def test_gaits_of_one_step_say_what_they_do_not_know(rabbit: hs.Robot) -> None:
-    with pytest.raises(hs.GaitError, match="Only instants of motions .* have .*torque_rate"):
+    with pytest.raises(hs.GaitError, match=r"Only instants of motions .* have .*torque_rate"):
         hs.optimize_gait(
             rabbit, step_length=0.3, step_duration=0.5,
             cost=lambda now: casadi.sumsqr(now.torque_rate),

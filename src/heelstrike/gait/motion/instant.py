@@ -179,7 +179,8 @@ class MotionFunctions:
         self.jumps = np.array(casadi.which_depends(limits, now.torque_rate, 1, True))
         self.rated = bool(self.jumps.any() or casadi.depends_on(cost, now.torque_rate))
         y = casadi.vertcat(*(parts if self.rated else parts[:-2]))
-        self.joining, self.joining_rows = None, list[Row]()
+        self.joining: Block | None = None
+        self.joining_rows: list[Row] = []
         if self.rated:
             changed = casadi.jtimes(
                 now.torque, casadi.vertcat(q, first, second, force),
@@ -202,9 +203,8 @@ class MotionFunctions:
             unit = robot.weight * (self.length if robot.model.axis[j, 0] else 1.0)
             rows.add(Kind.JOIN, jump[i], subject=robot.joint_names[j], upper=0.0, unit=unit)
         given, jumps = casadi.vertcat(before, after), casadi.vertcat(*rows.expressions)
-        self.joining, self.joining_rows = (
-            Block("joining", given, parameters, casadi.SX(0), jumps), rows.rows,
-        )  # fmt: skip
+        self.joining = Block("joining", given, parameters, casadi.SX(0), jumps)
+        self.joining_rows = rows.rows
 
     def _build_spending(self, y: Any, parameters: Any, by: Any, now: Instant) -> None:
         """Bound what motors spend; `by` is what a rate counts."""
