@@ -175,6 +175,43 @@ def test_progress_goes_on_while_it_is_made_to_close(recwarn: pytest.WarningsReco
     assert told[-1] == 1.0
 
 
+def test_instants_are_added_once() -> None:
+    program = program_of(hs.load_robot("rabbit"), run(2), distance=(0.0, 2.0), speed=2.0)
+    unknowns = guess_of(program, lean=0.0, lowered=0.95)
+    unknowns += 0.1 * np.random.default_rng(0).standard_normal(unknowns.size)
+    finer = optimize._with_failing(program, unknowns)
+    assert finer is not None
+    again = optimize._with_failing(finer, unknowns)
+    for grid in (again or finer).grids:
+        instants = list(zip(grid.piece.tolist(), grid.share.tolist(), strict=True))
+        assert len(instants) == len(set(instants))
+
+
+@pytest.mark.parametrize(("pieces", "tried"), [(4, [16, 8]), (20, [40]), (30, [])])
+def test_pieces_are_divided_equally(pieces: int, tried: list[int], monkeypatch: Any) -> None:
+    """At most into 48, and what led nowhere is not tried again."""
+    found = list[int]()
+
+    def again(program: MotionProgram, *_: Any) -> None:
+        found.extend(phase.pieces for phase in program.request.phases)
+        raise hs.GaitNotFoundError("no such motion")
+
+    program = program_of(
+        hs.load_robot("rabbit"), [hs.ContactPhase("right_tibia", duration=0.5, pieces=pieces)]
+    )
+    start = optimize._Found(program, guess_of(program, lean=0.0, lowered=0.95), None, True)
+    monkeypatch.setattr(optimize, "_again", again)
+    monkeypatch.setattr(optimize, "_slip", lambda *_: 1.0)
+    monkeypatch.setattr(Follower, "missed_by_phases", lambda _: np.ones(1))
+    monkeypatch.setattr(MotionProgram, "polished", lambda _, unknowns: unknowns)
+    if tried:
+        with pytest.raises(hs.GaitNotFoundError):
+            optimize._refined(start)
+    else:
+        assert optimize._refined(start) is start
+    assert found == tried
+
+
 def test_each_phase_has_a_limit_of_pieces_of_its_own(monkeypatch: Any) -> None:
     monkeypatch.setattr(optimize, "MOST_HALVED", 8)
     phases = [
