@@ -9,6 +9,7 @@ import pytest
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.gait import Instant
+from heelstrike.gait.motion.program import looked_at
 
 PHASES = [
     hs.ContactPhase("right_tibia", duration=(0.05, 0.3), pieces=4),
@@ -65,6 +66,14 @@ def test_rates_of_torques_are_limited(rabbit: hs.Robot, usual: hs.Motion) -> Non
     # Were torques to jump between pieces, differences over so short a time would be far larger.
     assert max(np.abs(each).max() for each in rates(rabbit, motion)) < BETWEEN * most
     assert motion.cost / motion.distance > usual.cost / usual.distance
+
+
+def test_where_rates_matter_every_piece_is_looked_at_where_it_begins() -> None:
+    """Rates jump there: what holds at the end of one piece need not hold on."""
+    for rated, begun in ((False, [0]), (True, [0, 1, 2])):
+        grid = looked_at(3, rated)
+        assert grid.piece[grid.share == 0.0].tolist() == begun
+        assert grid.piece[grid.share == 1.0].tolist() == [0, 1, 2]
 
 
 def test_rates_of_torques_are_a_cost(rabbit: hs.Robot, usual: hs.Motion) -> None:

@@ -200,8 +200,9 @@ def optimize_motion(
         constraint=constraint,
     )  # fmt: skip
     program = MotionProgram(
-        request, functions, tuple(looked_at(phase.pieces) for phase in request.phases)
-    )
+        request, functions,
+        tuple(looked_at(phase.pieces, functions.rated) for phase in request.phases),
+    )  # fmt: skip
     report(0.1)
     found = _solved_to_corners(program, warm_start, starts, report)
     if refine:
@@ -577,7 +578,7 @@ def _with_pieces(program: MotionProgram, pieces: list[int]) -> MotionProgram:
     )
     return replace(
         program, request=replace(request, phases=phases),
-        grids=tuple(map(looked_at, pieces)), near=CLOSE,
+        grids=tuple(looked_at(each, program.functions.rated) for each in pieces), near=CLOSE,
     )  # fmt: skip
 
 

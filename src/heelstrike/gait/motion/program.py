@@ -156,10 +156,15 @@ def gauss_points(pieces: int, stages: int = STAGES) -> Instants:
     )  # fmt: skip
 
 
-def looked_at(pieces: int) -> Instants:
-    """Gauss points of all pieces of a phase, where the pieces end, and where the first begins."""
+def looked_at(pieces: int, rated: bool) -> Instants:
+    """Gauss points of all pieces of a phase, where the pieces end, and where the first begins.
+
+    Where rates of torques matter, which jump between pieces, the beginnings of all.
+    """
     begin = Instants(pieces, np.zeros(1, np.int64), np.zeros(1), np.zeros(1))
-    return gauss_points(pieces).joined(endings(pieces)).joined(begin)
+    return (
+        gauss_points(pieces).joined(endings(pieces)).joined(beginnings(pieces) if rated else begin)
+    )
 
 
 def beginnings(pieces: int) -> Instants:
