@@ -72,6 +72,9 @@ CAPS = (0.1, 0.05, 0.025, 0.0125)
 PIECES = (4, 8)
 """Of the arc: the first walk is found on few and leads to that on many."""
 EXACT = 1e-12
+"""Of integrals and roots."""
+CLOSED = 1e-10
+"""What the equations of a walk may lack that was shot."""
 
 
 def robot() -> hs.Robot:
@@ -155,7 +158,7 @@ class Asked:
 
         near = (1.0, self.speed, 0.5 * self.distance / self.speed, 0.2, 0.5 * cap)
         found = root(lambda unknowns: half(unknowns)[0], near, tol=EXACT)
-        assert np.abs(found.fun).max() < 1e-10, found.message
+        assert np.abs(found.fun).max() < CLOSED, found.message
         return half(found.x)[1]
 
 
