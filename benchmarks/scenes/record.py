@@ -56,7 +56,12 @@ class Rows:
         Loops, couplings, brakes and latches.
     smooth : (T, n) float
         Generalised force of motors, springs and dampers, less H; pushes are not in it.
+    speed_in_wedge, deepest_in_wedge : float
+        Normal speed (m/s) that is enough in a wedge, and the largest depth (m) that it may leave;
+        in the plane the record tells which steps they are, and nothing is asked of them.
     """
+
+    speed_in_wedge, deepest_in_wedge = -np.inf, np.inf
 
     def __init__(self, run: Any, corners: float = -np.inf, *, instants: bool = False) -> None:
         model = run.robot.model
@@ -127,6 +132,10 @@ class Rows:
     def stops_of_balls(self) -> tuple[tuple[str, Array, Array, Array], ...]:
         """Name, row (T, n), gap (T,) and force (T,) of stops of joints with several velocities."""
         return ()
+
+    def fastest(self, speed: Array, velocity: Array) -> Array:  # noqa: ARG002
+        """Speeds of the contact points at the faces they are near to; here as at the one told."""
+        return speed
 
     def lowered(self) -> float:
         """How much farther below its centre a contact touches after a step; a disc never."""

@@ -188,7 +188,7 @@ class _Steps:
     def arrives(self, found: Findings, law: str, gap: Array, speed: Array, free: Array) -> Array:
         """Judge where the positions go in split steps; tell whose impact each of them is."""
         after = gap + self.h * speed
-        left = np.where(self.wedged[:, None], np.minimum(gap, 0.0), 0.0)
+        left = np.where(self.may_stay(gap), np.minimum(gap, 0.0), 0.0)
         deep = np.where(self.split[:, None], left - after, 0.0)
         found.look(f"{law}: moved into it", deep / (1.0 + np.abs(gap)), MOTION, self.time)
         touches = after <= TOUCHING
@@ -196,46 +196,58 @@ class _Steps:
         closes = gap + self.h * free < 0.0
         return (gap <= TOUCHING) | (touches & (touched | closes))
 
+    def may_stay(self, gap: Array) -> Array:
+        """Where a wedge excuses what stays at its gap (T, n): not what is too deep for that."""
+        excused = (gap < TOUCHING) & (gap >= -self.rows.deepest_in_wedge)
+        return np.asarray(self.wedged[:, None] & excused)
+
     def bound(
         self, gap: Array, before: Array, bounce: Array, mine: Array | None = None
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Array, Array, Array]:
         """Least normal velocity that the scheme asks for, -inf where it asks for none.
 
-        The second array tells where rounding decides whether it asks; `mine` tells who takes part
-        in the impacts of split steps.
+        The second array is the largest at which it lets forces act, no less than the first: what
+        lies between is excused. The third tells where rounding decides whether it asks at all;
+        `mine` tells who takes part in the impacts of split steps.
         """
-        held = self.wedged[:, None] & (gap < TOUCHING)
+        held = self.may_stay(gap)
         if mine is not None:
             whole = np.where(mine, -bounce * before, -np.inf)
-            least = np.where(self.split[:, None], whole, -gap / self.h)
+            asked = np.where(self.split[:, None], whole, -gap / self.h)
             held |= (self.split & self.wedged)[:, None] & mine
             near = self.split[:, None] & (np.abs(gap) < 2.0 * TOUCHING)
-            return np.where(held, -np.inf, least), near | held
-        if self.scheme in BOUND:
-            return np.where(held, -np.inf, -gap / self.h), held
-        foreseen, least = gap, np.zeros_like(gap)
-        if self.scheme is Scheme.MOREAU_JEAN:
-            foreseen, least = gap + 0.5 * self.h * before, -bounce * before
-        near = np.abs(foreseen - self.activation) < UNDECIDED
-        return np.where(foreseen <= self.activation, least, -np.inf), near
+        elif self.scheme in BOUND:
+            asked, near = -gap / self.h, np.zeros_like(held)
+        else:
+            foreseen, asked = gap, np.zeros_like(gap)
+            if self.scheme is Scheme.MOREAU_JEAN:
+                foreseen, asked = gap + 0.5 * self.h * before, -bounce * before
+            near = np.abs(foreseen - self.activation) < UNDECIDED
+            asked = np.where(foreseen <= self.activation, asked, -np.inf)
+            return asked, asked, near
+        least = np.where(held, np.minimum(asked, self.rows.speed_in_wedge), asked)
+        most = np.where(held, np.maximum(asked, self.rows.speed_in_wedge), asked)
+        return least, most, near | (held & ~np.isfinite(least))
 
     def normals(
         self, law: str, found: Findings, impulse: Array, speed: Array, weight: Array,
-        least: Array, near: Array, names: tuple[str, ...],
+        asked: tuple[Array, Array, Array], names: tuple[str, ...],
     ) -> None:  # fmt: skip
-        """Judge ``w ≥ b ⟂ λ ≥ 0``, row by row and place."""
+        """Judge ``w ≥ b ⟂ λ ≥ 0``, row by row and place; `asked` is what `bound` returns."""
+        least, most, near = asked
         size = self.size[:, None]
         unit_of_speed = np.maximum(weight * size, 1e-300)
         unit_of_impulse = size / np.maximum(weight, 1e-300)
         asks = np.isfinite(least)
-        over = np.where(asks, speed - np.where(asks, least, 0.0), 0.0) / unit_of_speed
+        low, high = (np.where(asks, each, 0.0) for each in (least, most))
+        over = np.where(asks, speed - np.clip(speed, low, high), 0.0) / unit_of_speed
         pushes = impulse / unit_of_impulse
         below = np.where(asks & ~near, -over, 0.0)
         found.look(f"{law}: speed into it", below, LAW, self.time, names)
         both = np.where(asks, np.minimum(np.abs(over), pushes), np.where(near, 0.0, pushes))
         found.look(f"{law}: force without touch", both, LAW, self.time, names)
         found.look(f"{law}: pull", -pushes, LAW, self.time, names)
-        gain = np.where(asks, np.maximum(least, 0.0), 0.0) * np.maximum(impulse, 0.0)
+        gain = np.where(asks, np.maximum(most, 0.0), 0.0) * np.maximum(impulse, 0.0)
         self.asked_for += gain.sum(axis=1)
 
     def contacts(self, found: Findings) -> None:
@@ -249,10 +261,10 @@ class _Steps:
         if self.scheme is Scheme.IMPACT_RESOLVED:
             moved, free = (rates(self.jacobian, v)[..., 0] for v in (self.moved, self.free))
             mine = self.arrives(found, "contact", self.gap, moved, free)
-        least, near = self.bound(self.gap, before, rows.measured.restitution[:-1], mine)
+        least, most, near = self.bound(self.gap, before, rows.measured.restitution[:-1], mine)
         # Of the force of two faces only where it acts is known, and what it does. What is asked of
         # either face is: to push out of the ground, and to bounce.
-        came = np.linalg.norm(rates(self.jacobian, self.before), axis=-1)
+        came = rows.fastest(np.linalg.norm(rates(self.jacobian, self.before), axis=-1), self.before)
         asked = rows.measured.restitution[:-1] * came
         if self.scheme in BOUND:
             asked = asked + np.maximum(-self.gap, 0.0) / self.h
@@ -266,8 +278,7 @@ class _Steps:
             impulse[..., 0],
             speed[..., 0],
             weight[..., 0],
-            least,
-            near,
+            (least, most, near),
             names,
         )
         size = self.size[:, None]
@@ -300,7 +311,7 @@ class _Steps:
             left = np.diff(rows.center, axis=0) - self.h * rates(world, self.moved)
             own = np.abs(turning - np.einsum("tpc,tpc->tp", left, rows.normal[:-1]))
             explained = np.where(self.cornered, np.linalg.norm(left, axis=-1) + own, explained)
-        left = np.where(self.wedged[:, None], np.maximum(-rows.gap[:-1], 0.0), 0.0)
+        left = np.where(self.may_stay(self.gap), np.maximum(-self.gap, 0.0), 0.0)
         deep = -rows.gap[1:] - explained - left
         found.look("sunk at a corner", np.maximum(deep, 0.0), SINK, self.time, rows.contacts)
 
@@ -314,13 +325,14 @@ class _Steps:
             mine = None
             if self.scheme is Scheme.IMPACT_RESOLVED:
                 mine = self.arrives(found, f"{name} stop", gap, side * self.moved, side * self.free)
-            least, near = self.bound(gap, side * self.before, nothing, mine)
+            least, most, near = self.bound(gap, side * self.before, nothing, mine)
             pressed = np.where(rows.ties.latched[:-1], 0.0, np.maximum(side * self.stop, 0.0))
             pressed = np.where(rows.of_balls, 0.0, pressed)
             near = near | rows.ties.latched[:-1]
             self.normals(
-                f"{name} stop", found, pressed, side * self.after, weight, least, near, rows.joints
-            )
+                f"{name} stop", found, pressed, side * self.after, weight, (least, most, near),
+                rows.joints,
+            )  # fmt: skip
 
         for name, row, gap, force in rows.stops_of_balls():
             weight = self.metric.weight(row[:-1, None, None])[..., 0]
@@ -328,12 +340,12 @@ class _Steps:
             def along(velocity: Array, row: Array = row) -> Array:
                 return np.einsum("tn,tn->t", row[:-1], velocity)[:, None]
 
-            least, near = self.bound(gap[:-1, None], along(self.before), 0.0 * weight, self.arrives(
+            asked = self.bound(gap[:-1, None], along(self.before), 0.0 * weight, self.arrives(
                 found, "ball stop", gap[:-1, None], along(self.moved), along(self.free)
             ) if self.scheme is Scheme.IMPACT_RESOLVED else None)  # fmt: skip
             self.normals(
-                "ball stop", found, self.h * force[:-1, None], along(self.after), weight, least,
-                near, (name,),
+                "ball stop", found, self.h * force[:-1, None], along(self.after), weight, asked,
+                (name,),
             )  # fmt: skip
 
     def dry_joints(self, found: Findings) -> None:

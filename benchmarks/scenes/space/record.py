@@ -22,6 +22,9 @@ SAME_WAY = 1e-5
 """Normals agree within this."""
 SINK = 1e-6
 """Depth (m) in a face that is not the recorded one."""
+BESIDE_ITS_WAY = 1e-10
+"""Change of position (m, rad) from which on positions moved with another velocity than that behind
+the step."""
 NEAR_BOTH = 1e-3
 """A point that is this near (m) to two faces, or comes so near in a step, may be pushed by both."""
 
@@ -33,6 +36,10 @@ def frames(normal: Array) -> Array:
     length = np.linalg.norm(first, axis=-1, keepdims=True)
     first = np.where(length < 1e-12, y, first / np.where(length < 1e-12, 1.0, length))
     return np.stack((normal, first, np.cross(normal, first)), axis=-2)
+
+
+LEFT_IN_THE_GROUND = 1e-4
+"""What is no deeper in the ground than this (m) may be left there where there is no way out."""
 
 
 class SpatialRows:
@@ -49,7 +56,12 @@ class SpatialRows:
     ----------
     cornered : (T, nc) bool
         Where the force of a contact point may be that of two faces.
+    speed_in_wedge, deepest_in_wedge : float
+        Normal speed (m/s) that is enough in a step which is excused, and the largest depth (m) that
+        it may leave: what touches need not bounce or come out, but must not go in.
     """
+
+    speed_in_wedge, deepest_in_wedge = 0.0, LEFT_IN_THE_GROUND
 
     def __init__(self, run: Any, terrain: Terrain) -> None:
         model = run.robot.model
@@ -118,12 +130,66 @@ class SpatialRows:
         return np.abs(self.tree.difference(there, self.q[1:])) / size
 
     def wedges(self, touching: float) -> Array:
-        """Steps (T − 1,) that need not lead out of the ground: a run in space counts them only."""
-        if not self.run.certificates.relaxed:
-            return np.zeros(len(self.time) - 1, dtype=bool)
-        way = np.minimum(self.coordinate - self.lower, self.upper - self.coordinate).min(axis=1)
-        deep = np.minimum(way, self.gap.min(axis=1, initial=0.0)) < -touching
-        return np.asarray(deep[:-1])
+        """Steps (T − 1,) that need not close gaps of what touches, or bounce.
+
+        A run in space only counts them. As many are taken as it counts, those that are farthest
+        from the speed that gaps and restitution ask for. How much that excuses is bounded.
+        """
+        found = np.zeros(len(self.time) - 1, dtype=bool)
+        count = int(self.run.certificates.relaxed)
+        if not count or not len(found):
+            return found
+        h = float(self.run.method.step)
+        chord = self.chord(h, np.ones(len(found), dtype=bool))
+        bounces = np.any(self.missed(h, self.v[1:]) > BESIDE_ITS_WAY, axis=1)[:, None]
+        own = self.jacobian[:, :, 0], self.gap, self.force[..., 0], self.measured.restitution
+        bounds = [tuple(each[:-1] for each in own)]
+        bounds += [
+            (row[:-1, None], gap[:-1, None], force[:-1, None], np.zeros((len(found), 1)))
+            for row, gap, force in self._stops()
+        ]
+        short = np.zeros(len(found))
+        for row, gap, force, e in bounds:
+            moved, before, after = (
+                np.einsum("tpn,tn->tp", row, v) for v in (chord, self.v[:-1], self.v[1:])
+            )
+            left = np.where(gap < 0.0, -gap / h - moved, 0.0)
+            pressed = (force > 0.0) & (gap <= touching)
+            left = np.maximum(left, np.where(pressed, np.abs(gap / h + moved), 0.0))
+            closed = bounces & (force > 0.0) & (np.minimum(gap, gap + h * moved) <= touching)
+            left = np.maximum(left, np.where(closed, -e * before - after, 0.0))
+            short = np.maximum(short, left.max(axis=1, initial=0.0))
+        worst = np.argsort(-short)[:count]
+        found[worst[short[worst] > 0.0]] = True
+        return found
+
+    def _stops(self) -> Iterator[tuple[Array, Array, Array]]:
+        """Row (T, nv), gap (T,) and force (T,) of every end of the range of a joint."""
+        for _, row, gap, force in self.stops_of_balls():
+            yield row, gap, force
+        for side, limit in ((1.0, self.lower), (-1.0, self.upper)):
+            for k in np.flatnonzero(np.isfinite(limit)).tolist():
+                row = np.zeros_like(self.v)
+                row[:, k] = side
+                gap = side * (self.coordinate[:, k] - limit[k])
+                yield row, gap, side * self.run.stop_torque[:, k]
+
+    def fastest(self, speed: Array, velocity: Array) -> Array:
+        """Speeds (T − 1, nc) of the points at the faces that they are near to, at a velocity.
+
+        A ball that spins comes to a wall with another speed than to the floor. `speed` is that at
+        the face that is told.
+        """
+        feet = (self.points - self.gaps[..., None] * self.ways)[:, :-1]
+        found = speed.copy()
+        for row in np.flatnonzero(self.cornered[:-1].any(axis=1)).tolist():
+            some = np.flatnonzero(self.cornered[row])
+            poses = SpatialPoses(self.tree, self.q[row : row + 1])
+            for each in feet[:, row][:, some]:
+                jacobian = poses.jacobian(self.model.contact_link[some], each[None])[0]
+                fast = np.linalg.norm(jacobian @ velocity[row], axis=-1)
+                found[row, some] = np.maximum(found[row, some], fast)
+        return found
 
     def push(self, share: Array) -> Array:
         """Generalised force (T, nv) of the pushes, each acting with a share (T, pushes)."""

@@ -81,7 +81,7 @@ class SpaceSetting:
         How many and how far they are from balance is told.
         """
         found = Findings()
-        terrain = self.scene.terrain()
+        terrain = self.scene.terrain().grown_together()
         parts, left_out = _without_halved(run, terrain)
         found.figures["steps left out"] = len(left_out)
         found.figures["largest of them"] = float(left_out.max(initial=0.0))

@@ -190,3 +190,12 @@ def test_wrong_data_are_refused_in_words(arguments: tuple, words: str) -> None:
 def test_other_dimensions_are_refused() -> None:
     with pytest.raises(ContactProblemError, match="dimension is 2 or 3"):
         hs.solve_contact(np.eye(4), np.zeros(4), 0.5, dimension=4)  # type: ignore[call-overload]
+
+
+def test_what_only_guessed_slip_speeds_solved_is_solved() -> None:
+    """Newton's method ends near four slipping contacts and a fifth, where there is no solution."""
+    problem = random_spatial_problem(np.random.default_rng([0, 9806]))
+    given = problem.delassus, problem.free, problem.friction
+    solution = hs.solve_contact(*given, dimension=3)
+    assert solution.certificate.valid
+    assert natural_map(*given, solution.impulse.ravel()) <= 1e-9

@@ -90,6 +90,28 @@ def test_depth_counts_to_faces_that_can_be_left_by() -> None:
     assert normal == pytest.approx((-1.0, 0.0, 0.0))
 
 
+@pytest.mark.parametrize("height", [0.0, 0.2], ids=["on the plane", "on a box"])
+def test_what_is_in_the_floor_of_a_wall_is_pushed_out_of_its_side(height: float) -> None:
+    """The bottom of a box that stands on something is no way out; that of one in the air is."""
+    boxes = (
+        Box(center=(0.0, 0.0, 0.1), size=(2.0, 2.0, 0.2)),
+        Box(center=(0.7, 0.0, height + 0.1), size=(0.4, 0.5, 0.2)),
+    )
+    ground = SpatialGround(boxes=boxes[1:] if height == 0.0 else boxes).model()
+    box = ground.half.shape[0] - 1
+    depth, normal = distance_to_box(ground, box, (0.5 + 3e-5, 0.0, height - 5e-5))
+    assert depth == pytest.approx(-3e-5, abs=1e-12)
+    assert normal == pytest.approx((-1.0, 0.0, 0.0))
+    assert is_beside(ground, box, (0.5 + 3e-5, 0.0, height - 5e-5))
+    before, away = distance_to_box(ground, box, (0.5 - 3e-5, 0.0, height - 5e-5))
+    assert before == pytest.approx(3e-5, abs=1e-12)
+    assert away == pytest.approx((-1.0, 0.0, 0.0))
+    floating = SpatialGround(boxes=(Box(center=(0.7, 0.0, 0.4), size=(0.4, 0.5, 0.2)),)).model()
+    below, down = distance_to_box(floating, 0, (0.6, 0.0, 0.3 - 5e-5))
+    assert below == pytest.approx(5e-5, abs=1e-12)
+    assert down == pytest.approx((0.0, 0.0, -1.0))
+
+
 def test_a_ground_is_made_of_its_numbers_again_to_the_last_bit() -> None:
     """Files and snapshots hold it: normals that are unit already are not made unit again."""
     rng = np.random.default_rng(1)
@@ -148,7 +170,7 @@ def test_distances_to_a_box_that_is_turned() -> None:
         ((0.6, 0.0, 1.2), False),  # above it
         ((0.0, 0.0, 1.1), True),  # above the top, which is one face
         ((0.6, 0.6, 0.5), False),  # before an edge
-        ((0.2, 0.1, 0.5), False),  # inside, behind no face
+        ((0.2, 0.1, 0.5), True),  # inside: it has to get out
         ((0.5, 0.1, 0.5), True),  # on the side
         ((0.6, 0.0, -0.5e-3), True),  # in the floor, a little
         ((0.6, 0.0, -2e-3), False),  # below the floor on which the box stands

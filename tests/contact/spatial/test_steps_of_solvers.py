@@ -16,11 +16,18 @@ from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
 from heelstrike.contact.spatial.certificate import certify_blocks, sum_blocks, weigh_blocks
 from heelstrike.contact.spatial.certified_solve import block_workspace
 from heelstrike.contact.spatial.cones import natural_map, project
+from heelstrike.contact.spatial.fixed_point import GRADIENT_STEPS, guess_slips
 from heelstrike.contact.spatial.gauss_seidel import solve_planar_point, solve_point, sweep
 from heelstrike.contact.spatial.impossible import proof_of_none
 from heelstrike.contact.spatial.iterates import look, note_best, return_to_best
 from heelstrike.contact.spatial.modes import OPEN, SLIP, STICK
-from heelstrike.contact.spatial.newton import find_step, go, name_modes, solve_general
+from heelstrike.contact.spatial.newton import (
+    find_step,
+    go,
+    iterate_newton,
+    name_modes,
+    solve_general,
+)
 from heelstrike.contact.spatial.proximal import remember, tie
 from heelstrike.contact.spatial.restarts import draw
 from heelstrike.contact.spatial.scaling import give_impulses, scale_blocks, take_impulses
@@ -581,3 +588,19 @@ def test_weights_prove_that_no_impulse_helps() -> None:
     assert proof_of_none(delassus, free) is None
     assert proof_of_none(delassus, np.zeros(6)) is None
     assert proof_of_none(np.zeros((0, 0)), np.zeros(0)) is None
+
+
+def test_guessed_slip_speeds_come_to_those_of_the_answer() -> None:
+    """Without Newton's method between the guesses; each guess counts the steps that it takes."""
+    problem, work = posed(3)
+    work.settings.effort = 80 * GRADIENT_STEPS
+    work.iterate.x[:] = 0.0
+    uncompiled(look)(problem, work.scaled, work.iterate)
+    before = work.iterate.least
+    alone = uncompiled(guess_slips, {iterate_newton: lambda *_: None})
+    alone(
+        problem, work.settings, work.scaled, work.tally, work.iterate, work.newton, work.anchor
+    )  # fmt: skip
+    assert work.iterate.least < 1e-5 * before
+    assert work.tally.iterations <= work.settings.effort
+    assert work.tally.iterations % GRADIENT_STEPS == 0

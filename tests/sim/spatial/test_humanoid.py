@@ -13,10 +13,10 @@ from heelstrike.sim.spatial.run import SpatialRun
 JOINT = (("yaw", "0 0 1"), ("roll", "1 0 0"), ("pitch", "0 1 0"))
 
 
-def leg(side: str, y: float) -> str:
-    """Hip of three axes, knee, ankle of two; a foot on four small spheres."""
+def leg(side: str, y: float, more: str = "") -> str:
+    """Hip of three axes, knee, ankle of two, all with `more`; a foot on four small spheres."""
     hips = "".join(
-        f"<joint name='{side}_hip_{name}' axis='{axis}' range='-1.5 1.5' limited='true'/>"
+        f"<joint name='{side}_hip_{name}' axis='{axis}' range='-1.5 1.5' limited='true' {more}/>"
         for name, axis in JOINT
     )
     spheres = "".join(
@@ -28,16 +28,16 @@ def leg(side: str, y: float) -> str:
       <body name='{side}_thigh' pos='0 {y} -0.1'>{hips}
         <inertial pos='0 0 -0.15' mass='4' diaginertia='0.05 0.05 0.01'/>
         <body name='{side}_shin' pos='0 0 -0.35'>
-          <joint name='{side}_knee' axis='0 1 0' range='-0.1 2.5' limited='true'/>
+          <joint name='{side}_knee' axis='0 1 0' range='-0.1 2.5' limited='true' {more}/>
           <inertial pos='0 0 -0.15' mass='2' diaginertia='0.03 0.03 0.004'/>
           <body name='{side}_foot' pos='0 0 -0.35'>
-            <joint name='{side}_ankle_pitch' axis='0 1 0'/>
-            <joint name='{side}_ankle_roll' axis='1 0 0'/>
+            <joint name='{side}_ankle_pitch' axis='0 1 0' {more}/>
+            <joint name='{side}_ankle_roll' axis='1 0 0' {more}/>
             <inertial pos='0.03 0 -0.03' mass='0.8' diaginertia='0.001 0.003 0.003'/>{spheres}
           </body></body></body>"""
 
 
-def biped(made: Maker) -> hs.SpatialRobot:
+def biped(made: Maker, *, base: str = "<freejoint/>", more: str = "") -> hs.SpatialRobot:
     names = [
         f"{side}_{joint}"
         for side in ("left", "right")
@@ -48,8 +48,8 @@ def biped(made: Maker) -> hs.SpatialRobot:
         for name in names
     )
     trunk = (
-        "<body name='trunk' pos='0 0 0.85'><freejoint/><inertial pos='0 0 0.15' mass='18' "
-        f"diaginertia='0.6 0.5 0.2'/>{leg('left', 0.1)}{leg('right', -0.1)}</body>"
+        "<body name='trunk' pos='0 0 0.85'>" + base + "<inertial pos='0 0 0.15' mass='18' "
+        f"diaginertia='0.6 0.5 0.2'/>{leg('left', 0.1, more)}{leg('right', -0.1, more)}</body>"
     )
     return made(trunk, f"<actuator>{motors}</actuator>")
 
@@ -80,13 +80,16 @@ def stand(
 
 
 def has_stood(run: SpatialRun, robot: hs.SpatialRobot, weight: float) -> None:
-    """Without penetration or creep, all steps certified, the weight borne to a part of it."""
+    """Without penetration or creep, all steps certified, the weight borne to a part of it.
+
+    By the feet and by dry friction of the free base, which its file may have.
+    """
     assert run.completed
     assert run.certificates.penetration <= 1e-9
     assert run.certificates.uncertified == run.certificates.halved == 0
     late = run.time > 0.8 * run.time[-1]
     assert np.max(np.abs(run.slip[late])) <= 1e-12
-    borne = np.sum(run.contact_force[late, :, 0], axis=1)
+    borne = np.sum(run.contact_force[late, :, 0], axis=1) + run.friction_torque[late, 2]
     assert borne == pytest.approx(robot.weight, rel=weight)
 
 
@@ -99,6 +102,15 @@ def test_it_stands_for_a_minute(made: Maker) -> None:
     """Penetration at most 1e-9 m, creep 1e-12 m/s, weight to 1e-7 (what the issue asks)."""
     robot = biped(made)
     has_stood(stand(robot, 60.0), robot, 1e-7)
+
+
+def test_dry_friction_of_the_base_bears_weight(made: Maker) -> None:
+    """As in files whose default class of joints has `frictionloss`: what the feet do not bear."""
+    robot = biped(made, base="<joint type='free' frictionloss='0.1'/>")
+    run = stand(robot, 6.0)
+    has_stood(run, robot, 1e-7)
+    feet = np.sum(run.contact_force[-1, :, 0])
+    assert 0.01 < robot.weight - feet <= 0.1 + 1e-9
 
 
 def test_it_withstands_a_push_and_falls_by_a_larger_one(made: Maker) -> None:

@@ -27,7 +27,7 @@ from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.record.record import Told
 from heelstrike.sim.spatial import space
-from heelstrike.sim.spatial.candidates import assemble, entry_speed, list_candidates
+from heelstrike.sim.spatial.candidates import assemble, complete, entry_speed, list_candidates
 from heelstrike.sim.spatial.impact import closes, energy_of_impact, pose_impact_of
 from heelstrike.sim.spatial.memory import (
     MOST_ITERATIONS,
@@ -150,10 +150,10 @@ def test_the_table_has_what_may_hold_the_robot(made: Maker) -> None:
     nc = robot.nc
     for walls in (False, True):
         table = lay_out_table(robot, walls=walls)
-        kinds = [POINT] * nc + [WALL] * nc * walls + [STOP, STOP, BALL_STOP, DRY_JOINT]
+        kinds = [POINT] * nc + [WALL] * 2 * nc * walls + [STOP, STOP, BALL_STOP, DRY_JOINT]
         assert table.kind.tolist() == kinds
-        points = nc * (1 + walls)
-        assert table.owner[:points].tolist() == [*range(nc)] * (1 + walls)
+        points = nc * (1 + 2 * walls)
+        assert table.owner[:points].tolist() == [*range(nc)] * (1 + 2 * walls)
         first = robot.model.first_velocity
         shoulder, neck = (robot.joint_names.index(name) for name in ("shoulder", "neck"))
         assert table.owner[points:].tolist() == [shoulder, shoulder, neck, first[shoulder]]
@@ -222,8 +222,11 @@ def test_the_problem_of_a_step_is_that_of_the_dense_equations(posed: Posed) -> N
     uncompiled(assemble)(
         robot.model, STEP, table, memory.feet, memory.q, memory.v, next_v, memory.equations.tree,
         memory.equations.factor, len(chosen), chosen, first, table.last[chosen], assembly.rows,
-        problem.free, problem.delassus, assembly.before,
+        problem.free, assembly.before,
     )  # fmt: skip
+    problem.first[: len(first)], assembly.count, assembly.complete = first, len(chosen), 0
+    assembly.last[: len(chosen)] = table.last[chosen]
+    uncompiled(complete)(robot.model, assembly)
     gaps = table.gap.copy()
     jacobian = np.vstack([posed.rows(int(entry)) for entry in chosen])
     wanted = jacobian @ next_v
@@ -443,20 +446,20 @@ def test_where_there_is_no_way_out_none_is_asked_for(posed: Posed) -> None:
 
     solved = partial(
         uncompiled(solve_positions, {call_at: solve}), table=table, solver=memory.solver,
-        assembly=assembly, wedge=wedge,
+        assembly=assembly, wedge=wedge, factor=memory.equations.factor, holding=memory.holding,
     )  # fmt: skip
     wedge.wedged = NEVER_TOUCHED
     for steps, tries in ((0, 2), (1, 2), (2, 2), (3, 1), (4, 2), (5, 1)):
         listed(posed, {0: -5e-5}, np.zeros(posed.robot.nv))
         assembly.problem.free[:3] = (-0.05, 0.0, 0.0)
         asked.clear()
-        assert solved(STEP, steps) == SOLVED
+        assert solved(posed.robot.model, STEP, steps) == SOLVED
         assert len(asked) == tries
         assert wedge.relaxed == 1
         assert wedge.wedged == steps
     listed(posed, {0: 1e-3}, np.zeros(posed.robot.nv))
     assembly.problem.free[:3] = (-1.0, 0.0, 0.0)
-    assert solved(STEP, 6) == NOT_FOUND
+    assert solved(posed.robot.model, STEP, 6) == NOT_FOUND
     assert wedge.relaxed == 0
 
 
@@ -498,6 +501,7 @@ def test_the_impact_is_of_what_touches_with_its_bounces(posed: Posed) -> None:
     problem = assembly.problem
     half = rng.normal(size=(10, 10))
     problem.delassus[:10, :10] = half @ half.T
+    assembly.complete, model = 1, posed.robot.model
     free = rng.normal(size=10)
     free[[0, 3, 6]] = [-0.5, -0.4, 1.0]  # the first two come down, the third does not
     problem.free[:10] = free
@@ -507,7 +511,7 @@ def test_the_impact_is_of_what_touches_with_its_bounces(posed: Posed) -> None:
     table.touching[:] = NEVER_TOUCHED
     table.restitution[:3] = [0.5, 0.25, 0.5]
     assert uncompiled(closes)(STEP, 3, table, assembly)
-    uncompiled(pose_impact_of)(STEP, 3, False, table, assembly, impact)
+    uncompiled(pose_impact_of)(model, STEP, 3, False, True, table, assembly, impact)
     its = impact.problem
     assert its.count == 3
     assert impact.member[:3].tolist() == [0, 1, 3]
@@ -519,8 +523,12 @@ def test_the_impact_is_of_what_touches_with_its_bounces(posed: Posed) -> None:
     np.testing.assert_allclose(its.free[:7], wanted, atol=1e-12)
     np.testing.assert_array_equal(its.delassus[:7, :7], problem.delassus[np.ix_(kept, kept)])
     assert its.bound[2] == pytest.approx(0.4 * STEP)
-    uncompiled(pose_impact_of)(STEP, 3, True, table, assembly, impact)  # not asked to come out
+    uncompiled(pose_impact_of)(
+        model, STEP, 3, True, True, table, assembly, impact
+    )  # not asked to come out
     assert its.free[3] == pytest.approx(free[3] + 0.25 * -2.0)
+    uncompiled(pose_impact_of)(model, STEP, 3, False, False, table, assembly, impact)  # no bounces
+    assert its.free[3] == pytest.approx(free[3] + 3e-4 / STEP)
     # What touched in the step before, with no new one, makes no impact.
     listed(posed, {0: 2e-4}, np.zeros(posed.robot.nv))
     problem.free[0], assembly.answer.velocity[0], table.touching[0] = -0.5, 0.0, 3
@@ -677,7 +685,7 @@ def test_solvers_have_room_for_the_largest_of_a_batch(made: Maker) -> None:
         ([(small, plane)], 1, 3, small.nv),
         ([(small, plane), (large, plane)], nc + 4, 3 * nc + 4, large.nv),
         ([(large, plane), (small, plane)], nc + 4, 3 * nc + 4, large.nv),
-        ([(large, plane), (large, WALLS), (small, plane)], 2 * nc + 4, 6 * nc + 4, large.nv),
+        ([(large, plane), (large, WALLS), (small, plane)], 3 * nc + 4, 9 * nc + 4, large.nv),
     ):
         scratch = SPACE.scratch([SimpleNamespace(robot=r, ground=g) for r, g in settings])
         assert scratch.assembly.candidate.shape == (entries,)

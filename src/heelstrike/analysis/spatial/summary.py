@@ -64,8 +64,8 @@ class SpatialSummary(ToldSummary):
     halved: int
     relaxed: int
     """uncertified, halved, relaxed: Steps that went on with a residual above 1e-9; steps taken in
-    parts; steps in which points in a wedge were not asked to leave the ground, or whose impact was
-    left to the next step."""
+    parts; steps in which points in a wedge were not asked to leave the ground, or whose impact did
+    not bounce or was left to the next step."""
     solver: SolverCount
     """How the contact problems were solved."""
     torque_cost_N2m2s: float  # noqa: N815 - units keep their capitals
@@ -190,7 +190,7 @@ LINES = {
     "contact problems": "{s.solver.solves}, {s.solver.failures} not certified, "
     "{s.solver.fallbacks} needed another way; residual {s.residual_max:.2}",
     "steps not certified": "{s.uncertified} to 1e-9; {s.halved} halved; {s.relaxed} with a wedged "
-    "point left in place, or an impact left to the next step",
+    "point left in place, or an impact without bounce or left to the next step",
     OF_A_GAIN: "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
     "torque cost": "{s.torque_cost_N2m2s:.4} N²m²s",
     "cost of transport": "{s.cost_of_transport:.3} "

@@ -8,7 +8,8 @@ over all rows i, each with the weight of its block. Velocities count in units of
 impulses in units of ``β s_c``. In these units the residual is the largest natural map of a block
 (:mod:`heelstrike.contact.spatial.cones`). Nothing in it comes from the size of the answer: an
 impulse of 1e16 does not prove itself. Where rounding would show, velocities are summed again with
-all rounding errors kept.
+all rounding errors kept. A simulation that finds velocities without the matrix W bounds their
+rounding (:mod:`heelstrike.sim.spatial.holding`).
 """
 
 from __future__ import annotations
@@ -171,7 +172,18 @@ def certify_blocks(
     velocity.
     """
     weigh_blocks(problem, settings, scaled)
-    rounding = sum_blocks(problem, scaled, answer)
+    return judge_blocks(problem, sum_blocks(problem, scaled, answer), scaled, answer)
+
+
+@kernel
+def judge_blocks(
+    problem: BlockProblem, rounding: float, scaled: ScaledBlocks, answer: BlockAnswer
+) -> float:
+    """Compute the residual of impulses and the velocity that they give; see `certify_blocks`.
+
+    `rounding` says how far off the velocities may be, relative to the data; `scaled` has the
+    weights.
+    """
     unit = scaled.unit
     worst, most, nothing = 0.0, 0.0, 0.0
     impulse, velocity = answer.impulse, answer.velocity

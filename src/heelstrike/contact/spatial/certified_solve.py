@@ -11,9 +11,11 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at, separate_kernel
 from heelstrike.contact.sets import INTERVAL
 from heelstrike.contact.spatial.certificate import certify_blocks
+from heelstrike.contact.spatial.fixed_point import guess_slips
 from heelstrike.contact.spatial.gauss_seidel import sweep
 from heelstrike.contact.spatial.iterates import look, return_to_best
 from heelstrike.contact.spatial.modes import (
+    FIXED_POINT,
     GAUSS_SEIDEL,
     LAST_MODES,
     NEWTON,
@@ -37,7 +39,7 @@ from heelstrike.contact.spatial.workspace import (
     ScaledBlocks,
 )
 
-WAYS = 6
+WAYS = 7
 """How many ways there are."""
 
 FIRST_STEPS, NEXT_STEPS = 12, 40
@@ -91,7 +93,12 @@ def try_last_modes(problem: BlockProblem, answer: BlockAnswer, work: BlockWorksp
     scaled, settings, tally = work.scaled, work.settings, work.tally
     iterate, newton = work.iterate, work.newton
     slipping, sliding = count_slips(problem, answer)
-    if slipping == 0:
+    tried, iterate.tried = iterate.tried, 0
+    if slipping == 0 and tried == 1:
+        look(problem, scaled, iterate)
+        if sliding == 0:
+            return
+    elif slipping == 0:
         tally.iterations += 1
         if try_sticking(problem, scaled, iterate, newton) or sliding == 0:
             return
@@ -141,6 +148,8 @@ def try_way(way: int, problem: BlockProblem, answer: BlockAnswer, work: BlockWor
             ties *= 2
     elif way == RESTARTS:
         try_other_starts(problem, settings, scaled, tally, iterate, newton)
+    elif way == FIXED_POINT:
+        guess_slips(problem, settings, scaled, tally, iterate, newton, work.anchor)
 
 
 @separate_kernel(_signature)

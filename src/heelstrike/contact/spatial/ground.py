@@ -30,8 +30,9 @@ COVERED = 1e-9
 """Distance (m) up to which a face that touches something lies on it."""
 
 DOWNWARDS, UNDER = -0.5, 1e-3
-"""Vertical part of the normal of a face on which a box stands, and how far (m) below that a point
-in the floor still meets the walls of the box."""
+"""Vertical part of the normal of a face on which a box stands, and how far (m) at most the box goes
+on into what it stands on, so that a point that is in the floor meets the walls of the box, not its
+bottom."""
 
 BESIDE = 1e-6
 """Depth (m) below the rim of a face from which on a point meets it as a wall."""
@@ -49,7 +50,7 @@ class SpatialGroundModel(Bundle):
     height: float = number(float)
     """Distance of the plane from the origin, along its normal (m)."""
     center: Floats = array("boxes", 3)
-    """Middle of each box (m)."""
+    """Middle of each box (m), that of a box which goes on into what it stands on."""
     rotation: Floats = array("boxes", 9)
     """Its axes in the world, row by row."""
     half: Floats = array("boxes", 3)
@@ -152,13 +153,14 @@ class SpatialGround:
                 if not 0.0 <= value <= most or not np.isfinite(value):
                     raise SimulationError(f"{name} of the ground cannot be {value}")
         height = float(normal[2] * self.height)
+        center, rotation, half, exposed = _laid(boxes, normal, height)
         model = SpatialGroundModel(
             normal=normal,
             height=height,
-            center=np.array([each.center for each in boxes], dtype=float).reshape(-1, 3),
-            rotation=np.array([_axes(each) for each in boxes], dtype=float).reshape(-1, 9),
-            half=0.5 * np.array([each.size for each in boxes], dtype=float).reshape(-1, 3),
-            exposed=_exposed(boxes, normal, height),
+            center=center,
+            rotation=rotation,
+            half=half,
+            exposed=exposed,
             friction=np.array(friction, dtype=float),
             restitution=np.array(restitution, dtype=float),
         )
@@ -306,28 +308,68 @@ def _axes(box: Box) -> Floats:
     return np.array([c * a, s * a, -b, -s, c, 0.0, c * b, s * b, a])
 
 
-def _exposed(boxes: tuple[Box, ...], normal: Floats, height: float) -> Floats:
-    """Which faces can be touched, (boxes, 6): all corners of the others lie in one other thing."""
+def _corners(center: Floats, axes: Floats, half: Floats, face: int) -> Floats:
+    """Corners (4, 3) of a face of a box; the faces at the upper ends of its axes come first."""
+    own = np.empty((4, 3))
+    own[:, face % 3] = 1.0 if face < 3 else -1.0
+    own[:, [k for k in range(3) if k != face % 3]] = [
+        (i, j) for i in (-1.0, 1.0) for j in (-1.0, 1.0)
+    ]
+    return center + (own * half) @ axes
+
+
+def _laid(boxes: tuple[Box, ...], normal: Floats, height: float) -> tuple[Floats, ...]:
+    """Return middles, axes and half lengths of boxes, and which of their faces can be touched.
+
+    All corners of the others, (boxes, 6), lie in one other thing. What stands on it goes on into
+    it.
+    """
     exposed = np.ones((len(boxes), 6))
-    axes = [_axes(each).reshape(3, 3) for each in boxes]
-    center = [np.array(each.center) for each in boxes]
-    half = [0.5 * np.array(each.size) for each in boxes]
-    signs = np.array([(i, j) for i in (-1.0, 1.0) for j in (-1.0, 1.0)])
+    axes = np.array([_axes(each) for each in boxes], dtype=float).reshape(-1, 3, 3)
+    center = np.array([each.center for each in boxes], dtype=float).reshape(-1, 3)
+    half = 0.5 * np.array([each.size for each in boxes], dtype=float).reshape(-1, 3)
+
+    def covered(box: int, corners: Floats, way: Floats, most: float) -> float:
+        """How far corners that go some way stay in one other thing; -1 if they are in none."""
+        farthest = -1.0
+        if np.all(corners @ normal <= height + COVERED):
+            farthest = most if way @ normal <= 0.0 else 0.0
+        for other in range(len(boxes)):
+            there = np.abs((corners - center[other]) @ axes[other].T)
+            if other == box or not np.all(there <= half[other] + COVERED):
+                continue
+            own, along = (corners - center[other]) @ axes[other].T, axes[other] @ way
+            room = half[other] + COVERED - own * np.sign(along)
+            moving = np.abs(along) > 0.0
+            far = np.min(room[:, moving] / np.abs(along[moving]), initial=most)
+            farthest = max(farthest, float(far))
+        return farthest
+
+    def reach_down(box: int, corners: Floats, way: Floats) -> float:
+        """How far a box goes on into what it stands on, thing by thing."""
+        reach = 0.0
+        while reach < UNDER:
+            more = covered(box, corners + reach * way, way, UNDER - reach)
+            if more <= COVERED:
+                break
+            reach += more
+        return reach
+
+    longer, moved = half.copy(), center.copy()
     for box in range(len(boxes)):
         for face in range(6):
-            own = np.empty((4, 3))
-            own[:, face % 3] = 1.0 if face < 3 else -1.0
-            own[:, [k for k in range(3) if k != face % 3]] = signs
-            corners = center[box] + (own * half[box]) @ axes[box]
-            covered = bool(np.all(corners @ normal <= height + COVERED))
-            for other in range(len(boxes)):
-                if other != box:
-                    there = np.abs((corners - center[other]) @ axes[other].T)
-                    covered = covered or bool(np.all(there <= half[other] + COVERED))
-            exposed[box, face] = 0.0 if covered else 1.0
+            corners = _corners(center[box], axes[box], half[box], face)
+            outwards = axes[box, face % 3] * (1.0 if face < 3 else -1.0)
+            if covered(box, corners, outwards, UNDER) < 0.0:
+                continue
+            exposed[box, face] = 0.0
+            reach = reach_down(box, corners, outwards) if outwards[2] < DOWNWARDS else 0.0
+            longer[box, face % 3] += 0.5 * reach
+            moved[box] += 0.5 * reach * outwards
         if not exposed[box].any():  # nothing can touch it
             exposed[box] = 1.0
-    return exposed
+            longer[box], moved[box] = half[box], center[box]
+    return moved, axes.reshape(-1, 9), longer, exposed
 
 
 @kernel
@@ -377,7 +419,7 @@ def distance_to_face(ground: SpatialGroundModel, face: int, point: Triple) -> tu
 
 @kernel
 def is_beside(ground: SpatialGroundModel, box: int, point: Triple) -> bool:
-    """Whether a point is before or behind one exposed face of a box, and not at its rim.
+    """Whether a point is before or behind one exposed face of a box, or in it, and not at its rim.
 
     Points on the top of a box do not stumble over the rim of the next one.
     """
@@ -390,8 +432,7 @@ def is_beside(ground: SpatialGroundModel, box: int, point: Triple) -> bool:
         own = r[box, 3 * k] * x + r[box, 3 * k + 1] * y + r[box, 3 * k + 2] * z
         beyond = abs(own) - ground.half[box, k]
         seen = ground.exposed[box, k if own >= 0.0 else 3 + k] > 0.0
-        below = (1.0 if own >= 0.0 else -1.0) * r[box, 3 * k + 2] < DOWNWARDS
-        if not seen and beyond > (UNDER if below else BESIDE):
+        if not seen and beyond > BESIDE:
             return False
         shallow += seen and beyond > -BESIDE
-    return shallow == 1
+    return shallow <= 1

@@ -11,7 +11,7 @@ from heelstrike.contact.modes import Coded
 
 OPEN, STICK, SLIP = range(3)
 
-LAST_MODES, NEWTON, GAUSS_SEIDEL, REGULARISED, PROXIMAL, RESTARTS = range(6)
+LAST_MODES, NEWTON, GAUSS_SEIDEL, REGULARISED, PROXIMAL, RESTARTS, FIXED_POINT = range(7)
 
 SOLVED, NOT_FOUND, IMPOSSIBLE = range(3)
 
@@ -43,6 +43,8 @@ class SpatialSolver(Coded):
         Problems with a larger diagonal, one after the other, whose answers tend to one of this.
     ``RESTARTS``
         Newton's method from other impulses.
+    ``FIXED_POINT``
+        Convex problems with guessed slip speeds, each nearer to those of the answer before.
     """
 
     LAST_MODES = "last_modes"
@@ -51,6 +53,7 @@ class SpatialSolver(Coded):
     REGULARISED = "regularised"
     PROXIMAL = "proximal"
     RESTARTS = "restarts"
+    FIXED_POINT = "fixed_point"
 
 
 class SpatialStatus(enum.IntEnum):

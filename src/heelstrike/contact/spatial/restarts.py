@@ -1,4 +1,4 @@
-"""The last resort: Newton's method from other impulses, which are drawn but always the same."""
+"""Newton's method from other impulses, which are drawn but always the same."""
 
 from __future__ import annotations
 

@@ -24,6 +24,18 @@ def sign(value: float) -> float:
 def scale_blocks(problem: BlockProblem, settings: BlockSettings, scaled: ScaledBlocks) -> None:
     """Write the problem in units of its own; what no impulse moves counts fully."""
     weigh_blocks(problem, settings, scaled)
+    scale_data(problem, scaled)
+    rows = problem.first[problem.count]
+    for row in range(rows):
+        scale = scaled.weight[row]
+        for column in range(rows):
+            both = scale * scaled.weight[column]
+            scaled.matrix[row, column] = problem.delassus[row, column] * both
+
+
+@kernel
+def scale_data(problem: BlockProblem, scaled: ScaledBlocks) -> None:
+    """Write weights, bounds and free velocities in units of the problem that has been weighed."""
     first, unit = problem.first, scaled.unit
     for block in range(problem.count):
         scale = scaled.scale[block]
@@ -35,12 +47,6 @@ def scale_blocks(problem: BlockProblem, settings: BlockSettings, scaled: ScaledB
                 scaled.offset[row] = problem.free[row] * scale / unit
             else:
                 scaled.offset[row] = sign(problem.free[row])
-    rows = first[problem.count]
-    for row in range(rows):
-        scale = scaled.weight[row]
-        for column in range(rows):
-            both = scale * scaled.weight[column]
-            scaled.matrix[row, column] = problem.delassus[row, column] * both
 
 
 @kernel

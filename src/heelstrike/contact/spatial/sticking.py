@@ -15,6 +15,7 @@ from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL
 from heelstrike.contact.spatial.cones import project
 from heelstrike.contact.spatial.iterates import find_velocities, look, return_to_best
 from heelstrike.contact.spatial.modes import OPEN, SLIP, STICK
+from heelstrike.contact.spatial.newton import apply_matrix
 from heelstrike.contact.spatial.workspace import (
     BlockProblem,
     Floats,
@@ -116,23 +117,13 @@ def list_sticking_rows(
 
 
 @kernel
-def begin_at_bounds(
-    problem: BlockProblem, scaled: ScaledBlocks, iterate: Iterate, newton: NewtonSystem
-) -> None:
-    """Let dry friction that slides be at its bound, and all other impulses be zero.
-
-    ``newton.moved`` receives what that does to the velocities.
-    """
-    x, rows = iterate.x, problem.first[problem.count]
-    for row in range(rows):
-        newton.moved[row] = 0.0
+def begin_at_bounds(problem: BlockProblem, scaled: ScaledBlocks, iterate: Iterate) -> None:
+    """Let dry friction that slides be at its bound, and all other impulses be zero."""
+    x = iterate.x
     for block in range(problem.count):
         begin = problem.first[block]
         if problem.set[block] == INTERVAL and iterate.mode[block] == SLIP:
             x[begin] = math.copysign(scaled.bound[block], x[begin])
-            own = x[begin]
-            for row in range(rows):
-                newton.moved[row] += scaled.matrix[begin, row] * own
             continue
         for row in range(begin, problem.first[block + 1]):
             x[row] = 0.0
@@ -216,7 +207,8 @@ def try_sticking(
         size = list_sticking_rows(problem, scaled, iterate.mode, newton)
         if size < 0:
             return False
-        begin_at_bounds(problem, scaled, iterate, newton)
+        begin_at_bounds(problem, scaled, iterate)
+        apply_matrix(problem.first[problem.count], scaled, iterate.x, newton.moved)
         if not hold(problem.first[problem.count], size, scaled, newton, iterate.x):
             return False
         look(problem, scaled, iterate)

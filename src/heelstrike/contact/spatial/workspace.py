@@ -111,6 +111,8 @@ class Iterate(Bundle):
     """The impulses of the smallest residual so far."""
     least: float = cell(float)
     """That residual."""
+    tried: int = cell(int)
+    """Whether it is known that not all of what sticks by the last modes can go on doing so."""
 
 
 class NewtonSystem(Bundle):

@@ -158,6 +158,15 @@ def along_rows(
     model: SpatialModel, last: int, first: int, count: int, rows: Floats, v: Floats, result: Floats
 ) -> None:
     """Write J v of a block of rows into its entries of a result."""
+    if count == 3:
+        n, s, t = 0.0, 0.0, 0.0
+        for a in range(model.depth[last] + 1):
+            own = v[model.chain[last, a]]
+            n += rows[first, a] * own
+            s += rows[first + 1, a] * own
+            t += rows[first + 2, a] * own
+        result[first], result[first + 1], result[first + 2] = n, s, t
+        return
     for r in range(first, first + count):
         total = 0.0
         for a in range(model.depth[last] + 1):
@@ -171,6 +180,13 @@ def add_row_forces(
     total: Floats,
 ) -> None:  # fmt: skip
     """Add Jᵀ λ of a block of rows, of its entries of a force, to a vector over the velocities."""
+    if count == 3:
+        n, s, t = force[first], force[first + 1], force[first + 2]
+        for a in range(model.depth[last] + 1):
+            k = model.chain[last, a]
+            added = total[k] + rows[first, a] * n + rows[first + 1, a] * s
+            total[k] = added + rows[first + 2, a] * t
+        return
     for r in range(first, first + count):
         own = force[r]
         for a in range(model.depth[last] + 1):
@@ -190,6 +206,29 @@ def whiten_rows(
             for b in range(a):
                 rows[r, b] -= tree.factor[k, b] * own
             rows[r, a] = own * root
+
+
+@kernel
+def write_diagonal(
+    model: SpatialModel, count: int, first: Integers, last: Integers, rows: Floats, matrix: Floats
+) -> None:
+    """Write the diagonal of J M⁻¹ Jᵀ of blocks of whitened rows; see :func:`write_delassus`."""
+    for i in range(count):
+        end = model.depth[last[i]] + 1
+        r = first[i]
+        if first[i + 1] - r == 3:
+            n, s, t = 0.0, 0.0, 0.0
+            for a in range(end):
+                n += rows[r, a] * rows[r, a]
+                s += rows[r + 1, a] * rows[r + 1, a]
+                t += rows[r + 2, a] * rows[r + 2, a]
+            matrix[r, r], matrix[r + 1, r + 1], matrix[r + 2, r + 2] = n, s, t
+            continue
+        for m in range(r, first[i + 1]):
+            total = 0.0
+            for a in range(end):
+                total += rows[m, a] * rows[m, a]
+            matrix[m, m] = total
 
 
 @kernel

@@ -16,6 +16,7 @@ from heelstrike.contact.spatial.ground import (
     distance_to_face,
     is_beside,
 )
+from heelstrike.contact.spatial.modes import OPEN
 from heelstrike.dynamics.spatial.algebra import Vector, dot, spatial, velocity_at
 from heelstrike.dynamics.spatial.configurations import turn_between
 from heelstrike.dynamics.spatial.kinematics import place_of
@@ -34,7 +35,15 @@ from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.spatial.memory import SpatialAssembly, SpatialFeet
-from heelstrike.sim.spatial.table import BALL_STOP, DRY_JOINT, POINT, STOP, WALL, BlockTable
+from heelstrike.sim.spatial.table import (
+    BALL_STOP,
+    DRY_JOINT,
+    NEVER_TOUCHED,
+    POINT,
+    STOP,
+    WALL,
+    BlockTable,
+)
 
 CLOSING = 5.0
 """Speed (m/s) at which what closes within a step takes part; or at twice its free speed."""
@@ -81,32 +90,85 @@ def meet_face(
 
 
 @kernel
+def is_hidden(
+    ground: SpatialGroundModel, face: int, place: Vector, depth: float, normal: Vector,
+    away: Vector,
+) -> bool:  # fmt: skip
+    """Whether a wall that a point is in shows only within what it is deeper in.
+
+    Lifted out of that, it meets another face of the box, or none: where two boxes of one height
+    cross, their sides within each other are no walls.
+    """
+    gap, _ = distance_to_face(ground, face, place)
+    if gap >= 0.0:  # the middle of a ball
+        return False
+    lifted = (
+        place[0] + depth * normal[0], place[1] + depth * normal[1], place[2] + depth * normal[2]
+    )  # fmt: skip
+    gap, there = distance_to_face(ground, face, lifted)
+    return gap > 0.0 or dot(there, away) < PARALLEL
+
+
+@kernel
+def wall_beside(
+    model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, contact: int,
+    below: int, normal: Vector, depth: float, wall: int, across: Vector,
+) -> tuple[int, float, Vector]:  # fmt: skip
+    """Return the nearest face that a contact meets beside others, its gap and normal.
+
+    The others are the face below it, in which it is by a depth, and if it is not -1 a wall, with
+    their normals; one parallel to either is none beside it, and neither is what a ball meets at the
+    seam of a floor or wall of several boxes. -1 if there is none.
+    """
+    is_ball = model.contact_radius[contact] > 0.0 and model.contact_rim[contact] == 0.0
+    found, least, way = -1, math.inf, normal
+    for face in range(ground.half.shape[0] + 1):
+        if face in (below, wall):
+            continue
+        point, gap, away = meet_face(model, ground, tree, contact, face)
+        probe = point if model.contact_rim[contact] > 0.0 else contact_center(model, tree, contact)
+        beside_both = max(dot(away, normal), dot(away, across) if wall >= 0 else -1.0)
+        at_edge = is_ball and beside_both < KERB
+        if face > 0 and not (at_edge or is_beside(ground, face - 1, probe)):
+            continue
+        if face > 0 and gap < 0.0 and depth > 0.0 and is_hidden(
+            ground, face, probe, depth, normal, away
+        ):  # fmt: skip
+            continue
+        if gap < least and beside_both < PARALLEL:
+            found, least, way = face, gap, away
+    return found, least, way
+
+
+@kernel
 def faces_of(
     model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, contact: int
-) -> tuple[int, int]:
-    """Return the face that a contact meets, and the wall beside it; -1 if there is none.
+) -> tuple[int, int, int]:
+    """Return the face that a contact meets, and two walls beside it; -1 if there is none.
 
     In a corner the first is the one that points more upwards. A ball that lies on one face may meet
     the edge of another box, too, as of a kerb; rolling from box to box of one height it does not.
     """
     best, distance, normal = 0, math.inf, (0.0, 0.0, 1.0)
-    is_ball = model.contact_radius[contact] > 0.0 and model.contact_rim[contact] == 0.0
     for face in range(ground.half.shape[0] + 1):
         _, gap, away = meet_face(model, ground, tree, contact, face)
         if gap < distance:
             best, distance, normal = face, gap, away
-    wall, least, across = -1, math.inf, normal
-    for face in range(ground.half.shape[0] + 1):
-        point, gap, away = meet_face(model, ground, tree, contact, face)
-        probe = point if model.contact_rim[contact] > 0.0 else contact_center(model, tree, contact)
-        at_edge = is_ball and dot(away, normal) < KERB
-        if face == best or (face > 0 and not (at_edge or is_beside(ground, face - 1, probe))):
-            continue
-        if gap < least and dot(away, normal) < PARALLEL:
-            wall, least, across = face, gap, away
-    if wall >= 0 and least <= distance + BESIDE and across[2] > normal[2]:
-        return wall, best
-    return best, wall
+    if ground.half.shape[0] == 0:
+        return best, -1, -1
+    wall, least, across = wall_beside(
+        model, ground, tree, contact, best, normal, -distance, -1, normal
+    )  # fmt: skip
+    if wall < 0:
+        return best, -1, -1
+    other, farther, aside = wall_beside(
+        model, ground, tree, contact, best, normal, -distance, wall, across
+    )  # fmt: skip
+    if least <= distance + BESIDE and across[2] > normal[2]:
+        best, wall, normal = wall, best, across
+    if other >= 0 and farther <= distance + BESIDE and aside[2] > normal[2]:
+        best, other = other, best
+    return best, wall, other
 
 
 @kernel
@@ -126,28 +188,82 @@ def locate_points(
 ) -> None:  # fmt: skip
     """Find where the contact points are, and the ground that is nearest to each."""
     for contact in range(model.nc):
-        face, wall = faces_of(model, ground, tree, contact)
+        face, wall, other = faces_of(model, ground, tree, contact)
         point, gap, normal = meet_face(model, ground, tree, contact, face)
         for k in range(3):
             position[contact, k] = point[k]
             normals[contact, k] = normal[k]
+        if table.wall[contact] >= 0:
+            entry = table.wall[contact]
+            slots = contact, entry, entry + model.nc
+            if (wall >= 0 and wall == table.face[slots[2]]) or (
+                other >= 0 and other == table.face[slots[1]]
+            ):
+                wall, other = other, wall
+            faces = face, wall, other
+            for i in range(3):
+                if faces[i] >= 0:
+                    _, _, way = meet_face(model, ground, tree, contact, faces[i])
+                    go_on_at(slots[i], faces[i], way, slots, table, feet)
+            keep_faces(slots, faces, table)
+            locate_wall(model, ground, tree, contact, wall, entry, table, feet)
+            locate_wall(model, ground, tree, contact, other, entry + model.nc, table, feet)
         keep_foot(contact, point, gap, normal, feet)
         gaps[contact] = gap
         table.gap[contact] = gap
         table.friction[contact] = model.friction_scale[contact] * ground.friction[face]
         bounces = model.restitution_scale[contact] * ground.restitution[face]
         table.restitution[contact] = min(bounces, 1.0)
-        if table.wall[contact] >= 0:
-            locate_wall(model, ground, tree, contact, wall, table, feet)
+
+
+@kernel
+def go_on_at(
+    entry: int, face: int, normal: Vector, slots: tuple[int, int, int], table: BlockTable,
+    feet: SpatialFeet,
+) -> None:  # fmt: skip
+    """Let an entry go on at a face that its point was not at before, if it goes the same way.
+
+    So does a point that moves from one box to the next in one floor or wall.
+    """
+    for i in range(3):
+        if table.face[slots[i]] == face:
+            return
+    before = feet.frame[entry, 0], feet.frame[entry, 1], feet.frame[entry, 2]
+    if table.face[entry] >= 0 and dot(before, normal) >= PARALLEL:
+        table.face[entry] = face
+
+
+@kernel
+def keep_faces(
+    entries: tuple[int, int, int], faces: tuple[int, int, int], table: BlockTable
+) -> None:
+    """Let what is kept of entries of one point go with its faces; of new faces nothing is known."""
+    for i in range(3):
+        for j in range(3):
+            one, two = entries[i], entries[j]
+            if faces[i] >= 0 and table.face[one] != faces[i] and table.face[two] == faces[i]:
+                table.face[one], table.face[two] = table.face[two], table.face[one]
+                table.mode[one], table.mode[two] = table.mode[two], table.mode[one]
+                touched = table.touching[one]
+                table.touching[one], table.touching[two] = table.touching[two], touched
+                for k in range(3):
+                    impulse = table.impulse[one, k]
+                    table.impulse[one, k], table.impulse[two, k] = table.impulse[two, k], impulse
+    for i in range(3):
+        one = entries[i]
+        if table.face[one] != faces[i]:
+            table.face[one], table.mode[one] = faces[i], OPEN
+            table.touching[one] = NEVER_TOUCHED
+            for k in range(3):
+                table.impulse[one, k] = 0.0
 
 
 @kernel
 def locate_wall(
     model: SpatialModel, ground: SpatialGroundModel, tree: SpatialWorkspace, contact: int,
-    wall: int, table: BlockTable, feet: SpatialFeet,
+    wall: int, entry: int, table: BlockTable, feet: SpatialFeet,
 ) -> None:  # fmt: skip
-    """Find how far a contact point is from the wall beside it, infinitely if there is none."""
-    entry = table.wall[contact]
+    """Find how far a contact point is from a wall beside it, infinitely if there is none."""
     table.gap[entry] = math.inf
     if wall < 0:
         return
@@ -262,14 +378,23 @@ def list_candidates(
         problem.bound[count] = 0.0
         if table.kind[entry] == DRY_JOINT:
             problem.bound[count] = step * model.dry_friction[table.owner[entry]]
-        assembly.answer.mode[count] = table.mode[entry]
-        for i in range(table.size[entry]):
-            assembly.answer.impulse[rows + i] = table.impulse[entry, i]
         rows += table.size[entry]
         count += 1
     problem.first[count] = rows
     problem.count = count
     assembly.count = count
+    begin_as_before(table, assembly)
+
+
+@kernel
+def begin_as_before(table: BlockTable, assembly: SpatialAssembly) -> None:
+    """Let the candidates begin with modes and impulses of the last step."""
+    answer, first = assembly.answer, assembly.problem.first
+    for place in range(assembly.count):
+        entry = assembly.candidate[place]
+        answer.mode[place] = table.mode[entry]
+        for i in range(table.size[entry]):
+            answer.impulse[first[place] + i] = table.impulse[entry, i]
 
 
 @kernel
@@ -301,10 +426,9 @@ def write_rows_of(
 def assemble(
     model: SpatialModel, step: float, table: BlockTable, feet: SpatialFeet, q: Floats, v: Floats,
     next_v: Floats, tree: SpatialWorkspace, factor: TreeFactor, count: int, candidate: Integers,
-    first_row: Integers, chain_end: Integers, rows: Floats, free: Floats,
-    delassus: Floats, before: Floats,
+    first_row: Integers, chain_end: Integers, rows: Floats, free: Floats, before: Floats,
 ) -> None:  # fmt: skip
-    """Write the contact problem of the candidates, gaps linearised over the step.
+    """Write the rows of the candidates, whitened, and free velocities with gaps over the step.
 
     v is the velocity as the step begins, next_v the free one at its end; `chain_end` is the last
     velocity of the chain of each candidate. Receives the normal velocities `before`.
@@ -314,10 +438,22 @@ def assemble(
         first, last = first_row[place], chain_end[place]
         size = first_row[place + 1] - first
         write_rows_of(model, tree, entry, first, table, feet, q, rows)
-        along_rows(model, last, first, 1, rows, v, free)
-        before[place] = free[first]
-        along_rows(model, last, first, size, rows, next_v, free)
-        if table.kind[entry] != DRY_JOINT:
+        if table.kind[entry] == DRY_JOINT:
+            before[place], free[first] = v[last], next_v[last]
+        else:
+            along_rows(model, last, first, 1, rows, v, free)
+            before[place] = free[first]
+            along_rows(model, last, first, size, rows, next_v, free)
             free[first] += table.gap[entry] / step
         whiten_rows(model, factor, last, first, size, rows)
-    write_delassus(model, count, first_row, chain_end, rows, delassus)
+
+
+@kernel
+def complete(model: SpatialModel, assembly: SpatialAssembly) -> None:
+    """Write the Delassus matrix of the problem, unless it is there."""
+    if assembly.complete == 0:
+        first, rows = assembly.problem.first, assembly.rows
+        write_delassus(
+            model, assembly.count, first, assembly.last, rows, assembly.problem.delassus
+        )  # fmt: skip
+        assembly.complete = 1

@@ -10,6 +10,8 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.spatial.certified_solve import solve_block_problem
 from heelstrike.contact.spatial.workspace import BlockProblem, BlockWorkspace
+from heelstrike.robot.spatial.model import SpatialModel
+from heelstrike.sim.spatial.candidates import complete
 from heelstrike.sim.spatial.memory import SpatialAssembly, SpatialImpact
 from heelstrike.sim.spatial.table import DRY_JOINT, BlockTable
 from heelstrike.tolerances import CLOSED_GAP, NOTICEABLE_ENERGY
@@ -56,13 +58,15 @@ def takes_part(
 
 @kernel
 def pose_impact_of(
-    step: float, before: int, relaxed: bool, table: BlockTable, assembly: SpatialAssembly,
-    impact: SpatialImpact,
+    model: SpatialModel, step: float, before: int, relaxed: bool, bounces: bool,
+    table: BlockTable, assembly: SpatialAssembly, impact: SpatialImpact,
 ) -> None:  # fmt: skip
     """Write the problem of the impact: what takes part, without the gaps, with its bounces.
 
-    `relaxed` says that nothing was asked to come out of the ground.
+    `relaxed` says that nothing that touches was asked to move by its gap, `bounces` whether
+    restitution counts.
     """
+    complete(model, assembly)
     problem, its = assembly.problem, impact.problem
     members = rows = 0
     for place in range(assembly.count):
@@ -82,9 +86,10 @@ def pose_impact_of(
             impact.answer.impulse[rows + i] = assembly.answer.impulse[begin + i]
         impact.bounce[members] = 0.0
         if table.kind[entry] != DRY_JOINT:
-            impact.bounce[members] = table.restitution[entry] * assembly.before[place]
-            left = 0.0 if relaxed else min(table.gap[entry], 0.0)
-            its.free[rows] -= (max(table.gap[entry], 0.0) + left) / step
+            if bounces:
+                impact.bounce[members] = table.restitution[entry] * assembly.before[place]
+            gap = table.gap[entry]
+            its.free[rows] -= (0.0 if relaxed and gap <= CLOSED_GAP else gap) / step
             its.free[rows] += impact.bounce[members]
         for other in range(members + 1):
             column = problem.first[impact.member[other]]
@@ -97,6 +102,15 @@ def pose_impact_of(
         members += 1
         its.first[members] = rows
     its.count = members
+
+
+@kernel
+def asks_for_bounces(impact: SpatialImpact) -> bool:
+    """Whether restitution asks anything of the impact."""
+    count = 0
+    for place in range(impact.problem.count):
+        count += impact.bounce[place] != 0.0
+    return count > 0
 
 
 @kernel
@@ -116,14 +130,14 @@ def energy_of_impact(impact: SpatialImpact) -> float:
 
 @kernel
 def solve_impact_of(
-    step: float, before: int, relaxed: bool, table: BlockTable, solver: BlockWorkspace,
-    assembly: SpatialAssembly, impact: SpatialImpact,
+    model: SpatialModel, step: float, before: int, relaxed: bool, bounces: bool,
+    table: BlockTable, solver: BlockWorkspace, assembly: SpatialAssembly, impact: SpatialImpact,
 ) -> int:  # fmt: skip
     """Solve the impact of a step; its impulses go to the rows of the candidates.
 
     Returns how the solve ended.
     """
-    pose_impact_of(step, before, relaxed, table, assembly, impact)
+    pose_impact_of(model, step, before, relaxed, bounces, table, assembly, impact)
     status = solve_block_problem(impact.problem, solver, impact.answer)
     impact.gain = energy_of_impact(impact)
     first, its = assembly.problem.first, impact.problem

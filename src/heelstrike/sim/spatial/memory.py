@@ -28,7 +28,13 @@ from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import CommonTally
 from heelstrike.sim.push import Push, Pushes, pushes_on
-from heelstrike.sim.spatial.table import NEVER_TOUCHED, BlockTable, lay_out_table, most_rows_of
+from heelstrike.sim.spatial.table import (
+    NEVER_TOUCHED,
+    WALLS,
+    BlockTable,
+    lay_out_table,
+    most_rows_of,
+)
 
 KNOWN_SPEED = 1e-12
 """Velocity times the root of a mass (m/s kg^(1/2)) below which nothing is known of free velocities:
@@ -49,7 +55,8 @@ class SpatialTally(CommonTally):
     halved: int = cell(int)
     relaxed: int = cell(int)
     """uncertified, halved, relaxed: Steps that went on with a residual above the tolerance; that
-    were halved; that were not asked to leave the ground, or left their impact to the next."""
+    were halved; that were not asked to leave the ground, or whose impact did not bounce or was left
+    to the next."""
     energy_gain: float = cell(float)
     """Kinetic energy that restitution made (J)."""
 
@@ -87,7 +94,7 @@ class SpatialFeet(Bundle):
     """The contact points of an instant beside what controllers see."""
 
     foot: Floats = array("feet", 3)
-    """Projection of each point onto the ground, then onto its wall: where its rows are taken."""
+    """Projection of each point onto the ground, then onto its walls: where its rows are taken."""
     frame: Floats = array("feet", 9)
     """Normals and tangents, row by row."""
 
@@ -105,11 +112,26 @@ class SpatialAssembly(Bundle):
     """Normal velocity of each as the step begins."""
     rows: Floats = array("capacity", "longest")
     """Rows of the candidates, whitened."""
+    complete: int = cell(int)
+    """Whether the Delassus matrix of the problem has been written."""
     change: Floats = array("nv")
     """What impulses do to the velocity."""
     problem: BlockProblem = part(BlockProblem)
     answer: BlockAnswer = part(BlockAnswer)
     """problem, answer: The problem of the positions."""
+
+
+class SpatialHolding(Bundle):
+    """The equations of what holds as in the step before, in the velocities."""
+
+    tree: TreeFactor = part(TreeFactor)
+    """Their matrix and its factor."""
+    along: Floats = array("nv")
+    """Impulses along the velocities."""
+    change: Floats = array("nv")
+    """Change of the velocities that impulses make."""
+    weighted: Floats = array("capacity")
+    """Impulses, or velocities, of the rows in other units."""
 
 
 class SpatialWedge(Bundle):
@@ -194,6 +216,7 @@ class SpatialMemory(Bundle):
     """What is decided of the step that follows."""
     wedge: SpatialWedge = part(SpatialWedge)
     assembly: SpatialAssembly = part(SpatialAssembly, address=True)
+    holding: SpatialHolding = part(SpatialHolding, address=True)
     impact: SpatialImpact = part(SpatialImpact, address=True)
     solver: BlockWorkspace = part(BlockWorkspace, address=True)
     settings: BlockSettings = part(BlockSettings)
@@ -210,11 +233,13 @@ class SpatialScratch(NamedTuple):
     Attributes
     ----------
     assembly : SpatialAssembly
+    holding : SpatialHolding
     impact : SpatialImpact
     solver : BlockWorkspace
     """
 
     assembly: SpatialAssembly
+    holding: SpatialHolding
     impact: SpatialImpact
     solver: BlockWorkspace
 
@@ -230,6 +255,7 @@ def spatial_scratch(entries: int, rows: int, models: Sequence[SpatialModel]) -> 
 
     return SpatialScratch(
         SpatialAssembly.allocate(extents, **both()),
+        SpatialHolding.allocate(extents),
         SpatialImpact.allocate(extents, **both()),
         block_workspace(blocks, most, ready=False),
     )
@@ -248,7 +274,8 @@ def allocate_spatial_memory(
 def beside_scratch(memory: SpatialMemory, scratch: SpatialScratch) -> SpatialMemory:
     """Return a memory whose solvers scribble there."""
     solver = scratch.solver.replaced(settings=memory.settings, tally=memory.solves)
-    return memory.replaced(assembly=scratch.assembly, impact=scratch.impact, solver=solver)
+    parts = {**scratch._asdict(), "solver": solver}
+    return memory.replaced(**parts)
 
 
 def spatial_mold(robot: SpatialRobot, *, walls: bool) -> Mold[SpatialMemory]:
@@ -267,7 +294,7 @@ def _laid_out(robot: SpatialRobot, *, walls: bool) -> SpatialMemory:
     nothing = spatial_scratch(0, 0, [robot.model])
     extents = {
         **robot.model.extents, "entries": len(table.kind), "axes": 3, "components": 3,
-        "feet": (2 if walls else 1) * robot.model.nc,
+        "feet": (1 + WALLS if walls else 1) * robot.model.nc,
     }  # fmt: skip
     memory = SpatialMemory.allocate(
         extents, command=guarded(np.zeros(robot.nu)), blocks=table, pushes=pushes_on(robot, ()),

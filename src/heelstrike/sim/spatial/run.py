@@ -41,7 +41,8 @@ class SpatialCertificates:
     """Steps that were taken in parts, because no answer for the whole was certified."""
     relaxed: int
     """Steps that were not asked to come out of the ground, in which they were by less than 0.1 mm,
-    or whose impact was left to the next: no certified way was found."""
+    or down to it by less than 1e-9 m, or whose impact did not bounce or was left to the next: no
+    certified way was found."""
     energy_gain: float
     """Kinetic energy that restitution with friction made (J)."""
 

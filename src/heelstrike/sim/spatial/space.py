@@ -306,9 +306,9 @@ class SpatialLook:
             own.feet,
         )  # fmt: skip
         table, points = own.blocks, slice(self._robot.nc)
-        at_wall = table.wall[points] >= 0
-        at_wall[at_wall] = table.gap[table.wall[points][at_wall]] <= STANDING_GAP
-        return np.where(at_wall, np.nan, table.friction[points])
+        walls, nearest = table.kind == WALL, np.full(self._robot.nc, np.inf)
+        np.minimum.at(nearest, table.owner[walls], table.gap[walls])
+        return np.where(nearest <= STANDING_GAP, np.nan, table.friction[points])
 
     def at_contacts(self, ground: SpatialGround, memory: SpatialMemory) -> Contacts:
         """Return the contact points of the state now, with the forces of the step before."""

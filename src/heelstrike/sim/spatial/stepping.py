@@ -2,9 +2,9 @@
 
 The scheme is that of the plane (:mod:`heelstrike.sim.time_stepping.method`): gaps linearised over
 the step, impacts whole within it. A step whose contact problem is not certified is halved, three
-times at most, and then solved with fifty times the effort, in the end without the impact, which
-then takes another step; if that does not help it goes on with a residual of up to 1e-6, marked, and
-above that the run ends.
+times at most, and then solved with fifty times the effort, in the end without restitution, or
+without the impact, which then takes another step; if that does not help it goes on with a residual
+of up to 1e-6, marked, and above that the run ends.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from heelstrike.dynamics.spatial.kinematics import (
     point_velocity,
 )
 from heelstrike.dynamics.spatial.rows import velocity_change
-from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
+from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.controller.interface import Contacts
@@ -39,6 +39,8 @@ from heelstrike.sim.push import Pushes, share_over_step
 from heelstrike.sim.spatial.candidates import (
     NO_ANGLE,
     assemble,
+    begin_as_before,
+    complete,
     entry_speed,
     is_far,
     list_candidates,
@@ -46,12 +48,19 @@ from heelstrike.sim.spatial.candidates import (
     locate_points,
     turn_of_ball,
 )
-from heelstrike.sim.spatial.impact import closes, solve_impact_of, touches_at_end
+from heelstrike.sim.spatial.holding import goes_on_holding
+from heelstrike.sim.spatial.impact import (
+    asks_for_bounces,
+    closes,
+    solve_impact_of,
+    touches_at_end,
+)
 from heelstrike.sim.spatial.memory import (
     MOST_ITERATIONS,
     SpatialAssembly,
     SpatialEquations,
     SpatialFeet,
+    SpatialHolding,
     SpatialMemory,
     SpatialStep,
     SpatialWedge,
@@ -173,19 +182,20 @@ def call_what_is_missed(
 
 @kernel
 def forgive_depth(step: float, table: BlockTable, assembly: SpatialAssembly) -> bool:
-    """Ask nothing to come out of the ground; return whether that changes anything.
+    """Ask nothing that touches to move by its gap; return whether that changes anything.
 
-    Points deeper than `LEFT_IN_THE_GROUND` are not left there: nothing changes then.
+    Neither out of the ground, nor down to it by less than counts as touching. Points deeper than
+    `LEFT_IN_THE_GROUND` are not left there: nothing changes then.
     """
     changed = False
     for place in range(assembly.count):
         gap = table.gap[assembly.candidate[place]]
         if gap < -LEFT_IN_THE_GROUND:
             return False
-        changed = changed or gap < 0.0
+        changed = changed or (gap != 0.0 and gap <= CLOSED_GAP)
     for place in range(assembly.count if changed else 0):
         gap = table.gap[assembly.candidate[place]]
-        if gap < 0.0:
+        if gap <= CLOSED_GAP:
             assembly.problem.free[assembly.problem.first[place]] -= gap / step
     return changed
 
@@ -207,24 +217,37 @@ def note_relaxed(steps: int, wedge: SpatialWedge) -> None:
 
 
 @kernel
+def solve_completed(
+    model: SpatialModel, assembly: SpatialAssembly, solver: BlockWorkspace
+) -> int:  # fmt: skip
+    """Solve the problem of the positions by its Delassus matrix."""
+    complete(model, assembly)
+    return solve_block_problem(assembly.problem, solver, assembly.answer)
+
+
+@kernel
 def solve_positions(
-    step: float, steps: int, table: BlockTable, solver: BlockWorkspace,
-    assembly: SpatialAssembly, wedge: SpatialWedge,
+    model: SpatialModel, step: float, steps: int, table: BlockTable, factor: TreeFactor,
+    holding: SpatialHolding, solver: BlockWorkspace, assembly: SpatialAssembly,
+    wedge: SpatialWedge,
 ) -> int:  # fmt: skip
     """Solve the problem of the positions; where there is no way out, without asking for one.
 
     Limbs that lie on several points, at the ends of their ranges, find none where each of their
-    points is in the ground by another billionth: each would have to slide its own way. They are
-    left there, and asked again when that is twice as long ago.
+    points is in the ground, or above it, by another billionth: each would have to slide its own
+    way. They are left there, and asked again when that is twice as long ago.
     """
-    wedge.relaxed = 0
+    wedge.relaxed = assembly.complete = 0
     at_once = goes_on_wedged(steps, wedge) and forgive_depth(step, table, assembly)
+    if not at_once and goes_on_holding(model, factor, assembly, holding, solver):
+        return SOLVED
+    begin_as_before(table, assembly)
     if at_once:
         note_relaxed(steps, wedge)
-    status = solve_block_problem(assembly.problem, solver, assembly.answer)
+    status = solve_completed(model, assembly, solver)
     if status != SOLVED and not at_once and forgive_depth(step, table, assembly):
         note_relaxed(steps, wedge)
-        status = solve_block_problem(assembly.problem, solver, assembly.answer)
+        status = solve_completed(model, assembly, solver)
     return status
 
 
@@ -243,10 +266,12 @@ def left_by(status: int, answer: BlockAnswer) -> float:
 
 @kernel
 def solve_step_of(
-    model: SpatialModel, time: float, step: float, number: int, resolves: bool,
+    model: SpatialModel, time: float, step: float, number: int, resolves: bool, bounces: bool,
     memory: SpatialMemory,
 ) -> float:  # fmt: skip
     """Find the velocity at the end of a step; return the largest residual, zero if certified.
+
+    `resolves` says whether an impact is whole within it, `bounces` whether restitution counts.
 
     ``memory.next_v`` receives the velocity, ``memory.impact.arriving`` that with which positions
     move, ``memory.impact.impulse`` the impulses of the candidates.
@@ -274,20 +299,25 @@ def solve_step_of(
             assemble(
                 model, step, table, memory.feet, memory.q, v, next_v, equations.tree,
                 equations.factor, assembly.count, assembly.candidate, problem.first,
-                assembly.last, assembly.rows, problem.free, problem.delassus, assembly.before,
+                assembly.last, assembly.rows, problem.free, assembly.before,
             )  # fmt: skip
             status = solve_positions(
-                step, number, table, memory.solver, assembly, memory.wedge
+                model, step, number, table, equations.factor, memory.holding, memory.solver,
+                assembly, memory.wedge,
             )  # fmt: skip
             worst = left_by(status, assembly.answer)
-            add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
+            if assembly.complete == 0:  # the change of velocity is known
+                for k in range(model.nv):
+                    impact.arriving[k] += memory.holding.change[k]
+            else:
+                add_impulses(model, assembly.answer.impulse, equations, assembly, impact.arriving)
             for row in range(assembly.problem.first[assembly.count]):
                 impact.impulse[row] = assembly.answer.impulse[row]
             if resolves and worst == 0.0 and closes(step, before, table, assembly):
                 impact.happens = 1
-                left = memory.wedge.relaxed == 1
+                relaxed = memory.wedge.relaxed == 1
                 status = solve_impact_of(
-                    step, before, left, table, memory.solver, assembly, impact
+                    model, step, before, relaxed, bounces, table, memory.solver, assembly, impact
                 )  # fmt: skip
                 worst = left_by(status, impact.answer)
                 add_impulses(model, impact.impulse, equations, assembly, next_v)
@@ -420,8 +450,8 @@ def take_step(
                 memory.contacts, memory.feet,
             )  # fmt: skip
         number = tally.steps + counts.parts
-        left = 0  # whether the impact is left to the next step
-        worst = solve_step_of(model, time + done * step, step, number, resolves, memory)
+        conceded = 0  # whether the impact has no restitution, or is left to the next step
+        worst = solve_step_of(model, time + done * step, step, number, resolves, True, memory)
         if worst > 0.0 and halvings < HALVINGS_OF_A_STEP:
             counts.halved = 1
             halvings += 1
@@ -430,11 +460,17 @@ def take_step(
             continue
         if worst > 0.0:  # before the run ends, or goes on marked, no effort is too much
             memory.solver.settings.effort = LAST_EFFORT
-            worst = solve_step_of(model, time + done * step, step, number, resolves, memory)
+            worst = solve_step_of(model, time + done * step, step, number, resolves, True, memory)
+            if worst > 0.0 and memory.impact.happens == 1 and asks_for_bounces(memory.impact):
+                # Friction may not let a point bounce (Painlevé's paradox): it stays, then.
+                worst = solve_step_of(
+                    model, time + done * step, step, number, resolves, False, memory
+                )  # fmt: skip
+                conceded = 1
             if worst > 0.0 and memory.impact.happens == 1:
                 # Between faces that nearly oppose each other an impact may have no answer at all.
-                worst = solve_step_of(model, time + done * step, step, number, False, memory)
-                left = 1
+                worst = solve_step_of(model, time + done * step, step, number, False, True, memory)
+                conceded = 1
             memory.solver.settings.effort = MOST_ITERATIONS
         if not worst <= MARKED_RESIDUAL:
             tally.unsolved = reaction.residual = worst
@@ -451,7 +487,7 @@ def take_step(
             tally.residual = max(tally.residual, reaction.residual)
         if memory.impact.happens == 1:
             tally.residual = max(tally.residual, residual_of(memory.impact.answer))
-        if left == 1 or memory.wedge.relaxed == 1:
+        if conceded == 1 or memory.wedge.relaxed == 1:
             counts.relaxed = 1
         if done + 1 == parts:
             find_slip(

@@ -14,7 +14,10 @@ from heelstrike.robot.spatial.model import BALL, HINGE, SLIDE
 from heelstrike.robot.spatial.robot import SpatialRobot
 
 POINT, STOP, BALL_STOP, DRY_JOINT, WALL = range(5)
-"""Kinds of entries; a wall is a second face that a contact point may meet."""
+"""Kinds of entries; a wall is a second or third face that a contact point may meet."""
+
+WALLS = 2
+"""How many walls a contact point may meet at once: with the face below it, those of a corner."""
 
 NEVER_TOUCHED = -2
 """The step at whose end what has not touched did so."""
@@ -28,7 +31,10 @@ class BlockTable(Bundle):
     owner: Integers = array("entries", of=int)
     """Its contact point; its joint; or its velocity, of dry friction."""
     wall: Integers = array("entries", of=int)
-    """Of a contact point the entry of its wall; −1 of all else, and where there are no walls."""
+    """Of a contact point the entry of its nearest wall; −1 of all else, and where there are no
+    walls. That of the other wall is as many entries later as there are points."""
+    face: Integers = array("entries", of=int)
+    """Which face points and walls are at, where there are walls: what is kept of them is of it."""
     side: Floats = array("entries")
     """Of a stop 1 for the lower end of the range, −1 for the upper."""
     last: Integers = array("entries", of=int)
@@ -54,11 +60,11 @@ class BlockTable(Bundle):
 
 
 def lay_out_table(robot: SpatialRobot, *, walls: bool) -> BlockTable:
-    """Return the table of a robot, with an entry for a wall at each contact point or without."""
+    """Return the table of a robot, with entries for walls at each contact point or without."""
     model = robot.model
     entries: list[tuple[int, int, float, int, int, int]] = [
         (kind, contact, 0.0, int(model.last_velocity[link]), CONE, 3)
-        for kind in ((POINT, WALL) if walls else (POINT,))
+        for kind in (POINT, *((WALL,) * WALLS if walls else ()))
         for contact, link in enumerate(model.contact_link.tolist())
     ]
     for joint, kind in enumerate(model.joint_kind.tolist()):
@@ -78,12 +84,13 @@ def lay_out_table(robot: SpatialRobot, *, walls: bool) -> BlockTable:
     kind, owner = column(0, np.int64), column(1, np.int64)
     wall = np.full(len(entries), -1)
     if walls:
-        wall[kind == POINT] = np.flatnonzero(kind == WALL)
+        wall[kind == POINT] = np.flatnonzero(kind == WALL)[: robot.nc]
     return BlockTable.allocate(
         entries=len(entries),
         kind=kind,
         owner=owner,
         wall=wall,
+        face=np.full(len(entries), -1),
         side=column(2, np.float64),
         last=column(3, np.int64),
         set=column(4, np.int64),

@@ -26,7 +26,7 @@ from heelstrike.view.spatial.forces import (
     middle_of_pressure,
     shown_forces,
 )
-from heelstrike.view.spatial.stage import BOX_CORNERS
+from heelstrike.view.spatial.stage import corners_of_boxes
 from heelstrike.view.style import in_words
 
 MOST_EDGES = 16
@@ -49,12 +49,7 @@ def scene_in_space(robot: SpatialRobot, ground: SpatialGround) -> dict[str, Any]
     model = robot.model
     foot_of = {i: index for index, foot in enumerate(robot.feet) for i in foot.contacts}
     normal = np.asarray(ground.normal, dtype=np.float64)
-    boxes = ground.model()
-    places = boxes.center[:, None] + np.einsum(
-        "bji,bkj->bki",
-        boxes.rotation.reshape(-1, 3, 3),
-        BOX_CORNERS * boxes.half[:, None],
-    )
+    places = corners_of_boxes(ground)
     return {
         "dimension": 3,
         "robot": robot.name,

@@ -43,6 +43,17 @@ BOX_SIDES = np.array(
 )
 
 
+def corners_of_boxes(ground: SpatialGround) -> Floats:
+    """Corners (boxes, 8, 3) of the boxes of a ground, as they were given (m)."""
+    axes = ground.model().rotation.reshape(-1, 3, 3)
+    center, size = (
+        np.array([getattr(box, name) for box in ground.boxes], dtype=np.float64).reshape(-1, 3)
+        for name in ("center", "size")
+    )
+    corners: Floats = center[:, None] + (0.5 * size[:, None] * BOX_CORNERS) @ axes
+    return corners
+
+
 @dataclass(frozen=True, eq=False)
 class Instant:
     """What is drawn of one instant, in world axes; NaN and empty arrays for what there is not."""
@@ -84,15 +95,7 @@ class Stage:
         self._normal = np.asarray(ground.normal, dtype=np.float64)
         self._normal = self._normal / np.linalg.norm(self._normal)
         self._height = float(ground.height)
-        model = ground.model()
-        self._boxes = (
-            model.center[:, None]
-            + np.einsum(
-                "bji,bkj->bki",
-                model.rotation.reshape(-1, 3, 3),
-                BOX_CORNERS * model.half[:, None],
-            )
-        )[:, BOX_SIDES]
+        self._boxes = corners_of_boxes(ground)[:, BOX_SIDES]
         size = self.body.size
         spread = 10.0 ** np.floor(np.log10(size))
         self._spacing = float(

@@ -1,0 +1,300 @@
+"""What holds, or is open, as in the step before: found in the velocities of the robot.
+
+Contacts and dry friction that stick make the equations (A + ε I) x = −b of
+:mod:`heelstrike.contact.spatial.sticking`. With the scaled and whitened rows Y, A = Y Yᵀ, and
+(Woodbury 1950)::
+
+    x = −(b − Y (Yᵀ Y + ε I)⁻¹ Yᵀ b) / ε
+
+The matrix in brackets has a row for each velocity, however many contacts and joints hold, and
+nothing where the mass matrix has nothing: it is factored along the tree, and no Delassus matrix is
+needed. Modes and certificate are those of the solvers, velocities to 1e-12, impulses to 1e-6 of
+their size: along what moves nothing both are only as good as rounding over ε.
+"""
+
+from __future__ import annotations
+
+import math
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.compensated import UNIT_ROUNDOFF
+from heelstrike.contact.sets import INTERVAL
+from heelstrike.contact.spatial.certificate import judge_blocks, weigh_blocks
+from heelstrike.contact.spatial.certified_solve import begin_from
+from heelstrike.contact.spatial.modes import LAST_MODES, STICK
+from heelstrike.contact.spatial.scaling import give_impulses, scale_data
+from heelstrike.contact.spatial.sticking import (
+    FIRM,
+    REFINED,
+    REFINEMENTS,
+    ROUNDS_OF_OPENING,
+    STAGNANT,
+    STUCK,
+    begin_at_bounds,
+    correct_modes,
+    list_sticking_rows,
+)
+from heelstrike.contact.spatial.workspace import (
+    BlockAnswer,
+    BlockProblem,
+    BlockTally,
+    BlockWorkspace,
+    Iterate,
+    ScaledBlocks,
+)
+from heelstrike.dynamics.spatial.equations import (
+    factorize,
+    solve_factorized,
+    solve_lower,
+    solve_upper,
+)
+from heelstrike.dynamics.spatial.rows import add_row_forces, along_rows, write_diagonal
+from heelstrike.dynamics.spatial.workspace import TreeFactor
+from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.spatial.model import SpatialModel
+from heelstrike.sim.spatial.memory import SpatialAssembly, SpatialHolding
+
+WORTHWHILE = 2
+"""How many times more entries the matrix of the rows that stick has where that of the velocities
+takes less time: steps of robots of 18 and 35 velocities that stand were timed with each
+(``python benchmarks/spatial_speed.py``)."""
+
+WELL_ROUNDED = STUCK
+"""Rounding of velocities, of data of size one, above which the solvers, which can sum up without
+any, take over."""
+
+
+@kernel
+def is_worthwhile(model: SpatialModel, size: int) -> bool:
+    """Whether so many rows that stick are solved faster in the velocities."""
+    entries = model.nv
+    for k in range(model.nv):
+        entries += model.depth[k]
+    return size * size >= WORTHWHILE * entries
+
+
+@kernel
+def rubs(problem: BlockProblem) -> bool:
+    """Whether dry friction takes part; it comes last."""
+    return problem.count > 0 and problem.set[problem.count - 1] == INTERVAL
+
+
+@kernel
+def gather_held(
+    model: SpatialModel, problem: BlockProblem, scaled: ScaledBlocks, mode: Integers,
+    last: Integers, rows: Floats, matrix: Floats,
+) -> None:  # fmt: skip
+    """Write Yᵀ Y + ε I of the blocks that stick, each row along the chain of its velocity."""
+    for k in range(model.nv):
+        for a in range(model.depth[k]):
+            matrix[k, a] = 0.0
+        matrix[k, model.depth[k]] = FIRM
+    for block in range(problem.count):
+        if mode[block] != STICK:
+            continue
+        end, r = last[block], problem.first[block]
+        square = scaled.scale[block] * scaled.scale[block]
+        if problem.first[block + 1] - r == 3:
+            for a in range(model.depth[end] + 1):
+                k = model.chain[end, a]
+                n, s, t = square * rows[r, a], square * rows[r + 1, a], square * rows[r + 2, a]
+                for b in range(a + 1):
+                    matrix[k, b] += n * rows[r, b] + s * rows[r + 1, b] + t * rows[r + 2, b]
+            continue
+        for row in range(r, problem.first[block + 1]):
+            for a in range(model.depth[end] + 1):
+                k = model.chain[end, a]
+                own = square * rows[row, a]
+                for b in range(a + 1):
+                    matrix[k, b] += own * rows[row, b]
+
+
+@kernel
+def take_along(
+    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
+    impulse: Floats, by_rows: bool, along: Floats,
+) -> None:  # fmt: skip
+    """Write Yᵀ λ of whitened rows.
+
+    That of dry friction, unless it is asked for `by_rows`, is D^(-1/2) L⁻ᵀ λ, all at once.
+    """
+    for k in range(model.nv):
+        along[k] = 0.0
+    at_once = rubs(problem) and not by_rows
+    if at_once:
+        for block in range(problem.count):
+            if problem.set[block] == INTERVAL:
+                along[last[block]] = impulse[problem.first[block]]
+        solve_upper(model, factor, along)
+        for k in range(model.nv):
+            along[k] *= factor.root[k]
+    for block in range(problem.count):
+        if problem.set[block] != INTERVAL or not at_once:
+            r = problem.first[block]
+            size = problem.first[block + 1] - r
+            some = 0.0
+            for row in range(r, r + size):
+                some = max(some, abs(impulse[row]))
+            if some > 0.0:
+                add_row_forces(model, last[block], r, size, rows, impulse, along)
+
+
+@kernel
+def change_along(model: SpatialModel, factor: TreeFactor, along: Floats, change: Floats) -> None:
+    """Write the change of the velocities L⁻¹ D^(-1/2) z."""
+    for k in range(model.nv):
+        change[k] = factor.root[k] * along[k]
+    solve_lower(model, factor, change)
+
+
+@kernel
+def give_along(
+    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
+    along: Floats, by_rows: bool, change: Floats, velocity: Floats,
+) -> None:  # fmt: skip
+    """Write Y z of whitened rows.
+
+    That of dry friction, unless it is asked for `by_rows`, is a change of velocity, kept, too.
+    """
+    at_once = rubs(problem) and not by_rows
+    if at_once:
+        change_along(model, factor, along, change)
+    for block in range(problem.count):
+        r = problem.first[block]
+        if problem.set[block] == INTERVAL and at_once:
+            velocity[r] = change[last[block]]
+        else:
+            size = problem.first[block + 1] - r
+            along_rows(model, last[block], r, size, rows, along, velocity)
+
+
+@kernel
+def hold_along(
+    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, scaled: ScaledBlocks,
+    mode: Integers, last: Integers, rows: Floats, holding: SpatialHolding, u: Floats, x: Floats,
+) -> None:  # fmt: skip
+    """Find the impulses of least norm that hold what sticks; u is scratch."""
+    gather_held(model, problem, scaled, mode, last, rows, holding.tree.matrix)
+    factorize(model, holding.tree)
+    along, weighted, weight = holding.along, holding.weighted, scaled.weight
+    before = math.inf
+    for _ in range(REFINEMENTS):
+        for row in range(problem.first[problem.count]):
+            weighted[row] = weight[row] * x[row]
+        take_along(model, factor, problem, last, rows, weighted, False, along)
+        give_along(model, factor, problem, last, rows, along, False, holding.change, u)
+        left = 0.0
+        for block in range(problem.count):
+            for row in range(problem.first[block], problem.first[block + 1]):
+                weighted[row] = 0.0
+                if mode[block] == STICK and weight[row] > 0.0:  # else nothing moves it
+                    u[row] = scaled.offset[row] + weight[row] * u[row]
+                    left = max(left, abs(u[row]))
+                    weighted[row] = weight[row] * u[row]
+        if left <= REFINED or left > STAGNANT * before:
+            return
+        is_last = before < math.inf and left * left <= STUCK * before  # as much less again
+        before = left
+        take_along(model, factor, problem, last, rows, weighted, False, along)
+        solve_factorized(model, holding.tree, along)
+        give_along(model, factor, problem, last, rows, along, False, holding.change, weighted)
+        for block in range(problem.count):
+            if mode[block] == STICK:
+                for row in range(problem.first[block], problem.first[block + 1]):
+                    if weight[row] > 0.0:
+                        x[row] -= (u[row] - weight[row] * weighted[row]) / FIRM
+        if is_last:
+            return
+
+
+@kernel
+def certify_along(
+    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
+    scaled: ScaledBlocks, holding: SpatialHolding, answer: BlockAnswer,
+) -> float:  # fmt: skip
+    """Certify impulses by the velocities that the rows give; return the residual with rounding.
+
+    Scaled rows, those of dry friction as well, have the length one at most. So, relative to the
+    data, no velocity is off by more than rounding of as many terms of the size of all scaled
+    impulses together; infinite is returned if that is more than `WELL_ROUNDED`. The change of the
+    velocities of the robot is kept.
+    """
+    count = problem.first[problem.count]
+    take_along(model, factor, problem, last, rows, answer.impulse, True, holding.along)
+    give_along(
+        model, factor, problem, last, rows, holding.along, True, holding.change, answer.velocity
+    )  # fmt: skip
+    change_along(model, factor, holding.along, holding.change)
+    size = 1.0
+    for row in range(count):
+        answer.velocity[row] += problem.free[row]
+        if scaled.weight[row] > 0.0:
+            size += abs(answer.impulse[row]) / (scaled.weight[row] * scaled.unit)
+    terms = count + 2.0 * model.longest + 2.0
+    rounding = terms * UNIT_ROUNDOFF * size
+    residual = judge_blocks(problem, rounding, scaled, answer)
+    return residual if rounding <= WELL_ROUNDED else math.inf
+
+
+@kernel
+def is_held(problem: BlockProblem, iterate: Iterate) -> bool:
+    """Whether all that sticks by its mode does so by its scaled velocity."""
+    worst = 0.0
+    for block in range(problem.count):
+        if iterate.mode[block] == STICK:
+            for row in range(problem.first[block], problem.first[block + 1]):
+                worst = max(worst, abs(iterate.u[row]))
+    return worst <= STUCK
+
+
+@kernel
+def note_shortcut(tally: BlockTally) -> None:
+    """Count a solve whose answer is that of the last modes."""
+    tally.solves += 1
+    tally.shortcuts += 1
+    tally.iterations = 1
+    tally.last_fallbacks = 0
+    tally.solver = LAST_MODES
+
+
+@kernel
+def goes_on_holding(
+    model: SpatialModel, factor: TreeFactor, assembly: SpatialAssembly, holding: SpatialHolding,
+    solver: BlockWorkspace,
+) -> bool:  # fmt: skip
+    """Solve the problem of a step if what touches goes on sticking; return if it is certified.
+
+    The answer is changed in any case. ``solver.iterate.tried`` says whether the solvers would try
+    the same in vain: what sticks was held, and impulses left their cones.
+    """
+    problem, answer, last, rows = assembly.problem, assembly.answer, assembly.last, assembly.rows
+    scaled, iterate, newton = solver.scaled, solver.iterate, solver.newton
+    iterate.tried = 0
+    for block in range(problem.count):
+        iterate.mode[block] = answer.mode[block]
+        scaled.scale[block] = 1.0  # not known yet; what nothing moves counts as well
+    if not is_worthwhile(model, max(list_sticking_rows(problem, scaled, iterate.mode, newton), 0)):
+        return False
+    write_diagonal(model, problem.count, problem.first, last, rows, problem.delassus)
+    weigh_blocks(problem, solver.settings, scaled)
+    scale_data(problem, scaled)
+    begin_from(problem, scaled, answer, iterate)
+    for _ in range(ROUNDS_OF_OPENING):
+        if list_sticking_rows(problem, scaled, iterate.mode, newton) < 0:
+            return False
+        begin_at_bounds(problem, scaled, iterate)
+        hold_along(
+            model, factor, problem, scaled, iterate.mode, last, rows, holding, iterate.u, iterate.x
+        )  # fmt: skip
+        give_impulses(problem, scaled, iterate.x, answer)
+        residual = certify_along(model, factor, problem, last, rows, scaled, holding, answer)
+        if answer.residual <= STUCK and residual <= solver.settings.tolerance:
+            note_shortcut(solver.tally)
+            iterate.tried = 0
+            return True
+        for row in range(problem.first[problem.count]):
+            iterate.u[row] = answer.velocity[row] * scaled.weight[row] / scaled.unit
+        iterate.tried = int(is_held(problem, iterate) and residual < math.inf)
+        if correct_modes(problem, scaled, iterate) == 0:
+            return False
+    return False
