@@ -55,7 +55,9 @@ def test_the_neighbour_of_a_gait_keeps_its_profile() -> None:
     robot, step = hs.load_robot("rabbit"), STEPS["rabbit"]
     flat = hs.optimize_gait(robot, **step, starts=1, clearance_profile="smooth")
     asked = step | {"step_length": 1.04 * step["step_length"]}
-    assert request_of(robot, **asked, warm_start=flat).profiles == (hs.gait.ClearanceProfile.SMOOTH,)
+    assert request_of(robot, **asked, warm_start=flat).profiles == (
+        hs.gait.ClearanceProfile.SMOOTH,
+    )
     assert len(request_of(robot, **asked).profiles) == 2
     found = hs.optimize_gait(robot, **asked, starts=1, warm_start=flat)
     assert found.clearance_profile is hs.gait.ClearanceProfile.SMOOTH
