@@ -8,10 +8,12 @@ M. P. Kelly, TwoPhaseOptimalGait (2016): a hip and two feet, point masses, at th
 legs that grow and shrink, with a force along each leg up to four times the weight, a torque at the
 hip up to half of weight times leg, and one at the ankle of the foot that stands; friction 0.8. What
 is least is the cost of transport ∫Σ|power| dt / (weight · step). His limits on how fast forces
-change are left out. Speed and step are given here, from within his bounds.
+change, legs turn and feet move are left out, and a foot that leaves the ground may be pressed on it
+until then: `printed_limits.py` tells which of them a run breaks. Speed and step are given here.
 
-His runs: 7.2 and 0.4 kg, legs of 0.6 to 1 m. Ours have no torque at the ankle: but for the limits
-left out, each of them is a gait of his problem.
+His runs: 7.2 and 0.4 kg, legs of 0.6 to 1 m, with the steps and speeds that came out of his
+problem; the second is stored with other limits, a force of five weights and a hip's torque of
+weight times leg. Ours have no torque at the ankle, and keep to the limits of the first.
 
 His walk: 6.8 and 0.6 kg, legs of 0.7 to 0.9 m, ankle torque up to 0.2 weight times leg, a step of
 0.05 m at 0.1 m/s, its shortest and slowest, on both feet for 0.05 s, his shortest. The foot in the
@@ -61,20 +63,26 @@ class Biped:
     """shortest, longest: Of the legs (m)."""
     ankle: float = 0.0
     """Largest torque at an ankle, in units of weight times leg."""
+    push: float = 4.0
+    """Largest force along a leg, in units of weight."""
+    turn: float = 0.5
+    """Largest torque at a hip, in units of weight times leg."""
+    inertia: float = INERTIA
+    """Of the trunk (kg m²)."""
 
     def robot(self) -> hs.Robot:
         """Return the robot."""
         build, longest = hs.RobotBuilder("telescoping", gravity=GRAVITY), self.longest
-        trunk = build.floating_base("hip", (0.0, longest), mass=self.hip, inertia=INERTIA)
+        trunk = build.floating_base("hip", (0.0, longest), mass=self.hip, inertia=self.inertia)
         for side in ("right", "left"):
             hip = build.hinge(
                 f"{side}_hip", trunk, limits=(-0.5 * np.pi, 0.5 * np.pi),
-                torque=0.5 * WEIGHT * longest,
+                torque=self.turn * WEIGHT * longest,
             )  # fmt: skip
             leg = build.slide(
                 f"{side}_leg", hip, direction=(0.0, -1.0), mass=self.foot,
                 center_of_mass=(0.0, -longest), limits=(self.shortest - longest, 0.0),
-                torque=4.0 * WEIGHT, link=f"{side}_shank" if self.ankle else f"{side}_foot",
+                torque=self.push * WEIGHT, link=f"{side}_shank" if self.ankle else f"{side}_foot",
             )  # fmt: skip
             if not self.ankle:
                 build.contact(leg, (0.0, -longest))
@@ -124,7 +132,7 @@ WALK = (
 )
 PRINTED = {
     "run": Printed(
-        0.338762, 114.0, RUNNER, RUN, {"distance": 0.5, "speed": 1.6, "clearance": 0.02}
+        0.338762, 114.0, RUNNER, RUN, {"distance": 0.66523, "speed": 1.542, "clearance": 0.02}
     ),
     "run, the other": Printed(
         0.285669, 255.0, RUNNER, RUN, {"distance": 0.5605, "speed": 1.6024, "clearance": 0.02}

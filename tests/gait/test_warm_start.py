@@ -7,6 +7,7 @@ import pytest
 import heelstrike as hs
 from heelstrike.errors import GaitError
 from heelstrike.gait import design
+from heelstrike.gait.optimize import request_of
 from heelstrike.gait.program import Program, first_instants
 from heelstrike.gait.request import Request
 from heelstrike.gait.transcription import transcribed
@@ -47,6 +48,19 @@ def test_a_gait_is_resampled_as_it_is(name: str) -> None:
     unknowns = program.resampled(gait)
     assert abs(program.violations(unknowns)).max() < 1e-6
     assert program.effort(unknowns) == pytest.approx(gait.cost, rel=1e-9)
+
+
+def test_the_neighbour_of_a_gait_keeps_its_profile() -> None:
+    """Without it, the parabola that led nowhere for the known gait is tried again."""
+    robot, step = hs.load_robot("rabbit"), STEPS["rabbit"]
+    flat = hs.optimize_gait(robot, **step, starts=1, clearance_profile="smooth")
+    asked = step | {"step_length": 1.04 * step["step_length"]}
+    assert request_of(robot, **asked, warm_start=flat).profiles == (
+        hs.gait.ClearanceProfile.SMOOTH,
+    )
+    assert len(request_of(robot, **asked).profiles) == 2
+    found = hs.optimize_gait(robot, **asked, starts=1, warm_start=flat)
+    assert found.clearance_profile is hs.gait.ClearanceProfile.SMOOTH
 
 
 def test_another_robots_gait_is_refused(bravo7: hs.Robot) -> None:

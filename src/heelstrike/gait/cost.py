@@ -56,16 +56,17 @@ class Instant:
     """(nc, 2) Places of all contact points of a motion, along the ground and away from it, in m;
     None in gaits of one step."""
     point_force: Any = None
-    """(nc, 2) Forces of the ground on all contact points of a motion, along the ground and away
-    from it, in N; None in gaits of one step."""
+    """(nc, 2) Forces of the ground on all contact points of a motion, normal and tangential, as
+    `Motion.forces` has them, in N; None in gaits of one step."""
     stands: Any = None
     """(nc,) 1 for each contact point that stands in a phase of a motion, 0 for the others; None in
     gaits of one step."""
     share: Any = None
     """Share of its phase of a motion that has gone by, from 0 to 1; None in gaits of one step."""
     torque_rate: Any = None
-    """(nu,) Rates at which the torques of the motors change in a motion (N m/s); None in gaits of
-    one step. If a cost or a constraint depends on them, torques jump only where phases join."""
+    """(nu,) Rates at which the torques of the motors change in a motion (N m/s; N/s of slides);
+    None in gaits of one step. If a cost or a constraint depends on them, torques jump only where
+    phases join."""
 
 
 OwnCost = Callable[[Instant], Any]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 import casadi
@@ -119,10 +120,17 @@ def own_expression(what: str, function: Callable[[Instant], Any], now: Instant) 
     GaitError
         If it fails, or uses symbols of its own.
     """
+    absent = [each.name for each in fields(now) if getattr(now, each.name) is None]
     try:
         found = casadi.SX(function(now))
     except Exception as error:
-        raise GaitError(f"the {what} function failed: {type(error).__name__}: {error}") from error
+        said = f"the {what} function failed: {type(error).__name__}: {error}"
+        if absent and "None" in str(error):
+            said += (
+                f". Only instants of motions (optimize_motion) have {', '.join(absent)}; in gaits "
+                "of one step these are None."
+            )
+        raise GaitError(said) from error
     known = casadi.vertcat(now.position, now.velocity, now.torque, now.force)
     for each in (now.acceleration, now.time, now.stands, now.share, now.torque_rate):
         if each is not None:

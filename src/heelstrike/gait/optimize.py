@@ -82,8 +82,9 @@ def optimize_gait(
     clearance : float
         Greatest height (m) of the profile above which all contact points of the swing foot stay.
     clearance_profile : ClearanceProfile or its name, optional
-        Shape of that profile. By default a parabola, or, where no gait keeps above that and for
-        gaits without impact, a hump that is flat at both ends; the gait says which.
+        Shape of that profile. By default a parabola, or, where no gait keeps above that, for
+        gaits without impact and from a gait that has it, a hump that is flat at both ends; the gait
+        says which.
     zmp_margin : float, optional
         Distance (m) of the zero moment point, and of the centre of the landing impulse, from the
         ends of the sole. A tenth of the sole's length by default.

@@ -111,7 +111,7 @@ class Request:
         self.stance, self.swing = sole(robot, STANCE_FOOT), sole(robot, 1 - STANCE_FOOT)
         self.height = standing_height(robot, self.stance)
         self.reach = reach(robot, (self.stance, self.swing), self.lower, self.upper)
-        self.profiles = _profiles(self.clearance_profile, self.impact)
+        self.profiles = _profiles(self.clearance_profile, self.impact, self.warm_start)
         flat = self.stance.flat
         if not flat and self.zmp_margin is not None:
             raise GaitError(
@@ -259,10 +259,13 @@ class Request:
         return ", ".join([*asked, f"friction = {self.friction:g}"])
 
 
-def _profiles(profile: ClearanceProfile | str | None, impact: bool) -> tuple[ClearanceProfile, ...]:
+def _profiles(
+    profile: ClearanceProfile | str | None, impact: bool, start: Gait | None
+) -> tuple[ClearanceProfile, ...]:
     if profile is None:
         both = (ClearanceProfile.PARABOLA, ClearanceProfile.SMOOTH)
-        return both if impact else both[1:]
+        flat = start is not None and start.clearance_profile is ClearanceProfile.SMOOTH
+        return both if impact and not flat else both[1:]
     try:
         return (ClearanceProfile(profile),)
     except ValueError:

@@ -29,6 +29,8 @@ SWEEPS = 60
 START_DAMPING = 1e-4
 MET = 1e-9
 """Distance (m, rad) within which a place counts as reached."""
+OUT_OF_REACH = 1e-4
+"""Distance (m, rad) beyond which it cannot be reached: damping leaves less, stops leave more."""
 WEIGHT_OF_TRUNK = 0.1
 """Weight of the trunk's place next to those of the feet, where both cannot be reached."""
 
@@ -143,7 +145,7 @@ class _Kinematics:
         closed = [0.0] * count_rows(self._request.robot.model)
         target = np.array([0.0, 0.0, *level, *swing, *level, *trunk, *closed])
         q, missing = self._nearest(self._bent(bend), target, np.ones(target.size))
-        if np.abs(missing).max() < MET:
+        if np.abs(missing).max() < OUT_OF_REACH:
             return q
         # Feet in their places are worth more than the trunk's: it may have to lean where hips
         # cannot bend backwards.
@@ -171,7 +173,7 @@ class _Kinematics:
                     break
                 free &= ~held
             q = self._in_range(q + step / max(1.0, np.abs(step).max() / BENT))
-        return q, missing
+        return q, target - np.array(self._places(q)[0]).ravel()
 
     def _bent(self, bend: float) -> Floats:
         """Reference configuration with the joints inside the legs bent, in range."""

@@ -25,7 +25,7 @@ from heelstrike.gait.cost_rate import (
     smooth_rate_of,
 )
 from heelstrike.gait.motion.rows import Kind
-from heelstrike.gait.rows import Limit, Rows, joint_limits
+from heelstrike.gait.rows import Limit, Row, Rows, joint_limits
 from heelstrike.robot.loops import row_names
 from heelstrike.robot.robot import Robot
 
@@ -63,6 +63,8 @@ class MotionFunctions:
         What its constraints mean.
     rated : bool
         Whether the cost or a constraint of one's own depends on the rates of torques.
+    jumps : (rows,) array of bool
+        Which of its constraints do, so that they jump where pieces join.
     joining : Block or None
         If so, of the variables of the path at the end of a piece and then at the beginning of the
         next. The constraints are equations: the torques are the same.
@@ -160,14 +162,11 @@ class MotionFunctions:
             acceleration=expression(a),
             time=time,
             points=casadi.horzcat(expression(centers @ self.along), expression(heights)),
-            point_force=casadi.horzcat(expression(pushes[1::2]), expression(pushes[0::2])),
+            point_force=casadi.horzcat(expression(pushes[0::2]), expression(pushes[1::2])),
             stands=stands,
             share=share,
-            torque_rate=casadi.jtimes(
-                expression(torque), casadi.vertcat(q, first, second, force),
-                casadi.vertcat(first, second, third, force_rate),
-            ) / duration,
-        )  # fmt: skip
+            torque_rate=casadi.SX.sym("torque_rate", robot.nu),
+        )
         if self.constraint is not None:
             own = own_expression("constraint", self.constraint, now)
             for k, value in enumerate(casadi.vertsplit(casadi.vec(own)), start=1):
@@ -177,12 +176,19 @@ class MotionFunctions:
         parameters = casadi.vertcat(self.slope, self.friction)
         cost = by * smooth_rate_of(self.cost, now)
         limits = casadi.vertcat(*rows.expressions)
-        self.rated = bool(
-            casadi.depends_on(casadi.vertcat(cost, limits), casadi.vertcat(third, force_rate))
-        )
+        self.jumps = np.array(casadi.which_depends(limits, now.torque_rate, 1, True))
+        self.rated = bool(self.jumps.any() or casadi.depends_on(cost, now.torque_rate))
         y = casadi.vertcat(*(parts if self.rated else parts[:-2]))
+        self.joining: Block | None = None
+        self.joining_rows: list[Row] = []
+        if self.rated:
+            changed = casadi.jtimes(
+                now.torque, casadi.vertcat(q, first, second, force),
+                casadi.vertcat(first, second, third, force_rate),
+            ) / duration  # fmt: skip
+            cost, limits = casadi.substitute([cost, limits], [now.torque_rate], [changed])
+            self._build_joining(y, parameters, now.torque)
         self.path = Block("path", y, parameters, cost, limits)
-        self._build_joining(y, parameters, now.torque)
         self._build_spending(y, parameters, by, now)
         effort = duration * casadi.sumsqr(now.torque)
         self.effort = casadi.Function("effort", [y, parameters], [effort])
@@ -196,10 +202,9 @@ class MotionFunctions:
         for i, j in enumerate(robot.model.actuator_joint.tolist()):
             unit = robot.weight * (self.length if robot.model.axis[j, 0] else 1.0)
             rows.add(Kind.JOIN, jump[i], subject=robot.joint_names[j], upper=0.0, unit=unit)
-        self.joining, self.joining_rows = None, rows.rows
-        if self.rated:
-            given, jumps = casadi.vertcat(before, after), casadi.vertcat(*rows.expressions)
-            self.joining = Block("joining", given, parameters, casadi.SX(0), jumps)
+        given, jumps = casadi.vertcat(before, after), casadi.vertcat(*rows.expressions)
+        self.joining = Block("joining", given, parameters, casadi.SX(0), jumps)
+        self.joining_rows = rows.rows
 
     def _build_spending(self, y: Any, parameters: Any, by: Any, now: Instant) -> None:
         """Bound what motors spend; `by` is what a rate counts."""

@@ -199,9 +199,10 @@ def optimize_motion(
         robot, request.cost, per_metre=free and request.repeat is not Repeat.NEVER,
         constraint=constraint,
     )  # fmt: skip
-    program = MotionProgram(
-        request, functions, tuple(looked_at(phase.pieces) for phase in request.phases)
+    grids = tuple(
+        looked_at(phase.pieces, jumps=bool(functions.jumps.any())) for phase in request.phases
     )
+    program = MotionProgram(request, functions, grids)
     report(0.1)
     found = _solved_to_corners(program, warm_start, starts, report)
     if refine:
@@ -545,39 +546,44 @@ def _refined(found: _Found) -> _Found:
     while True:
         program, unknowns = found.program, found.unknowns
         before = [phase.pieces for phase in program.request.phases]
+        most = [max(1, MOST_PIECES // own) for own in before]
         slips = np.array([_slip(program, unknowns, p) for p in range(len(before))])
         moves = slips > STILL
-        if not any(m and own < MOST_PIECES for m, own in zip(moves, before, strict=True)):
+        if not any(m and times > 1 for m, times in zip(moves, most, strict=True)):
             return found
         motion = motion_of(program, program.polished(unknowns), found.optimal)
         missed = Follower(program.request.robot, motion).missed_by_phases()
         far = np.isfinite(missed) & (missed > CLOSED * HALVING)
         far |= slips > STILL * HALVING_SLIP
-        for more in (4, 2) if np.any(far & moves) else (2,):
-            times = [(more if off else 2) if m else 1 for m, off in zip(moves, far, strict=True)]
-            pieces = [
-                max(own, min(by * own, MOST_PIECES)) for own, by in zip(before, times, strict=True)
-            ]
+        tried = [
+            tuple(
+                own * min(limit, (more if off else 2) if m else 1)
+                for own, limit, m, off in zip(before, most, moves, far, strict=True)
+            )
+            for more in (4, 2)
+        ]
+        for pieces in dict.fromkeys(tried):
             finer = _with_pieces(program, pieces)
             start = finer.polished(_resampled(program, unknowns, finer))
             try:
                 found = _again(_with_failing(finer, start) or finer, start, None)
                 break
             except GaitNotFoundError:
-                if more == 2:
+                if pieces == tried[-1]:
                     raise
 
 
-def _with_pieces(program: MotionProgram, pieces: list[int]) -> MotionProgram:
+def _with_pieces(program: MotionProgram, pieces: Sequence[int]) -> MotionProgram:
     """Return the program with so many pieces, a phase each, for a start that is nearly there."""
     request = program.request
     phases = tuple(
         ContactPhase(*phase.contacts, duration=phase.duration, pieces=count)
         for phase, count in zip(request.phases, pieces, strict=True)
     )
+    jumps = bool(program.functions.jumps.any())
     return replace(
         program, request=replace(request, phases=phases),
-        grids=tuple(map(looked_at, pieces)), near=CLOSE,
+        grids=tuple(looked_at(count, jumps=jumps) for count in pieces), near=CLOSE,
     )  # fmt: skip
 
 
@@ -736,7 +742,8 @@ MOST_HALVED = 192
 STILL = 3e-4
 """Velocity (m/s) that a point that stands may have between the ends of pieces."""
 MOST_PIECES = 48
-"""Pieces of a phase beyond which the mesh is not refined."""
+"""Pieces of a phase beyond which the mesh is not refined: pieces are divided into equally many, so
+that what finer ones begin from is the same motion."""
 
 
 def _fine(pieces: int, times: int = 1) -> Instants:
@@ -811,6 +818,9 @@ def _failing(program: MotionProgram, unknowns: Floats, p: int) -> Instants:
     at = np.clip([worst, worst - beside, worst + beside], 0, count - 1)
     at += count * np.arange(fine.pieces)
     bad = np.union1d(at[0, fails], at[1:, fails & ~own[:, None]])
+    grid = program.grids[p]
+    there = set(zip(grid.piece.tolist(), grid.share.tolist(), strict=True))
+    bad = np.array([i for i in bad if (int(fine.piece[i]), float(fine.share[i])) not in there], int)
     return Instants(fine.pieces, fine.piece[bad], fine.share[bad], np.zeros(bad.size))
 
 

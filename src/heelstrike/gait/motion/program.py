@@ -156,9 +156,13 @@ def gauss_points(pieces: int, stages: int = STAGES) -> Instants:
     )  # fmt: skip
 
 
-def looked_at(pieces: int) -> Instants:
-    """Gauss points of all pieces of a phase, where the pieces end, and where the first begins."""
-    begin = Instants(pieces, np.zeros(1, np.int64), np.zeros(1), np.zeros(1))
+def looked_at(pieces: int, *, jumps: bool = False) -> Instants:
+    """Gauss points of all pieces of a phase, where the pieces end, and where the first begins.
+
+    And where all the others begin, if there a constraint jumps.
+    """
+    begun = np.arange(pieces if jumps else 1)
+    begin = Instants(pieces, begun, np.zeros(begun.size), np.zeros(begun.size))
     return gauss_points(pieces).joined(endings(pieces)).joined(begin)
 
 
@@ -431,7 +435,9 @@ class MotionProgram:
         free = np.full(count, True)  # whether the end of the piece is not given
         if request.end is not None and p + 1 == len(request.phases):
             free = grid.piece < grid.pieces - 1
-        for k, row in enumerate(rows):
+        # Only what jumps where pieces join is looked at again where the next one begins.
+        again = (grid.share == 0.0) & (grid.piece > 0)
+        for k, (row, jumps) in enumerate(zip(rows, self.functions.jumps, strict=True)):
             used: Any = True
             # A point that stands has no acceleration. Where a piece ends it is on the ground and at
             # rest, in the place of two of four accelerations: nothing drifts. A given state at the
@@ -460,7 +466,7 @@ class MotionProgram:
                 lower[k] = request.force_margin_of(p, row.of[0]) / request.robot.weight
             elif row.kind in {Kind.RANGE, Kind.OWN}:
                 begins = (grid.piece == 0) & (grid.share == 0.0) & (p == 0)
-                used = ~(ends & ~free) & ~(begins & (request.start is not None))
+                used = ~(ends & ~free) & ~(begins & (request.start is not None)) | jumps
             elif row.kind is Kind.FRICTION:
                 used = not stands.points.isdisjoint(row.of)
             elif row.kind is Kind.HEIGHT:
@@ -475,6 +481,7 @@ class MotionProgram:
                     kept = 0.0
                 span = np.minimum(kept, 0.5 * (upper[k] - lower[k]))
                 lower[k], upper[k] = lower[k] + span, upper[k] - span
+            used = used & (jumps | ~again)
             lower[k] = np.where(used, lower[k], -np.inf)
             upper[k] = np.where(used, upper[k], np.inf)
         return lower, upper
