@@ -242,7 +242,7 @@ def test_a_few_scenes_have_no_objection(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [11, 110, 251, 331, 346, 471, 581, 730, 918])
+@pytest.mark.parametrize("seed", [11, 110, 251, 331, 346, 353, 369, 471, 547, 581, 730, 918])
 def test_scenes_that_had_objections_have_none(seed: int) -> None:
     """Corners of three faces, points under a box, wedges, impacts without an answer."""
     result = run_space_scene("impact_resolved", seed)

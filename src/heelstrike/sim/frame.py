@@ -284,7 +284,7 @@ PLAIN: Fixed = (
     ("segments", 1), ("concave", 0), ("curved", 0), ("constraints", 0), ("ties", 0), ("axes", 2),
     ("components", 2),
 )  # fmt: skip
-"""What a robot and a ground without rarer features have none of.
+"""What a robot and a ground without rarer features have none of, and what is so in the plane.
 
 A loop that is made for these has no code for closed loops, latches, brakes, dry friction,
 constraints from outside, profiles or curves.
@@ -298,24 +298,25 @@ Most loops of a step are as short as these: where they end costs as much as what
 """
 
 
-def fixed_for(robot: AnyRobot, ground: Any, work: Any, way: Method) -> Fixed:
+def fixed_for(robot: AnyRobot, ground: Any, work: Any, method: Method) -> Fixed:
     """Return what the loop of a simulation can take for granted: all that is rare, or nothing.
 
-    So a method has two loops, and a third where it names the usual extents of robots; `way` is the
-    method. Each is compiled when it is first needed. In space there is one.
+    So a method has two loops, and a third where it names the usual extents of robots. Each is
+    compiled when it is first needed. In space there is one.
     """
-    plain = PLAIN + tuple(way.usual_numbers.items())
+    plain = PLAIN + tuple(method.usual_numbers.items())
     if not (dimension_of(robot).is_plain(robot, ground) and agrees(work, plain)):
         return ()
-    extents, seven = robot.model.extents, plain + tuple(way.usual_extents.items())
-    usual = all(extents[name] == size for name, size in way.usual_extents.items())
+    extents, seven = robot.model.extents, plain + tuple(method.usual_extents.items())
+    usual = all(extents[name] == size for name, size in method.usual_extents.items())
     return seven if usual and agrees(work, seven) else plain
 
 
 def agrees(bundle: Any, fixed: Fixed) -> bool:
     """Whether a bundle and its parts have what is taken for granted of extents and numbers.
 
-    Those of the package have. A method from outside may use the same names for something else.
+    In the package a name means the same everywhere. A method from outside may give it to something
+    else.
     """
     known, extents = dict(fixed), bundle.extents
     if any(size != known.get(name, size) for name, size in extents.items()):

@@ -1,6 +1,6 @@
 """Ground in space: a plane of any slope, and boxes on it that stand still.
 
-Contact points meet the nearest face of all of them, and one wall beside it. Only points of the
+Contact points meet the nearest face of all of them, and two walls beside it. Only points of the
 robot are looked at: edges of a box do not meet edges of the robot.
 """
 
@@ -54,7 +54,7 @@ class SpatialGroundModel(Bundle):
     rotation: Floats = array("boxes", 9)
     """Its axes in the world, row by row."""
     half: Floats = array("boxes", 3)
-    """Half its lengths along them (m)."""
+    """Half its lengths along them (m), lengthened likewise."""
     exposed: Floats = array("boxes", 6)
     """1 of what can be touched of their faces, 0 of what lies wholly on the plane or within another
     box: those at the upper end of each axis, then at the lower ends."""

@@ -252,8 +252,9 @@ def goes_on_holding(
 ) -> bool:  # fmt: skip
     """Solve the problem of a step if what touches goes on sticking; return if it is certified.
 
-    The answer is changed in any case. Where it is not certified the solvers try the same again:
-    their answer, which is none either, is where Newton's method begins well.
+    The answer is changed in any case. Where it is not certified, the caller restores the modes and
+    impulses of the last step. The solvers then try the same again, since Newton's method begins
+    well where that ends.
     """
     problem, answer, last, rows = assembly.problem, assembly.answer, assembly.last, assembly.rows
     scaled, iterate, newton = solver.scaled, solver.iterate, solver.newton

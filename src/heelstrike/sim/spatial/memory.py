@@ -55,8 +55,8 @@ class SpatialTally(CommonTally):
     halved: int = cell(int)
     relaxed: int = cell(int)
     """uncertified, halved, relaxed: Steps that went on with a residual above the tolerance; that
-    were halved; that were not asked to leave the ground, or whose impact did not bounce or was left
-    to the next."""
+    were halved; that were not asked to leave the ground or to come down to it, or whose impact did
+    not bounce or was left to the next."""
     energy_gain: float = cell(float)
     """Kinetic energy that restitution made (J)."""
 
@@ -135,7 +135,7 @@ class SpatialHolding(Bundle):
 
 
 class SpatialWedge(Bundle):
-    """Which steps were not asked to come out of the ground."""
+    """Which steps were not asked to come out of the ground, or down to it."""
 
     relaxed: int = cell(int)
     wedged: int = cell(int)

@@ -264,7 +264,7 @@ class Space(Dimension):
 
 
 def has_walls(ground: SpatialGround) -> bool:
-    """Whether contact points may meet a second face of a ground."""
+    """Whether contact points may meet other faces of a ground than the one below them."""
     return len(ground.boxes) > 0
 
 

@@ -201,7 +201,7 @@ def certificates_in_space(run: SpatialRun) -> dict[str, str]:
         "residual of the contact problems": f"{worst.residual:.3g} of the data",
         "steps not certified to 1e-9": str(worst.uncertified),
         "steps taken in parts": str(worst.halved),
-        "steps with a wedged point left in place, or an impact without bounce": str(worst.relaxed),
+        "steps with points left in place, or an impact not taken whole": str(worst.relaxed),
         "contact problems": f"{solver.solves}, {solver.shortcuts} by known modes, "
         f"{solver.fallbacks} by another way, {solver.failures} failed",
     }
