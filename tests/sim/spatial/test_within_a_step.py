@@ -165,7 +165,10 @@ def test_the_table_has_what_may_hold_the_robot(made: Maker) -> None:
         assert np.all(np.isinf(table.gap))
         assert np.all(table.touching == NEVER_TOUCHED)
         assert table.wall[:nc].tolist() == ([*range(nc, 2 * nc)] if walls else [-1] * nc)
-        assert np.all(table.wall[nc:] == -1)
+        assert table.wall[nc : 2 * nc].tolist() == (
+            [*range(2 * nc, 3 * nc)] if walls else [-1] * len(table.wall[nc : 2 * nc])
+        )
+        assert np.all(table.wall[2 * nc :] == -1)
         assert table.last[-1] == first[shoulder]
         assert table.last[-2] == first[neck] + 2
 

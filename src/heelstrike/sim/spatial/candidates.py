@@ -195,7 +195,8 @@ def locate_points(
             normals[contact, k] = normal[k]
         if table.wall[contact] >= 0:
             entry = table.wall[contact]
-            slots = contact, entry, entry + model.nc
+            second = table.wall[entry]
+            slots = contact, entry, second
             if (wall >= 0 and wall == table.face[slots[2]]) or (
                 other >= 0 and other == table.face[slots[1]]
             ):
@@ -207,7 +208,7 @@ def locate_points(
                     go_on_at(slots[i], faces[i], way, slots, feet, table)
             keep_faces(slots, faces, table)
             locate_wall(model, ground, tree, contact, wall, entry, table, feet)
-            locate_wall(model, ground, tree, contact, other, entry + model.nc, table, feet)
+            locate_wall(model, ground, tree, contact, other, second, table, feet)
         keep_foot(contact, point, gap, normal, feet)
         gaps[contact] = gap
         table.gap[contact] = gap

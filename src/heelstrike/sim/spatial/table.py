@@ -31,8 +31,8 @@ class BlockTable(Bundle):
     owner: Integers = array("entries", of=int)
     """Its contact point; its joint; or its velocity, of dry friction."""
     wall: Integers = array("entries", of=int)
-    """Of a contact point the entry of its nearest wall; −1 of all else, and where there are no
-    walls. That of the other wall is as many entries later as there are points."""
+    """Of a contact point the entry of its first wall, of that the entry of the second; −1 of all
+    else, and where there are no walls."""
     face: Integers = array("entries", of=int)
     """Which face points and walls are at, where there are walls: what is kept of them is of it."""
     side: Floats = array("entries")
@@ -84,7 +84,8 @@ def lay_out_table(robot: SpatialRobot, *, walls: bool) -> BlockTable:
     kind, owner = column(0, np.int64), column(1, np.int64)
     wall = np.full(len(entries), -1)
     if walls:
-        wall[kind == POINT] = np.flatnonzero(kind == WALL)[: robot.nc]
+        first, second = np.split(np.flatnonzero(kind == WALL), WALLS)
+        wall[kind == POINT], wall[first] = first, second
     return BlockTable.allocate(
         entries=len(entries),
         kind=kind,
