@@ -111,9 +111,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("coarse")
-@pytest.mark.parametrize(
-    "why", ["at the limit of pieces", "no motion on more pieces", "no optimum on more pieces"]
-)
+@pytest.mark.parametrize("why", ["at the limit of pieces", "no motion on more pieces"])
 def test_one_that_does_not_close_is_told(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its closes_to is by how much it misses, and it is the last one that was found."""
 
@@ -123,17 +121,9 @@ def test_one_that_does_not_close_is_told(why: str, monkeypatch: pytest.MonkeyPat
         failed.append(True)
         raise hs.GaitNotFoundError("no such motion")
 
-    def only_on_two(program: MotionProgram, *more: Any) -> Any:
-        coarse = all(phase.pieces == 2 for phase in program.request.phases)
-        return again(program, *more) if coarse else fails()
-
-    again = optimize._again
     if why == "at the limit of pieces":
         monkeypatch.setattr(optimize, "MOST_HALVED", 2)
-    elif why == "no optimum on more pieces":
-        monkeypatch.setattr(optimize, "_again", only_on_two)
     else:
-        monkeypatch.setattr(optimize, "_fine_enough", lambda found, _: found)
         monkeypatch.setattr(optimize, "_on_halves", fails)
     rabbit = hs.load_robot("rabbit")
     with pytest.warns(hs.GaitWarning, match="misses the state in which it goes on"):
@@ -141,24 +131,7 @@ def test_one_that_does_not_close_is_told(why: str, monkeypatch: pytest.MonkeyPat
     assert pieces_of(motion) == [2, 2]
     assert CLOSED < motion.closes_to < SKETCHY
     assert motion.closes_to == pytest.approx(Follower(rabbit, motion).missed(), rel=1e-6)
-    # The third fails before limits between instants are held, and then again.
-    assert len(failed) == ["at the", "no motion", "no optimum"].index(" ".join(why.split()[:2]))
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("coarse")
-def test_limits_are_held_between_instants_once_there_are_pieces_enough(monkeypatch: Any) -> None:
-    """On twice the pieces rabbit's run is another optimum, with other limits to hold."""
-    held, hold = list[list[int]](), optimize._held_between
-
-    def recorded(found: Any) -> Any:
-        held.append([phase.pieces for phase in found.program.request.phases])
-        return hold(found)
-
-    monkeypatch.setattr(optimize, "_held_between", recorded)
-    motion = hs.optimize_motion(hs.load_robot("rabbit"), run(2), speed=2.0, starts=1)
-    assert min(held[0]) > 2
-    assert motion.closes_to < CLOSED
+    assert len(failed) == (why != "at the limit of pieces")
 
 
 @pytest.mark.usefixtures("coarse")
@@ -185,31 +158,6 @@ def test_instants_are_added_once() -> None:
     for grid in (again or finer).grids:
         instants = list(zip(grid.piece.tolist(), grid.share.tolist(), strict=True))
         assert len(instants) == len(set(instants))
-
-
-@pytest.mark.parametrize(("pieces", "tried"), [(4, [16, 8]), (20, [40]), (30, [])])
-def test_pieces_are_divided_equally(pieces: int, tried: list[int], monkeypatch: Any) -> None:
-    """At most into 48, and what led nowhere is not tried again."""
-    found = list[int]()
-
-    def again(program: MotionProgram, *_: Any) -> None:
-        found.extend(phase.pieces for phase in program.request.phases)
-        raise hs.GaitNotFoundError("no such motion")
-
-    program = program_of(
-        hs.load_robot("rabbit"), [hs.ContactPhase("right_tibia", duration=0.5, pieces=pieces)]
-    )
-    start = optimize._Found(program, guess_of(program, lean=0.0, lowered=0.95), None, True)
-    monkeypatch.setattr(optimize, "_again", again)
-    monkeypatch.setattr(optimize, "_slip", lambda *_: 1.0)
-    monkeypatch.setattr(Follower, "missed_by_phases", lambda _: np.ones(1))
-    monkeypatch.setattr(MotionProgram, "polished", lambda _, unknowns: unknowns)
-    if tried:
-        with pytest.raises(hs.GaitNotFoundError):
-            optimize._refined(start)
-    else:
-        assert optimize._refined(start) is start
-    assert found == tried
 
 
 def test_each_phase_has_a_limit_of_pieces_of_its_own(monkeypatch: Any) -> None:

@@ -206,7 +206,7 @@ def optimize_motion(
     report(0.1)
     found = _solved_to_corners(program, warm_start, starts, report)
     if refine:
-        found = _fine_enough(_refined(found), report)
+        found = _refined(found)
         report(0.9)
         found = _held_between(found)
     motion = motion_of(found.program, found.program.polished(found.unknowns), found.optimal)
@@ -538,39 +538,18 @@ def _again(program: MotionProgram, start: Floats, multipliers: Floats | None) ->
 
 
 def _refined(found: _Found) -> _Found:
-    """Halve the pieces of phases in which points that stand move between the ends of pieces.
-
-    They are halved twice at once if, by how much these move, or the motion misses, it would have to
-    be done again.
-    """
+    """Double the pieces of phases in which points that stand move between the ends of pieces."""
     while True:
         program, unknowns = found.program, found.unknowns
-        before = [phase.pieces for phase in program.request.phases]
-        most = [max(1, MOST_PIECES // own) for own in before]
-        slips = np.array([_slip(program, unknowns, p) for p in range(len(before))])
-        moves = slips > STILL
-        if not any(m and times > 1 for m, times in zip(moves, most, strict=True)):
+        before = tuple(phase.pieces for phase in program.request.phases)
+        pieces = tuple(
+            max(own, min(2 * own, MOST_PIECES)) if _slip(program, unknowns, p) > STILL else own
+            for p, own in enumerate(before)
+        )
+        if pieces == before:
             return found
-        motion = motion_of(program, program.polished(unknowns), found.optimal)
-        missed = Follower(program.request.robot, motion).missed_by_phases()
-        far = np.isfinite(missed) & (missed > CLOSED * HALVING)
-        far |= slips > STILL * HALVING_SLIP
-        tried = [
-            tuple(
-                own * min(limit, (more if off else 2) if m else 1)
-                for own, limit, m, off in zip(before, most, moves, far, strict=True)
-            )
-            for more in (4, 2)
-        ]
-        for pieces in dict.fromkeys(tried):
-            finer = _with_pieces(program, pieces)
-            start = finer.polished(_resampled(program, unknowns, finer))
-            try:
-                found = _again(_with_failing(finer, start) or finer, start, None)
-                break
-            except GaitNotFoundError:
-                if pieces == tried[-1]:
-                    raise
+        finer = _with_pieces(program, pieces)
+        found = _again(finer, finer.polished(_resampled(program, unknowns, finer)), None)
 
 
 def _with_pieces(program: MotionProgram, pieces: Sequence[int]) -> MotionProgram:
@@ -611,32 +590,6 @@ def _closed(found: _Found, motion: Motion, report: Callable[[float], None]) -> M
             break
         motion = motion_of(found.program, found.unknowns, found.optimal)
     return motion
-
-
-def _fine_enough(found: _Found, report: Callable[[float], None]) -> _Found:
-    """Halve pieces now that would be halved later so that the motion closes.
-
-    But only where that takes another optimum: limits between the instants are then held once.
-    """
-    times = 0
-    while True:
-        times += 1
-        report(0.9 - 0.1 / (times + 1))
-        program = found.program
-        motion = motion_of(program, program.polished(found.unknowns), found.optimal)
-        missed = Follower(program.request.robot, motion).missed_by_phases()
-        if missed.max() <= CLOSED or not np.all(np.isfinite(missed)):
-            return found
-        finer = _halved(program, missed)
-        if finer is None:
-            return found
-        unknowns, holds = _halves(finer, motion)
-        if holds:
-            return found
-        try:
-            found = _again(_with_failing(finer, unknowns) or finer, unknowns, None)
-        except GaitNotFoundError:
-            return found
 
 
 def _halves(finer: MotionProgram, motion: Motion) -> tuple[Floats, bool]:
@@ -731,10 +684,6 @@ PROMISED = 1e-8
 CLOSED = 3e-9
 """Difference (m, rad, m/s, rad/s) within which a motion goes on where it should: a third of what is
 promised, since others integrate otherwise."""
-HALVING = 2.0 ** (2 * STAGES)
-"""By how much halving all pieces divides what a motion misses, by the order of collocation."""
-HALVING_SLIP = 2.0**STAGES
-"""Likewise of the velocity between the ends of pieces of points that stand."""
 OFF_MOST = 0.1
 """Share of the largest error of a phase from which on the pieces of another are halved, too."""
 MOST_HALVED = 192
