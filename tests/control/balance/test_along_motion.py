@@ -155,6 +155,7 @@ def test_spells_in_the_air_are_those_of_the_motion() -> None:
     np.testing.assert_array_equal(parameters.before, np.zeros((2, 2)))
 
 
+@pytest.mark.slow
 def test_spells_of_a_run_are_those_of_its_simulation() -> None:
     """From when a foot leaves the ground until it lands, and for how long the other stands then."""
     robot = walking.bravo7()
@@ -178,6 +179,7 @@ def test_spells_of_a_run_are_those_of_its_simulation() -> None:
     assert parameters.stance == pytest.approx([left, 0.0, lifted - other, 0.0], **near)
 
 
+@pytest.mark.slow
 def test_an_error_of_the_capture_point_grows_while_something_stands() -> None:
     """And not in flight: footholds are moved by e exp(ω t) of the stance that is left, smoothly."""
     robot = walking.bravo7()
