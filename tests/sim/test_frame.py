@@ -10,10 +10,11 @@ import pytest
 
 import heelstrike as hs
 from heelstrike.sim import simulation
-from heelstrike.sim.frame import PLAIN, SEVEN_LINKS, fixed_for
+from heelstrike.sim.frame import PLAIN, fixed_for
 from heelstrike.sim.memory import allocate_memory
 from heelstrike.sim.method import work_of
 from heelstrike.sim.time_stepping import TimeStepping
+from heelstrike.sim.time_stepping.method import SEVEN_LINKS
 
 PROFILE = hs.Ground(profile=[[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]])
 

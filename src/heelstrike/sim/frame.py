@@ -291,13 +291,6 @@ constraints from outside, profiles or curves.
 """
 
 
-SEVEN_LINKS = {"nl": 9, "nj": 9, "nq": 9, "nv": 9, "nu": 6, "nc": 4}
-"""Extents of a biped of seven links that stands on heels and toes, as most are.
-
-Most loops of a step are as short as these: where they end costs as much as what they do.
-"""
-
-
 def fixed_for(robot: AnyRobot, ground: Any, work: Any, method: Method) -> Fixed:
     """Return what the loop of a simulation can take for granted: all that is rare, or nothing.
 

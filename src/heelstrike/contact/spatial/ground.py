@@ -335,10 +335,9 @@ def _laid(boxes: tuple[Box, ...], normal: Floats, height: float) -> tuple[Floats
         if np.all(corners @ normal <= height + COVERED):
             farthest = most if way @ normal <= 0.0 else 0.0
         for other in range(len(boxes)):
-            there = np.abs((corners - center[other]) @ axes[other].T)
-            if other == box or not np.all(there <= half[other] + COVERED):
-                continue
             own, along = (corners - center[other]) @ axes[other].T, axes[other] @ way
+            if other == box or not np.all(np.abs(own) <= half[other] + COVERED):
+                continue
             room = half[other] + COVERED - own * np.sign(along)
             moving = np.abs(along) > 0.0
             far = np.min(room[:, moving] / np.abs(along[moving]), initial=most)

@@ -592,18 +592,12 @@ def _closed(found: _Found, motion: Motion, report: Callable[[float], None]) -> M
     return motion
 
 
-def _halves(finer: MotionProgram, motion: Motion) -> tuple[Floats, bool]:
-    """Unknowns of the same motion on more pieces, and whether it satisfies all constraints."""
-    unknowns = finer.polished(_packed(motion.phases, motion.distance, finer))
-    equations, limits = finer.missing(unknowns)
-    return unknowns, equations <= FEASIBLE and limits <= ALLOWED
-
-
 def _on_halves(finer: MotionProgram, motion: Motion, optimal: bool) -> _Found:
     """Return nearly the same motion on more pieces, its equations satisfied to rounding."""
-    unknowns, holds = _halves(finer, motion)
+    unknowns = finer.polished(_packed(motion.phases, motion.distance, finer))
     found = _Found(finer, unknowns, None, optimal)
-    if not holds:
+    equations, limits = finer.missing(unknowns)
+    if equations > FEASIBLE or limits > ALLOWED:
         found = _again(finer, unknowns, None)
     found = _held_between(found)
     if found.multipliers is None:
@@ -691,8 +685,7 @@ MOST_HALVED = 192
 STILL = 3e-4
 """Velocity (m/s) that a point that stands may have between the ends of pieces."""
 MOST_PIECES = 48
-"""Pieces of a phase beyond which the mesh is not refined: pieces are divided into equally many, so
-that what finer ones begin from is the same motion."""
+"""Pieces of a phase beyond which the mesh is not refined."""
 
 
 def _fine(pieces: int, times: int = 1) -> Instants:
