@@ -13,6 +13,7 @@ from heelstrike.experiments.engine_comparison.compass_table import STEPS
 from heelstrike.experiments.engine_comparison.entries import ABSENT, ENTRIES
 from heelstrike.experiments.engine_comparison.facts import FACTS
 from heelstrike.experiments.engine_comparison.page import (
+    FELL,
     _compass,
     _pushes,
     _taken,
@@ -122,6 +123,14 @@ def test_it_shows_figures_of_walks_and_why_others_fell(page: str) -> None:
     assert fallen[3:8] == ["–"] * 5  # differences of a fall mean nothing
     assert "- Bullet, defaults: fell: slipped at 0.100 s." in page
     assert "- ODE, defaults: ODE is not installed." in page
+
+
+def test_peaks_of_walks_that_ended_early_are_marked(page: str) -> None:
+    section = "## Foot force over step size"
+    assert row(page, section, "heelstrike")[2:4] == ["20", "20"]  # at 2 and 1 ms
+    assert row(page, section, "MuJoCo")[2:4] == ["20" + FELL, "20"]
+    assert row(page, section, "ODE")[2:4] == ["–", "–"]
+    assert f"{FELL} marks walks that ended early" in page
 
 
 def test_scenes_and_guards_are_in_their_tables(page: str) -> None:

@@ -29,6 +29,9 @@ from heelstrike.experiments.engine_comparison.whole import taken
 SHOWN = 1e-3
 """Step (s) whose walks the page shows in full."""
 
+FELL = "†"
+"""Behind the peak force of a walk that ended early."""
+
 Rows = Sequence[Sequence[str]]
 
 
@@ -354,7 +357,7 @@ def _peaks(walks: Mapping[str, Any]) -> str:
         }
         rows.append(
             [_title(name), which]
-            + [short(own[h]["peak"]) if h in own else "–" for h in sizes]
+            + [_peak(own.get(h)) for h in sizes]
             + [short(own[h]["computing_s"]) if h in own else "–" for h in sizes]
         )
     headings = ["engine", "settings"]
@@ -363,13 +366,19 @@ def _peaks(walks: Mapping[str, Any]) -> str:
     called = ",".join(f"{h:g}" for h in sizes)
     return (
         "## Foot force over step size\n\nThe peak force on a foot, as above, and the computing "
-        f"time of the same walk under {law}, falls included. With hard contact a touchdown is an "
+        f"time of the same walk under {law}; {FELL} marks walks that ended early. With hard contact a touchdown is an "
         "impulse within one step, so its force grows as the step shrinks. With soft contact the "
         f"force is that of the spring. Each row is `heelstrike compare {found['robot']} "
         f"--controller {law.partition(' ')[0]} --engines NAME --settings SETTINGS --sizes {called} "
         f"--steps {found['steps']}`.\n\n"
         + _table(headings, rows)
     )  # fmt: skip
+
+
+def _peak(figures: Mapping[str, Any] | None) -> str:
+    if figures is None:
+        return "–"
+    return short(figures["peak"]) + ("" if figures["walks"] else FELL)
 
 
 def _pushes(file: Path) -> str:
