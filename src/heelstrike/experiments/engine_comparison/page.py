@@ -366,9 +366,10 @@ def _peaks(walks: Mapping[str, Any]) -> str:
     called = ",".join(f"{h:g}" for h in sizes)
     return (
         "## Foot force over step size\n\nThe peak force on a foot, as above, and the computing "
-        f"time of the same walk under {law}; {FELL} marks walks that ended early. With hard contact a touchdown is an "
-        "impulse within one step, so its force grows as the step shrinks. With soft contact the "
-        f"force is that of the spring. Each row is `heelstrike compare {found['robot']} "
+        f"time of the same walk under {law}; {FELL} marks walks that ended early. With hard "
+        "contact a touchdown is an impulse within one step, so its force grows as the step "
+        "shrinks. With soft contact the force is that of the spring. "
+        f"Each row is `heelstrike compare {found['robot']} "
         f"--controller {law.partition(' ')[0]} --engines NAME --settings SETTINGS --sizes {called} "
         f"--steps {found['steps']}`.\n\n"
         + _table(headings, rows)
