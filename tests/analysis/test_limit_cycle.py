@@ -355,6 +355,7 @@ def test_footstep_feedback_repeats_with_its_samples_and_its_memory() -> None:
         )
 
 
+@pytest.mark.slow
 def test_a_walk_that_does_not_keep_step_with_its_samples() -> None:
     """The wheel takes a spoke in 1.035 s, and its filter is called every 0.1 s."""
     gravity, slope, inertia = 9.81, 0.08, 0.5

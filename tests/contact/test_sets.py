@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from contact_oracle import solutions
@@ -155,6 +157,12 @@ def dry(seed: int, slack: int) -> ContactProblem:
     )
 
 
+@cache
+def enumerated(seed: int, slack: int) -> list[Floats]:
+    problem = dry(seed, slack)
+    return solutions(problem.delassus, problem.free, problem.friction, problem.bound)
+
+
 @pytest.mark.parametrize("solver", [LEMKE, FISCHER_BURMEISTER, GAUSS_SEIDEL])
 @pytest.mark.parametrize("slack", [7, 4])
 def test_intervals_against_enumeration(solver: int, slack: int) -> None:
@@ -162,15 +170,13 @@ def test_intervals_against_enumeration(solver: int, slack: int) -> None:
     compared = moves = 0
     for seed in range(12):
         problem = dry(seed, slack)
-        given = (problem.delassus.copy(), problem.free.copy(), problem.friction.copy())
-        found = solutions(*given, problem.bound)
+        found, unit = enumerated(seed, slack), np.abs(problem.free).max()
         work, answer = contact_workspace(4), ContactAnswer.allocate(capacity=4)
         work.settings.corrections = 0
         if solve_contact_kernel(np.array([solver]), problem, work, answer) != SOLVED:
             continue
         rows = [0, 1, 3, 4, 5, 7]
         velocity = answer.velocity[rows]
-        unit = np.abs(given[1]).max()
         assert min(np.abs(velocity - w[rows]).max() for w in found) <= 1e-6 * unit
         assert np.all(np.abs(answer.impulse[[3, 7]]) <= problem.bound[[1, 3]])
         moves += int(np.sum(np.abs(velocity[[2, 5]]) > 1e-6 * unit))

@@ -83,6 +83,7 @@ def test_half_the_error_of_the_best_difference(bits: int, noise: float) -> None:
     assert mean(error[near]) <= 0.5 * min(mean(other[near]) for other in others)
 
 
+@pytest.mark.slow
 def test_a_robot_walks_on_its_estimate() -> None:
     robot, gait = walking.bravo7(), walking.gait()
     controller = hs.Sensed(

@@ -72,7 +72,13 @@ LAWS: dict[str, Callable[[], tuple[hs.Robot, hs.State, Law]]] = {
     "ZeroMomentPointRegulation": lambda: on_flat_feet(hs.ZeroMomentPointRegulation),
 }
 
-every = pytest.mark.parametrize("name", sorted(LAWS))
+OWN = {"FlatGaitLQR", "FootstepFeedback on a motion", "MotionLQR", "ZeroMomentPointRegulation"}
+"""Laws that take long to compile, and have quick tests of their own."""
+
+every = pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow) if name in OWN else name for name in sorted(LAWS)],
+)
 
 PUSH = hs.Push(2, force=(60.0, 0.0), start=0.02, duration=0.02)
 

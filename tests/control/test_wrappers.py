@@ -83,6 +83,7 @@ def wrapped(controller: Any, **options: Any) -> Any:
     return hs.Sensed(controller, **sensors)
 
 
+@pytest.mark.slow
 def test_shells_that_do_nothing_change_nothing() -> None:
     plain = run_of(law(), control_period=1e-3)
     for wrapper in (hs.Sensed(law()), hs.Actuated(law())):

@@ -25,6 +25,7 @@ def test_the_optimum_costs_least(bravo7: hs.Robot) -> None:
     assert 0.0 < optimum.zmp_margin < preview.zmp_margin
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path) -> None:
     """One step is too long: it says so, and writes everything nevertheless."""
     asked = ["planners", "--speeds", "0.43,3", "--steps", "2", "--json", "--out", str(tmp_path)]

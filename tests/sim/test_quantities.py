@@ -61,6 +61,7 @@ assert old.link_angle.shape == old.position.shape and not old.link_angle.any()
 """
 
 
+@pytest.mark.slow
 def test_a_quantity_is_recorded_saved_and_drawn_by_its_declaration(tmp_path: Path) -> None:
     copy = tmp_path / "heelstrike"
     shutil.copytree(PACKAGE, copy)

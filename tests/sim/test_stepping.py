@@ -323,6 +323,7 @@ def test_snapshots_of_an_older_layout_are_refused_for_that(tmp_path: Path) -> No
         hs.load_snapshot(tmp_path / "old.npz")
 
 
+@pytest.mark.slow
 def test_other_names_of_arrays_are_another_layout() -> None:
     """Files hold arrays by their names: where one is renamed, _FORMAT of sim/snapshot.py is raised.
 

@@ -16,6 +16,7 @@ GENERAL = 0.2
 """Part of the steps that may take the general way; 0.8 did where poor pivots cost digits."""
 
 
+@pytest.mark.slow
 def test_what_stands_straight_on_its_stops_takes_no_solver() -> None:
     """Knees straight and at their stops: of eight rows one nearly depends on those before it."""
     robot = hs.load_robot("walker2d")

@@ -69,6 +69,7 @@ def test_a_run_on_points_repeats_as_predicted() -> None:
     np.testing.assert_allclose(np.abs(cycle.multipliers[:4]), predicted[:4], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_it_recovers_from_pushes_that_computed_torque_does_not() -> None:
     """The trunk in flight, and on a point, is steered by the touchdowns to come."""
     push = hs.Push("torso", force=(20.0, 0.0), start=0.1, duration=0.05)  # 1 N s

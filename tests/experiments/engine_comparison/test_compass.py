@@ -130,6 +130,7 @@ def test_one_that_falls_only_when_disturbed_keeps_its_cycle(
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_table_says_who_walks_and_why_others_do_not(
     monkeypatch: pytest.MonkeyPatch, cycle: tuple[CompassWalk, State], tmp_path: Any
 ) -> None:
@@ -158,6 +159,7 @@ def test_the_table_says_who_walks_and_why_others_do_not(
         assert words in told
 
 
+@pytest.mark.slow
 def test_an_engine_that_falls_at_its_defaults_is_tried_at_its_best(
     monkeypatch: pytest.MonkeyPatch, cycle: tuple[CompassWalk, State]
 ) -> None:

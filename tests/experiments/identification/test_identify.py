@@ -329,6 +329,7 @@ def fitting_of(robot: hs.Robot, log: RobotLog, noise: float, again: int = 1) -> 
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_work_of_a_long_motion_takes_hardly_more_memory() -> None:
     """Beyond the recording: for each second of it, what is compared and the curves."""
     robot, log, peaks = walking.bravo7(), measured_walk(), []
@@ -374,6 +375,7 @@ def test_noise_that_is_twice_as_large_as_told_makes_the_intervals_of_its_true_si
     np.testing.assert_array_less(np.abs(proud.values - honest.values), 0.1 * spread)
 
 
+@pytest.mark.slow
 def test_noise_that_is_larger_than_told_widens_intervals() -> None:
     log = noisy(measured_walk(), 3)
     honest = hs.identify(walking.bravo7(), log, **NOISE)

@@ -118,6 +118,7 @@ def test_derivatives_are_those_of_the_curves(fitted: BodyMotion) -> None:
     assert np.abs(between - middle).max() < step * curved
 
 
+@pytest.mark.slow
 def test_markers_that_were_not_seen_are_bridged() -> None:
     seen = markers(NOISE)
     position = seen.position.copy()

@@ -55,6 +55,7 @@ def test_the_trunk_is_upright_and_the_centre_of_mass_level(
     assert np.abs([dynamics.link_poses(bravo7, row).angle[2] for row in q]).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_both_planners_at_a_given_height(bravo7: hs.Robot) -> None:
     low = [hs.plan_motion(bravo7, **STEP, planner=each, height=0.85) for each in hs.Planner]
     for motion in low:

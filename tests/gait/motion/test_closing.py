@@ -134,6 +134,7 @@ def test_one_that_does_not_close_is_told(why: str, monkeypatch: pytest.MonkeyPat
     assert len(failed) == (why != "at the limit of pieces")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_progress_goes_on_while_it_is_made_to_close(recwarn: pytest.WarningsRecorder) -> None:
     told: list[float] = []

@@ -24,7 +24,19 @@ import heelstrike as hs
 from heelstrike.sim import Scheme
 
 
-@pytest.mark.parametrize("robot", hs.builtin_robots())
+QUICK = ("bravo7", "rabbit")
+"""Robots that stand for all where time is short."""
+ROBOTS = [
+    robot if robot in QUICK else pytest.param(robot, marks=pytest.mark.slow)
+    for robot in hs.builtin_robots()
+]
+SCHEMES = [
+    scheme if scheme is Scheme.GAP_LINEARISED else pytest.param(scheme, marks=pytest.mark.slow)
+    for scheme in Scheme
+]
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_a_time_step_of_every_robot_has_the_derivatives_that_differences_show(robot: str) -> None:
     """Along a fall onto the ground and onto stops, wherever disturbed steps keep contact modes."""
     found = time_steps(hs.load_robot(robot))
@@ -32,7 +44,7 @@ def test_a_time_step_of_every_robot_has_the_derivatives_that_differences_show(ro
     assert found.worst <= ENOUGH
 
 
-@pytest.mark.parametrize("scheme", Scheme)
+@pytest.mark.parametrize("scheme", SCHEMES)
 def test_so_has_one_of_every_scheme(scheme: Scheme) -> None:
     found = time_steps(hs.load_robot("bravo7"), scheme)
     assert {0, 1} <= found.modes

@@ -83,7 +83,10 @@ def test_friction_slows_what_slides_by_the_weight(friction: FrictionLaw) -> None
 FINEST: dict[str, Any] = {"rtol": 1e-11, "atol": 1e-13}
 
 
-@pytest.mark.parametrize("friction", [BristleFriction(), RegularisedFriction(speed=1e-3)])
+@pytest.mark.parametrize(
+    "friction",
+    [BristleFriction(), pytest.param(RegularisedFriction(speed=1e-3), marks=pytest.mark.slow)],
+)
 def test_a_landing_robot_has_the_derivatives_that_differences_show(friction: FrictionLaw) -> None:
     """Toes come down, and slip or stick."""
     robot, draw = hs.load_robot("compass_gait"), np.random.default_rng(4)
