@@ -23,7 +23,6 @@ from derivative_checks import (
 import heelstrike as hs
 from heelstrike.sim import Scheme
 
-
 QUICK = ("bravo7", "rabbit")
 """Robots that stand for all where time is short."""
 ROBOTS = [
