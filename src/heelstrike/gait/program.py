@@ -11,6 +11,7 @@ import casadi
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
+from heelstrike.blas_threads import one_blas_thread
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.blocks import BlockProgram, Copies
 from heelstrike.gait.clearance import ClearanceProfile
@@ -532,7 +533,7 @@ class Ipopt:
         KeyboardInterrupt
             At Ctrl-C, once the iteration under way has ended.
         """
-        with deferred_interrupts() as interrupted:
+        with deferred_interrupts() as interrupted, one_blas_thread():
             self._watch.stop = interrupted
             found = self._solver(**arguments)
         return found, self._solver.stats()
