@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -80,6 +80,14 @@ INSIDE = SETTINGS | {"mu_strategy": "adaptive", "max_iter": 2 * MOST_ITERATIONS}
 the problem: an optimum that 100 iterations with a falling one missed takes 20."""
 
 
+HASTY = SETTINGS | {"max_iter": MOST_ITERATIONS // 2}
+"""Those for the first start, before it is known whether any point satisfies all constraints: most
+that take longer find none."""
+ROUGH = 14
+"""Intervals of the grid on which the best of the starts is chosen: costs have ten digits there, and
+its optimum is three steps of Newton's method from that on the whole grid."""
+
+
 def first_instants(request: Request) -> tuple[int, Instants]:
     """Degree of the polynomials, and the instants on which a program begins.
 
@@ -91,15 +99,28 @@ def first_instants(request: Request) -> tuple[int, Instants]:
     1995, section 5.3).
     """
     if request.stance.flat:
-        pieces, degree, (nodes, weights) = 1, 3, lobatto(request.intervals)
-    else:
-        pieces, degree, (nodes, weights) = request.intervals, POINTS + 1, gauss(POINTS)
-    return degree, Instants(
+        return 3, _one_piece(request.intervals)
+    pieces, (nodes, weights) = request.intervals, gauss(POINTS)
+    return POINTS + 1, Instants(
         pieces,
         np.repeat(np.arange(pieces), nodes.size),
         np.tile(nodes, pieces),
         np.tile(weights, pieces) / pieces,
     )
+
+
+def coarse(program: Program) -> Program:
+    """Return a program of one piece with fewer instants; others as they are."""
+    request = program.request
+    if program.instants.pieces > 1 or request.intervals <= ROUGH:
+        return program
+    return replace(program, instants=_one_piece(ROUGH))
+
+
+def _one_piece(intervals: int) -> Instants:
+    """Nodes of Gauss and Lobatto on one piece."""
+    nodes, weights = lobatto(intervals)
+    return Instants(1, np.zeros(nodes.size, np.int64), nodes, weights)
 
 
 @dataclass(frozen=True)
@@ -147,6 +168,8 @@ class Program:
     """Whether guesses are nearly optima."""
     inside: bool = False
     """Whether guesses satisfy all constraints."""
+    hasty: bool = False
+    """Whether to give up soon."""
     elastic: bool = False
     """Let every constraint be violated and minimise the sum of the scaled violations instead of the
     effort: shows which constraints are in conflict when there is no solution."""
@@ -312,8 +335,15 @@ class Program:
             x = casadi.vertcat(x, excess)
         return Ipopt(
             x, f, g, gradient=slope, jacobian=slopes, hessian=(price, prices, bend),
-            settings=NEAR if self.near else INSIDE if self.inside else SETTINGS,
+            settings=self._settings,
         )  # fmt: skip
+
+    @property
+    def _settings(self) -> dict[str, Any]:
+        """Settings of IPOPT."""
+        if self.hasty:
+            return HASTY
+        return NEAR if self.near else INSIDE if self.inside else SETTINGS
 
     def _joins(self) -> tuple[Any, Any, Copies]:
         """Symbols of the unknowns, the gaps between the pieces, and the touchdown."""
