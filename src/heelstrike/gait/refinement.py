@@ -60,9 +60,7 @@ def held_between_nodes(program: Program, solution: Solution) -> tuple[Floats, bo
     )
 
 
-def solved_again(
-    program: Program, unknowns: Floats, multipliers: Floats | None = None
-) -> Solution:
+def solved_again(program: Program, unknowns: Floats, multipliers: Floats | None = None) -> Solution:
     """Solve a program from the optimum of another, on other instants.
 
     Raises

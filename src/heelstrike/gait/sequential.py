@@ -60,7 +60,7 @@ def optimum_near(
     lower, upper = bounds
     for step in range(MOST_STEPS + 1):
         slope, value, slopes = first(unknowns)
-        if not np.all(np.isfinite(value)):
+        if not all(np.isfinite(each).all() for each in (slope, value, slopes)):
             return None
         missed = np.maximum(lower - value, value - upper).max()
         apart = np.where(priced > 0.0, upper - value, value - lower)[priced != 0.0]
@@ -70,6 +70,8 @@ def optimum_near(
         if step == MOST_STEPS:
             break
         bend = second(unknowns, priced)
+        if not np.isfinite(bend).all():
+            return None
         try:
             active = _active(slope, slopes, bend, (lower - value, upper - value))
             moved, priced, strict = _held(slope, slopes, bend, active)
@@ -79,9 +81,7 @@ def optimum_near(
     return None
 
 
-def _active(
-    slope: Floats, slopes: Floats, bend: Floats, room: tuple[Floats, Floats]
-) -> Floats:
+def _active(slope: Floats, slopes: Floats, bend: Floats, room: tuple[Floats, Floats]) -> Floats:
     """Return the change of every constraint that is held, and NaN for those that are not."""
     from scipy.optimize import nnls
 
@@ -90,13 +90,17 @@ def _active(
     held, free = _spaces(slopes[exact])
     begun = held @ low[exact]
     values, axes = np.linalg.eigh(free.T @ bend @ free)
-    least = DEPENDENT * np.abs(values).max()
+    least = DEPENDENT * np.abs(values).max(initial=0.0)
+    if values.size and not least > 0.0:
+        raise np.linalg.LinAlgError("the Lagrangian has no curvature")
     wide = free @ (axes / np.sqrt(np.maximum(np.abs(values), least)))  # so that wideᵀ W wide = 1
     away = wide.T @ (slope + bend @ begun)
     rows = np.flatnonzero(~exact)
     sides = [(rows[np.isfinite(low[rows])], low, 1.0), (rows[np.isfinite(high[rows])], high, -1.0)]
     matrix = np.vstack([sign * slopes[at] @ wide for at, _, sign in sides])
     right = np.concatenate([sign * (ends[at] - slopes[at] @ begun) for at, ends, sign in sides])
+    if not len(right):
+        return np.where(exact, low, np.nan)
     # Least |u| with matrix u >= right + matrix away.
     right = right + matrix @ away
     scale = 1.0 / np.maximum(np.linalg.norm(matrix, axis=1), np.finfo(float).tiny)
