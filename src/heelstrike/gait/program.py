@@ -29,8 +29,8 @@ from heelstrike.robot.model import Floats
 CONVERGED = 1e-8
 """Tolerance of IPOPT on scaled constraints and optimality."""
 RELAXED = 1e-8
-"""Relative distance by which bounds of inequalities are moved outwards, as IPOPT does by itself: the
-rear foot's freedom to lift has prices of 1e5, so that costs depend on it in the fifth digit."""
+"""Relative distance by which bounds of inequalities are moved outwards, as IPOPT does by itself:
+the rear foot's freedom to lift has prices of 1e5, so that costs show it in the fifth digit."""
 FEASIBLE = 1e-7
 """Scaled violations up to which a point satisfies all constraints."""
 MOST_ITERATIONS = 100
@@ -293,7 +293,7 @@ class Program:
 
     @cached_property
     def _blocks(self) -> BlockProgram:
-        """The program: gaps between the pieces, then the blocks of touchdown and of the instants."""
+        """Gaps between the pieces, then the blocks of touchdown and of the instants."""
         x, gaps, touchdown = self._joins()
         return BlockProgram(x, gaps, [touchdown, self._path(x)])
 
