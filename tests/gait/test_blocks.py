@@ -49,6 +49,35 @@ def test_derivatives_are_those_of_the_whole(program: tuple[BlockProgram, casadi.
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 
+def test_numbers_are_those_of_the_expressions(program: tuple[BlockProgram, casadi.MX]) -> None:
+    blocks, x = program
+    draw = np.random.default_rng(7)
+    point, price, prices = draw.normal(size=4), 0.8, draw.normal(size=17)
+    bend = blocks.hessian(x, price, prices)
+    given = [blocks.value(x)[0], blocks.gradient(x), blocks.value(x)[1], blocks.jacobian(x), bend]
+    expected = [casadi.densify(each).full() for each in casadi.Function("given", [x], given)(point)]
+    found = [blocks.cost(point), *blocks.first(point), blocks.second(point, price, prices)]
+    for ours, theirs in zip(found, expected, strict=True):
+        assert np.abs(theirs).max() > 0.1
+        np.testing.assert_allclose(ours, theirs.squeeze(), rtol=1e-12, atol=1e-12)
+
+
+def test_copies_that_are_joined_are_those_of_all() -> None:
+    y = casadi.SX.sym("y", 2)
+    block = Block("b", y, casadi.SX.sym("theta", 0), y[0] ** 2 * y[1], casadi.vertcat(y[0] * y[1]))
+    x, draw = casadi.MX.sym("x", 3), np.random.default_rng(8)
+    along, weight = casadi.reshape(draw.normal(size=(10, 3)) @ x + 0.2, 2, 5), draw.uniform(size=5)
+    parts = [
+        Copies.of(block, weight[part], x, along[:, part], np.zeros(0))
+        for part in (slice(0, 2), slice(2, 5), slice(0, 5))
+    ]
+    point, prices = draw.normal(size=3), draw.normal(size=5)
+    both, whole = parts[0].joined(parts[1]), parts[2]
+    for ours, theirs in zip(both.first(point), whole.first(point), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    np.testing.assert_array_equal(both.second(point, 0.3, prices), whole.second(point, 0.3, prices))
+
+
 def test_what_is_linear_comes_first_then_block_by_block(
     program: tuple[BlockProgram, casadi.MX],
 ) -> None:

@@ -107,6 +107,19 @@ def test_the_matrix_of_instants_evaluates_the_pieces(degree: int, order: int) ->
     np.testing.assert_allclose(instants.phases, (piece + share) / 3.0)
 
 
+def test_what_was_joined_to_instants() -> None:
+    nodes, weights = lobatto(3)
+    first = Instants(1, np.zeros(4, int), nodes, weights)
+    others = Instants(1, np.zeros(2, int), np.array([0.4, 0.1]), np.zeros(2))
+    more = first.joined(others).after(first)
+    assert more is not None
+    assert more.share.tolist() == [0.4, 0.1]
+    assert more.weight.tolist() == [0.0, 0.0]
+    assert first.after(first) is not None
+    assert first.after(others) is None
+    assert first.after(first.joined(others)) is None
+
+
 def test_quadrature_is_exact_for_polynomials_of_its_degree() -> None:
     # Gauss-Lobatto with n + 1 nodes integrates degree 2n - 1 exactly, Gauss with n of them too.
     for (nodes, weights), exact in ((lobatto(6), 12), (gauss(4), 8)):

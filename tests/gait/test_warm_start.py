@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 import heelstrike as hs
 from heelstrike.errors import GaitError
-from heelstrike.gait import design
+from heelstrike.gait import design, program
 from heelstrike.gait.optimize import request_of
 from heelstrike.gait.program import Program, first_instants
+from heelstrike.gait.refinement import solved_again
 from heelstrike.gait.request import Request
+from heelstrike.gait.starts import starts
 from heelstrike.gait.transcription import transcribed
 
 STEPS = {
@@ -32,6 +36,30 @@ def test_the_neighbour_of_a_gait(name: str, monkeypatch: pytest.MonkeyPatch) -> 
     assert found.step_length == asked["step_length"]
 
 
+def test_neighbours_on_flat_feet_need_no_ipopt(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, step = hs.load_robot("bravo7"), STEPS["bravo7"]
+    near = hs.optimize_gait(robot, **step, starts=1)
+    monkeypatch.setattr(program, "Ipopt", None)
+    for slope in (-0.02, 0.02):
+        assert hs.optimize_gait(robot, **step, slope=slope, warm_start=near).optimal
+
+
+def test_the_coarse_grid_leads_to_the_optimum_on_the_whole_one() -> None:
+    robot = hs.load_robot("bravo7")
+    request = request_of(robot, **STEPS["bravo7"], starts=1)
+    whole = Program(request, transcribed(request), request.profiles[0], *first_instants(request))
+    rough = program.coarse(whole)
+    assert rough.instants.share.size < 0.6 * whole.instants.share.size
+    guess = rough.sampled(next(iter(starts(request))))
+    expected, found = whole.solve(guess), solved_again(whole, rough.solve(guess).unknowns)
+    assert found.converged
+    assert found.objective == pytest.approx(expected.objective, rel=1e-7)
+    assert abs(whole.violations(found.unknowns)).max() < 2e-8
+    coarsest = replace(request, intervals=12)
+    few = Program(coarsest, whole.transcription, whole.profile, *first_instants(coarsest))
+    assert program.coarse(few) is few
+
+
 @pytest.mark.parametrize("name", STEPS)
 def test_a_gait_is_resampled_as_it_is(name: str) -> None:
     """On its own mesh, a gait is a point that satisfies its own constraints."""
@@ -42,12 +70,10 @@ def test_a_gait_is_resampled_as_it_is(name: str) -> None:
         clearance_profile=gait.clearance_profile, force_margin=None, impact=True, intervals=None,
         joint_speed_limit=float("inf"), joint_ranges=None, starts=1,
     )  # fmt: skip
-    program = Program(
-        request, transcribed(request), gait.clearance_profile, *first_instants(request)
-    )
-    unknowns = program.resampled(gait)
-    assert abs(program.violations(unknowns)).max() < 1e-6
-    assert program.effort(unknowns) == pytest.approx(gait.cost, rel=1e-9)
+    own = Program(request, transcribed(request), gait.clearance_profile, *first_instants(request))
+    unknowns = own.resampled(gait)
+    assert abs(own.violations(unknowns)).max() < 1e-6
+    assert own.effort(unknowns) == pytest.approx(gait.cost, rel=1e-9)
 
 
 def test_the_neighbour_of_a_gait_keeps_its_profile() -> None:

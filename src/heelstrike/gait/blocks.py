@@ -12,6 +12,7 @@ The small ones, of y, are symbolic expressions, found once; large ones are never
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import casadi
@@ -112,6 +113,14 @@ class Copies:
         selection, offset = affine(0.0)
         return cls(block, weight, selection, offset, parameters)
 
+    def joined(self, other: Copies) -> Copies:
+        """Return these copies, and those of another after them."""
+        return Copies(
+            self.block, np.append(self.weight, other.weight),
+            casadi.vertcat(self.selection, other.selection),
+            casadi.vertcat(self.offset, other.offset), self.parameters,
+        )  # fmt: skip
+
     @property
     def number(self) -> int:
         """How many copies there are."""
@@ -148,6 +157,33 @@ class Copies:
         half = self.selection.T @ (_diagonal(blocks, self.block.size) @ self.selection)
         return half + half.T
 
+    @cached_property
+    def _selections(self) -> Floats:
+        """S of each copy, (N, m, n)."""
+        return np.array(self.selection.full().reshape(self.number, self.block.size, -1))
+
+    def first(self, x: Floats) -> tuple[Floats, Floats, Floats]:
+        """Gradient of the cost (n,), constraints (N r,) and their Jacobian (N r, n), as numbers."""
+        given = self._given(casadi.DM(x))
+        _, rows = self.block.value.map(self.number)(*given)
+        slope = casadi.densify(self.block.gradient.map(self.number)(*given)).full()
+        slopes = self.block.jacobian.map(self.number)(*given)
+        by_unknowns = _stacked(slopes, self.number) @ self._selections
+        along = np.einsum("mi,imn->n", slope * self.weight, self._selections)
+        return along, rows.full().ravel(order="F"), by_unknowns.reshape(rows.numel(), -1)
+
+    def second(self, x: Floats, price: float, prices: Floats) -> Floats:
+        """Hessian of the priced cost and constraints, (n, n), as numbers."""
+        blocks = self.block.hessian.map(self.number)(
+            *self._given(casadi.DM(x)),
+            casadi.DM(price * self.weight).T,
+            casadi.DM(prices.reshape(self.number, self.block.count).T),
+        )
+        chosen = self._selections
+        inner = (_stacked(blocks, self.number) @ chosen).reshape(-1, chosen.shape[2])
+        half = chosen.reshape(-1, chosen.shape[2]).T @ inner
+        return np.asarray(half + half.T)
+
 
 class BlockProgram:
     """Cost and constraints of a program, and their derivatives.
@@ -161,17 +197,52 @@ class BlockProgram:
     copies : sequence of Copies
         All others, and the cost.
 
-    Attributes
-    ----------
-    value : casadi.Function
-        x to the cost and all constraints.
+    Most methods take expressions, and are made functions of. Those of a program that is solved but
+    once are faster evaluated as numbers, by `first` and `second`.
     """
 
     def __init__(self, x: Any, linear: Any, copies: Sequence[Copies]) -> None:
         self._copies = tuple(copies)
         self._linear = casadi.evalf(casadi.jacobian(linear, x))
-        cost, rows = zip(*(each.value(x) for each in copies), strict=True)
-        self.value = casadi.Function("value", [x], [sum(cost), casadi.vertcat(linear, *rows)])
+        self._given = x, linear
+
+    @cached_property
+    def value(self) -> Any:
+        """Function of x: the cost, and all constraints."""
+        x, linear = self._given
+        cost, rows = zip(*(each.value(x) for each in self._copies), strict=True)
+        return casadi.Function("value", [x], [sum(cost), casadi.vertcat(linear, *rows)])
+
+    def cost(self, x: Floats) -> float:
+        """Cost, as a number."""
+        return float(sum(each.value(casadi.DM(x))[0] for each in self._copies))
+
+    @cached_property
+    def _affine(self) -> tuple[Floats, Floats]:
+        """Derivatives of the affine constraints, and their values where all unknowns are zero."""
+        x, linear = self._given
+        constant = casadi.Function("linear", [x], [linear])(0.0)
+        return self._linear.full(), constant.full().ravel()
+
+    def first(self, x: Floats) -> tuple[Floats, Floats, Floats]:
+        """Gradient of the cost (n,), all constraints, and their Jacobian, as numbers."""
+        slopes, constant = self._affine
+        parts = [each.first(x) for each in self._copies]
+        return (
+            np.sum([slope for slope, _, _ in parts], axis=0),
+            np.concatenate([slopes @ x + constant, *(rows for _, rows, _ in parts)]),
+            np.vstack([slopes, *(own for _, _, own in parts)]),
+        )
+
+    def second(self, x: Floats, price: float, prices: Floats) -> Floats:
+        """Hessian of the cost times its price and the constraints times theirs, as numbers."""
+        ends = np.cumsum([len(self._affine[1]), *(each.number * each.block.count
+                                                  for each in self._copies)]).tolist()  # fmt: skip
+        parts = [
+            each.second(x, price, prices[first:end])
+            for each, first, end in zip(self._copies, ends, ends[1:], strict=False)
+        ]
+        return np.asarray(np.sum(parts, axis=0))
 
     def gradient(self, x: Any) -> Any:
         """Gradient of the cost, (n,)."""
@@ -189,6 +260,12 @@ class BlockProgram:
             total += each.hessian(x, price, prices[first:end])
             first = end
         return total
+
+
+def _stacked(blocks: Any, number: int) -> Floats:
+    """Blocks that stand side by side, one after the other along a first axis."""
+    dense = casadi.densify(blocks).full()
+    return np.array(dense.reshape(len(dense), number, -1).transpose(1, 0, 2))
 
 
 def _diagonal(blocks: Any, width: int) -> Any:

@@ -13,8 +13,8 @@ from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Footing, Gait, Phase, actuated_joints, fingerprint
 from heelstrike.gait.infeasible import nearest_to_feasible
 from heelstrike.gait.margins import Margins
-from heelstrike.gait.program import Program, Solution, first_instants
-from heelstrike.gait.refinement import checked_instants, held_between_nodes
+from heelstrike.gait.program import Program, Solution, coarse, first_instants
+from heelstrike.gait.refinement import checked_instants, held_between_nodes, solved_again
 from heelstrike.gait.request import Request
 from heelstrike.gait.starts import starts
 from heelstrike.gait.transcription import Group, transcribed
@@ -24,7 +24,11 @@ from heelstrike.robot.state import State
 
 
 def designed(request: Request, profile: ClearanceProfile, report: Callable[[float], None]) -> Gait:
-    """Design a gait whose swing foot keeps above a profile; `report` is told the share of it."""
+    """Design a gait whose swing foot keeps above a profile; `report` is told the share of it.
+
+    If there is no such gait, this takes the least time where another profile is left to try, which
+    asks less of the foot.
+    """
     program = Program(request, transcribed(request), profile, *first_instants(request))
     report(0.05)
     best = _best_of_starts(program, report)
@@ -50,20 +54,24 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
         report(0.8)
         if solution.converged:
             return solution
-    guesses = [program.sampled(start) for start in islice(starts(request), request.starts)]
-    solutions: list[Solution] = []
-    for guess in guesses:
-        solutions.append(program.solve(guess))
-        if len(solutions) == 1 and not solutions[0].converged:
-            # Perhaps no start can succeed, which ends here in an error that tells why. Otherwise
-            # a point that satisfies all constraints is as good a start as can be.
-            feasible = nearest_to_feasible(program)
-            solutions.append(replace(program, inside=True).solve(feasible))
-        report(0.05 + 0.75 * len(solutions) / (len(guesses) + 1))
+    rough = coarse(program)
+    guesses = [rough.sampled(start) for start in islice(starts(request), request.starts)]
+    solutions = [replace(rough, hasty=True).solve(guesses[0])]
+    if not solutions[0].converged:
+        # Perhaps no start can succeed, which ends here in an error that tells why. Otherwise a
+        # point that satisfies all constraints is as good a start as can be.
+        left = program.profile is not request.profiles[-1]
+        feasible = nearest_to_feasible(rough, *([1] if left else []))
+        solutions = [replace(rough, inside=True).solve(feasible), rough.solve(guesses[0])]
+    for k, guess in enumerate(guesses[1:]):
+        report(0.05 + 0.75 * (k + 1) / (len(guesses) + 1))
+        solutions.append(rough.solve(guess))
+    report(0.8)
     good = [solution for solution in solutions if solution.converged]
     # Without an optimum, the best of the points that satisfy all constraints is better than none.
-    good = good or [program.at(feasible), *filter(program.satisfied_by, solutions)]
-    return min(good, key=lambda solution: solution.objective)
+    good = good or [rough.at(feasible), *filter(rough.satisfied_by, solutions)]
+    best = min(good, key=lambda solution: solution.objective)
+    return best if rough is program else solved_again(program, best.unknowns)
 
 
 def designed_gait(program: Program, unknowns: Floats, optimal: bool) -> Gait:

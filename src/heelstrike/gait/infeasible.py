@@ -22,8 +22,15 @@ NAMED = 4
 """Groups of constraints that a message names before it only counts."""
 
 
-def nearest_to_feasible(program: Program) -> Floats:
+def nearest_to_feasible(program: Program, attempts: int = ATTEMPTS) -> Floats:
     """Minimise the sum of all violations, and return a point that has none.
+
+    Parameters
+    ----------
+    program : Program
+        The program.
+    attempts : int
+        Starting points.
 
     Raises
     ------
@@ -32,7 +39,7 @@ def nearest_to_feasible(program: Program) -> Floats:
     """
     elastic = replace(program, elastic=True, near=False)
     found = []
-    for start in islice(starts(program.request), ATTEMPTS):
+    for start in islice(starts(program.request), attempts):
         found.append(elastic.solve(program.sampled(start)))
         if np.abs(program.violations(found[-1].unknowns)).max() <= FEASIBLE:
             return found[-1].unknowns

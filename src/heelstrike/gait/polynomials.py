@@ -153,6 +153,14 @@ class Instants:
         parts = (np.concatenate([getattr(self, n), getattr(others, n)]) for n in names)
         return Instants(self.pieces, *parts)
 
+    def after(self, others: Instants) -> Instants | None:
+        """Return those that were joined to others; None if these do not begin with the others."""
+        first, count = (self.piece, self.share, self.weight), others.share.size
+        known = (others.piece, others.share, others.weight)
+        if any(not np.array_equal(a[:count], b) for a, b in zip(first, known, strict=True)):
+            return None
+        return Instants(self.pieces, *(each[count:] for each in first))
+
     def matrix(self, degree: int, order: int) -> Floats:
         """Derivatives of all shape functions of all pieces, ((degree + 1) pieces, N).
 

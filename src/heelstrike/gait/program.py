@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -11,6 +12,7 @@ import casadi
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
+from heelstrike.blas_threads import one_blas_thread
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.blocks import BlockProgram, Copies
 from heelstrike.gait.clearance import ClearanceProfile
@@ -18,6 +20,7 @@ from heelstrike.gait.gait import Gait
 from heelstrike.gait.polynomials import Instants, coefficients, gauss, lobatto
 from heelstrike.gait.request import Request
 from heelstrike.gait.rows import Row
+from heelstrike.gait.sequential import Derivatives, optimum_near
 from heelstrike.gait.starts import Start, typical_step
 from heelstrike.gait.transcription import Group, Transcription
 from heelstrike.interruption import deferred_interrupts
@@ -25,6 +28,9 @@ from heelstrike.robot.model import Floats
 
 CONVERGED = 1e-8
 """Tolerance of IPOPT on scaled constraints and optimality."""
+RELAXED = 1e-8
+"""Relative distance by which bounds of inequalities are moved outwards, as IPOPT does by itself:
+the rear foot's freedom to lift has prices of 1e5, so that costs show it in the fifth digit."""
 FEASIBLE = 1e-7
 """Scaled violations up to which a point satisfies all constraints."""
 MOST_ITERATIONS = 100
@@ -74,6 +80,14 @@ INSIDE = SETTINGS | {"mu_strategy": "adaptive", "max_iter": 2 * MOST_ITERATIONS}
 the problem: an optimum that 100 iterations with a falling one missed takes 20."""
 
 
+HASTY = SETTINGS | {"max_iter": MOST_ITERATIONS // 2}
+"""Those for the first start, before it is known whether any point satisfies all constraints: most
+that take longer find none."""
+ROUGH = 14
+"""Intervals of the grid on which the best of the starts is chosen: costs have ten digits there, and
+its optimum is three steps of Newton's method from that on the whole grid."""
+
+
 def first_instants(request: Request) -> tuple[int, Instants]:
     """Degree of the polynomials, and the instants on which a program begins.
 
@@ -85,15 +99,28 @@ def first_instants(request: Request) -> tuple[int, Instants]:
     1995, section 5.3).
     """
     if request.stance.flat:
-        pieces, degree, (nodes, weights) = 1, 3, lobatto(request.intervals)
-    else:
-        pieces, degree, (nodes, weights) = request.intervals, POINTS + 1, gauss(POINTS)
-    return degree, Instants(
+        return 3, _one_piece(request.intervals)
+    pieces, (nodes, weights) = request.intervals, gauss(POINTS)
+    return POINTS + 1, Instants(
         pieces,
         np.repeat(np.arange(pieces), nodes.size),
         np.tile(nodes, pieces),
         np.tile(weights, pieces) / pieces,
     )
+
+
+def coarse(program: Program) -> Program:
+    """Return a program of one piece with fewer instants; others as they are."""
+    request = program.request
+    if program.instants.pieces > 1 or request.intervals <= ROUGH:
+        return program
+    return replace(program, instants=_one_piece(ROUGH))
+
+
+def _one_piece(intervals: int) -> Instants:
+    """Nodes of Gauss and Lobatto on one piece."""
+    nodes, weights = lobatto(intervals)
+    return Instants(1, np.zeros(nodes.size, np.int64), nodes, weights)
 
 
 @dataclass(frozen=True)
@@ -141,9 +168,14 @@ class Program:
     """Whether guesses are nearly optima."""
     inside: bool = False
     """Whether guesses satisfy all constraints."""
+    hasty: bool = False
+    """Whether to give up soon."""
     elastic: bool = False
     """Let every constraint be violated and minimise the sum of the scaled violations instead of the
     effort: shows which constraints are in conflict when there is no solution."""
+
+    kept: dict[str, Any] = field(default_factory=dict, repr=False)
+    """What programs on other instants, or for other starts, have in common with it."""
 
     def __post_init__(self) -> None:
         n, pieces = self.transcription.size, self.instants.pieces
@@ -155,7 +187,6 @@ class Program:
         self._places = [0, *np.cumsum(sizes).tolist()]
         self._gaps = n * (2 * pieces - 1)
         self._lower, self._upper = self._bounds()
-        self._build()
 
     @property
     def size(self) -> int:
@@ -260,10 +291,26 @@ class Program:
         values = np.concatenate([q[:, :-1], v / piece, a / piece**2], axis=1)
         return coefficients(values.reshape(n, self.degree + 1, count).transpose(2, 1, 0), piece)
 
-    def _build(self) -> None:
+    @cached_property
+    def _blocks(self) -> BlockProgram:
+        """Gaps between the pieces, then the blocks of touchdown and of the instants."""
+        x, gaps, touchdown = self._joins()
+        return BlockProgram(x, gaps, [touchdown, self._path(x)])
+
+    @cached_property
+    def _equations(self) -> tuple[Any, Any]:
+        """Constraints up to the last equation, and their Jacobian: of the path only if need be."""
+        if any(row.lower == row.upper for row in self.transcription.path_rows):
+            return self._with_slopes(self._blocks)
+        if "equations" not in self.kept:
+            x, gaps, touchdown = self._joins()
+            self.kept["equations"] = self._with_slopes(BlockProgram(x, gaps, [touchdown]))
+        value, slopes = self.kept["equations"]
+        return value, slopes
+
+    def _with_slopes(self, blocks: BlockProgram) -> tuple[Any, Any]:
         x = casadi.MX.sym("x", self.size)
-        self._blocks = self._of_blocks(x)
-        self._slopes = casadi.Function("slopes", [x], [self._blocks.jacobian(x)])
+        return blocks.value, casadi.Function("slopes", [x], [blocks.jacobian(x)])
 
     @cached_property
     def _solver(self) -> Ipopt:
@@ -288,27 +335,45 @@ class Program:
             x = casadi.vertcat(x, excess)
         return Ipopt(
             x, f, g, gradient=slope, jacobian=slopes, hessian=(price, prices, bend),
-            settings=NEAR if self.near else INSIDE if self.inside else SETTINGS,
+            settings=self._settings,
         )  # fmt: skip
 
-    def _of_blocks(self, x: Any) -> BlockProgram:
-        """Gaps between the pieces, then the blocks of touchdown and of the instants."""
-        q, v, _, duration, length = self._parts(x)
-        q_end, v_end, _ = self._along(x, self._ends)
-        gaps = casadi.veccat(q[:, 1:] - q_end, v[:, 1:] - v_end[:, :-1])
-        step = casadi.vertcat(duration, length)
-        count = self.instants.share.size
-        along = casadi.vertcat(*self._along(x, self.instants), casadi.repmat(step, 1, count))
-        landing = casadi.vertcat(q[:, -1], v_end[:, -1], v[:, 0], step)
-        path, touchdown = self.transcription.blocks(self.instants.pieces)
-        ground = self.request.under_foot
-        return BlockProgram(
-            x, gaps,
-            [
-                Copies.of(touchdown, np.zeros(1), x, landing, ground),
-                Copies.of(path, self.instants.weight, x, along, ground),
-            ],
-        )  # fmt: skip
+    @property
+    def _settings(self) -> dict[str, Any]:
+        """Settings of IPOPT."""
+        if self.hasty:
+            return HASTY
+        return NEAR if self.near else INSIDE if self.inside else SETTINGS
+
+    def _joins(self) -> tuple[Any, Any, Copies]:
+        """Symbols of the unknowns, the gaps between the pieces, and the touchdown."""
+        if "joins" not in self.kept:
+            x = casadi.MX.sym("x", self.size)
+            q, v, _, duration, length = self._parts(x)
+            q_end, v_end, _ = self._along(x, self._ends)
+            gaps = casadi.veccat(q[:, 1:] - q_end, v[:, 1:] - v_end[:, :-1])
+            landing = casadi.vertcat(q[:, -1], v_end[:, -1], v[:, 0], duration, length)
+            _, block = self.transcription.blocks(self.instants.pieces)
+            touchdown = Copies.of(block, np.zeros(1), x, landing, self.request.under_foot)
+            self.kept["joins"] = x, gaps, touchdown
+        x, gaps, touchdown = self.kept["joins"]
+        return x, gaps, touchdown
+
+    def _path(self, x: Any) -> Copies:
+        """Copies of the path, made of those of a program with fewer instants if there is one."""
+        instants = self.instants
+        known, copies = self.kept.get("path", (None, None))
+        more = None if known is None else instants.after(known)
+        if more is None or more.share.size:
+            new = instants if more is None else more
+            block, _ = self.transcription.blocks(instants.pieces)
+            step = casadi.repmat(casadi.vertcat(*self._parts(x)[3:]), 1, new.share.size)
+            along = casadi.vertcat(*self._along(x, new), step)
+            made = Copies.of(block, new.weight, x, along, self.request.under_foot)
+            copies = made if more is None else copies.joined(made)
+            self.kept["path"] = instants, copies
+        found: Copies = copies
+        return found
 
     def solve(self, guess: Floats, multipliers: Floats | None = None) -> Solution:
         """Solve from a guess of the unknowns and, near an optimum, of the multipliers.
@@ -316,6 +381,10 @@ class Program:
         Those of instants that are new are zero. An elastic program starts with the violations of
         the guess taken up by the excesses.
         """
+        if self.near and self.instants.pieces == 1:  # few unknowns, for dense matrices
+            found = self._optimum_near(guess, multipliers)
+            if found is not None:
+                return found
         size, more = self.size, 2 * (self._lower.size - self._gaps) if self.elastic else 0
         low, high = np.array([self.request.duration_bounds, self.request.length_bounds]).T
         lower = np.concatenate([np.full(size - 2, -np.inf), low, np.zeros(more)])
@@ -337,6 +406,32 @@ class Program:
             ended=str(statistics["return_status"]).replace("_", " ").lower(),
             multipliers=np.array(found["lam_g"]).ravel(),
         )
+
+    def _optimum_near(self, guess: Floats, multipliers: Floats | None) -> Solution | None:
+        """Solve by sequential quadratic programming; None if the guess is not near enough."""
+        step = np.eye(self.size)[-2:]  # whose bounds are constraints like others here
+
+        def slopes(x: Floats) -> Derivatives:
+            gradient, values, jacobian = self._blocks.first(x)
+            return gradient, np.append(values, x[-2:]), np.vstack([jacobian, step])
+
+        low, high = np.array([self.request.duration_bounds, self.request.length_bounds]).T
+        lower, upper = np.append(self._lower, low), np.append(self._upper, high)
+        free = lower < upper
+        relaxed = [RELAXED * np.maximum(np.abs(each), 1.0) * free for each in (lower, upper)]
+        priced = np.zeros(lower.size)
+        if multipliers is not None:
+            priced[: multipliers.size] = multipliers
+        found = optimum_near(
+            self.in_bounds(guess), priced, slopes,
+            lambda x, prices: self._blocks.second(x, 1.0, prices[:-2]),
+            (lower - relaxed[0], upper + relaxed[1]),
+        )  # fmt: skip
+        if found is None:
+            return None
+        unknowns, priced = found
+        cost = self._blocks.cost(unknowns)
+        return Solution(unknowns, cost, True, "solved by Newton's steps", priced[:-2])
 
     def in_bounds(self, unknowns: Floats) -> Floats:
         """Bring duration and length of the step within their bounds."""
@@ -401,9 +496,11 @@ class Program:
         """
         step = np.ptp([self.request.duration_bounds, self.request.length_bounds], axis=1) > 0.0
         free = np.append(np.full(self.size - 2, True), step)
+        value, slopes = self._equations
+        count = value.numel_out(1)
         found = satisfied(
-            unknowns, lambda x: np.array(self._blocks.value(x)[1]).ravel(), self._slopes,
-            (self._lower, self._upper), free,
+            unknowns, lambda x: np.array(value(x)[1]).ravel(), slopes,
+            (self._lower[:count], self._upper[:count]), free,
         )  # fmt: skip
         return found if is_no_worse(self._missing(found), self._missing(unknowns)) else unknowns
 
@@ -532,7 +629,7 @@ class Ipopt:
         KeyboardInterrupt
             At Ctrl-C, once the iteration under way has ended.
         """
-        with deferred_interrupts() as interrupted:
+        with deferred_interrupts() as interrupted, one_blas_thread():
             self._watch.stop = interrupted
             found = self._solver(**arguments)
         return found, self._solver.stats()

@@ -50,19 +50,30 @@ def held_between_nodes(program: Program, solution: Solution) -> tuple[Floats, bo
         missed = _missed(program, unknowns, fine)
         if not missed.share.size:
             return unknowns, solution.converged
-        program = replace(program, instants=program.instants.joined(missed), near=True)
-        solution = program.solve(unknowns, solution.multipliers)
-        if not solution.converged:
-            feasible = nearest_to_feasible(program)
-            solution = replace(program, near=False, inside=True).solve(feasible)
-            if not program.satisfied_by(solution):
-                solution = program.at(feasible)
+        program = replace(program, instants=program.instants.joined(missed))
+        solution = solved_again(program, unknowns, solution.multipliers)
     request = program.request
     raise GaitNotFoundError(
         f"robot {request.robot.name!r}: a gait with {request} satisfies the constraints at "
         f"{np.count_nonzero(program.instants.weight)} phases of a step but not between them. Try "
         "more intervals, or a slower step."
     )
+
+
+def solved_again(program: Program, unknowns: Floats, multipliers: Floats | None = None) -> Solution:
+    """Solve a program from the optimum of another, on other instants.
+
+    Raises
+    ------
+    GaitNotFoundError
+        If no point satisfies its constraints.
+    """
+    solution = replace(program, near=True).solve(unknowns, multipliers)
+    if solution.converged:
+        return solution
+    feasible = nearest_to_feasible(program)
+    solution = replace(program, inside=True).solve(feasible)
+    return solution if program.satisfied_by(solution) else program.at(feasible)
 
 
 def checked_instants(program: Program) -> Instants:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from heelstrike.arguments import takes
+from heelstrike.blas_threads import one_blas_thread
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.identification.base_parameters import BaseParameters, base_parameters
 from heelstrike.experiments.identification.equations import Equations
@@ -119,6 +120,7 @@ class Identified:
 
 
 @takes(SimulationError)
+@one_blas_thread()
 def identify(
     robot: Robot,
     log: RobotLog | Run,
