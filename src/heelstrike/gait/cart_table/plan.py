@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from heelstrike.arguments import takes
@@ -34,6 +36,8 @@ HEIGHTS = np.arange(0.99, 0.7, -0.01)
 """Heights of the centre of mass that are tried, as shares of that of the standing robot."""
 PIECES = (8, 16)
 """Pieces of polynomials in double and in single support."""
+SMALLER = (0.75, 0.5, 0.25, 0.1)
+"""Shares of clearance and length at which steps are tried where legs do not reach."""
 SHORTEST, LONGEST = 0.1, 10.0
 """Durations (s) of steps that are planned."""
 CORRECTIONS = 2
@@ -126,8 +130,16 @@ def plan_motion(
         tuple(looked_at(phase.pieces) for phase in phases),
     )  # fmt: skip
     step = Step(robot, step_length, step_duration, both, clearance)
-    planned = _planned(step, way, height, corrections)
-    return motion_of(program, program.polished(_unknowns(program, planned, friction)), False)
+    try:
+        planned = _planned(step, way, height, corrections)
+        unknowns = _unknowns(program, planned, friction)
+    except np.linalg.LinAlgError:
+        raise InfeasibleGaitError(
+            f"with the centre of mass at this height a leg of robot {robot.name!r} is straight or "
+            "folded up, so that its joints do not follow from the feet. Ask for another height, or "
+            "leave it out."
+        ) from None
+    return motion_of(program, program.polished(unknowns), False)
 
 
 def _check_numbers(
@@ -172,18 +184,32 @@ def _planned(step: Step, planner: Planner, height: float | None, corrections: in
     state = robot.reference_state()
     soles = [sole(robot, foot) for foot in robot.feet]
     standing = float(center_of_mass(robot, state.q)[1]) - lowest(robot, state.q, soles)
+    found = _highest(step, planner, standing)
+    if found is not None:
+        return _corrected(step, planner, found.height, corrections)
+    short = (
+        f"the legs of robot {robot.name!r} are too short for steps of {step.length:.3g} m with a "
+        f"clearance of {step.clearance:.3g} m at any height of the centre of mass from "
+        f"{HEIGHTS[-1] * standing:.3g} m on."
+    )
+    for name, told in (("clearance", "clearance"), ("length", "step_length")):
+        for share in SMALLER:
+            value = share * getattr(step, name)
+            if _highest(replace(step, **{name: value}), planner, standing) is not None:
+                raise InfeasibleGaitError(f"{short} They reach with {told} = {value:.3g} m.")
+    raise InfeasibleGaitError(f"{short} Ask for shorter steps and less clearance.")
+
+
+def _highest(step: Step, planner: Planner, standing: float) -> Planned | None:
+    """Plan at the greatest height at which no leg is stretched, if there is one."""
     for share in HEIGHTS:
         try:
             planned = _corrected(step, planner, share * standing, 0)
             if _stretched(planned) <= STRETCHED:
-                return _corrected(step, planner, share * standing, corrections)
+                return planned
         except (InfeasibleGaitError, np.linalg.LinAlgError):
             continue
-    raise InfeasibleGaitError(
-        f"the legs of robot {robot.name!r} are too short for steps of {step.length:.3g} m at any "
-        f"height of the centre of mass from {HEIGHTS[-1] * standing:.3g} m on. Ask for shorter "
-        "steps."
-    )
+    return None
 
 
 def _stretched(planned: Planned) -> float:
