@@ -147,6 +147,13 @@ class Request:
                 f"{self.stance.half_length:g} m to each side of its middle. Ask for "
                 "less."
             )
+        falls = self.profiles == (ClearanceProfile.PARABOLA,) and self.clearance > 0.0
+        if falls and not self.impact:
+            raise InfeasibleGaitError(
+                "the clearance_profile 'parabola' comes down at an angle, and without impact the "
+                "foot comes to rest as it lands: it cannot stay above. Ask for 'smooth', or leave "
+                "the profile out."
+            )
         self._check_weight()
 
     def _check_weight(self) -> None:
@@ -306,7 +313,7 @@ def check_slope(robot: Robot, slope: float, friction: float, scale: float) -> No
         raise InfeasibleGaitError(
             f"robot {robot.name!r} cannot stay on a slope of {slope:g} rad with friction = "
             f"{friction:g}: to carry its weight there, the ground needs friction of at least "
-            f"{least:.4g}. Ask for that, or for a slope up to {steepest:.4g} rad."
+            f"{least:.4g}. Ask for that, or for slopes up to {steepest:.4g} rad."
         )
 
 

@@ -367,6 +367,14 @@ def _check_states(request: MotionRequest) -> MotionRequest:
             continue
         if not (np.all(np.isfinite(state.q)) and np.all(np.isfinite(state.v))):
             raise GaitError(f"{name} must have finite positions and velocities")
+        beyond = np.maximum(robot.model.lower - state.q, state.q - robot.model.upper)
+        if beyond.max() > ON_THE_GROUND:
+            j = int(np.argmax(beyond))
+            raise GaitError(
+                f"at the {name} {robot.joint_names[j]} is at {state.q[j]:.3g}, beyond its range "
+                f"from {robot.model.lower[j]:.3g} to {robot.model.upper[j]:.3g}. Give a state "
+                "within the ranges of all joints."
+            )
         centers = contact_positions(robot, state.q)
         heights = centers @ up - robot.model.contact_radius
         for i in sorted(stands.points):
@@ -571,12 +579,14 @@ def _not_found(program: MotionProgram, unknowns: Floats) -> str:
         row, phase, _ = program.labels[k]
         text = f"{row.kind.text} ({row.subject}) in phase {phase + 1}"
         if missing[k] > FEASIBLE and not any(line.startswith(text) for line in lines):
-            lines.append(f"{text}: {missing[k] * row.unit:.3g} {row.kind.unit}")
+            lines.append(f"{text}: {missing[k] * row.unit:.3g} {row.kind.unit}".rstrip())
     if not lines:
         lines.append("pieces and phases that join, and what is asked of the whole motion")
+    own = any(line.startswith(Kind.OWN.text) for line in lines[:4])
+    advice = "Ask less of your own constraint, or give" if own else "Give"
     return (
         "no such motion was found, which does not mean that there is none. Where the optimiser "
-        f"came nearest, these are violated: {'; '.join(lines[:4])}. Give the phases more time, "
+        f"came nearest, these are violated: {'; '.join(lines[:4])}. {advice} the phases more time, "
         "more friction, a shorter distance, or durations nearer to what you expect."
     )
 
