@@ -48,7 +48,8 @@ OURS = {*INSTEAD, "Snapshot", "Simulation", "ActiveContacts", "Encoders", "Inert
 """Classes of ours that an annotation may name."""
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
+    """Whether a value is one real number."""
     if isinstance(value, np.ndarray):
         return value.size == 1 and value.dtype.kind in NUMBERS
     return isinstance(value, Real) and not isinstance(value, (bool, np.bool_))
@@ -76,7 +77,7 @@ def _are_items(value: object) -> bool:
 
 
 _KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
-    "float": ("a number", _is_number),
+    "float": ("a number", is_number),
     "int": ("a whole number", _is_whole),
     "bool": ("True or False", lambda value: isinstance(value, (bool, np.bool_))),
     "str": ("a text", lambda value: isinstance(value, str)),

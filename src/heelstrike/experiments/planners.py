@@ -18,7 +18,7 @@ from rich.table import Table
 from heelstrike.analysis import zero_moment_point
 from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
 from heelstrike.analysis.told_summary import plain
-from heelstrike.arguments import takes
+from heelstrike.arguments import is_number, takes
 from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque
 from heelstrike.errors import GaitError, InfeasibleGaitError
@@ -142,9 +142,10 @@ def compare_planners(
     GaitError
         If the robot cannot be planned for, or an argument makes no sense.
     """
-    several = [float(speed) for speed in speeds]
-    if not several or not all(np.isfinite(speed) and speed > 0.0 for speed in several):
-        raise GaitError(f"speeds must be positive numbers (m/s), got {several}")
+    given = [speeds] if isinstance(speeds, str | int) else list(speeds)
+    if not given or not all(is_number(x) and np.isfinite(x) and x > 0.0 for x in given):
+        raise GaitError(f"speeds must be positive numbers (m/s), got {given}")
+    several = [float(speed) for speed in given]
     tell, walks = progress or (lambda _: None), []
     for speed in several:
         step: dict[str, Any] = {

@@ -87,11 +87,11 @@ def costs_of(asked: Any) -> dict[Cost, float] | OwnCost:
     """
     if callable(asked):
         return asked
-    named: dict[Any, Any] = dict(asked) if isinstance(asked, Mapping) else {asked: 1.0}
     try:
-        weights = {Cost(name): float(weight) for name, weight in named.items()}
+        named = list(asked.items()) if isinstance(asked, Mapping) else [(asked, 1.0)]
+        weights = {Cost(name): float(weight) for name, weight in named}
     except (TypeError, ValueError):
-        weights = {}
+        named, weights = [], {}
     if not weights or not all(np.isfinite(w) and w > 0.0 for w in weights.values()):
         names = ", ".join(repr(cost.value) for cost in Cost)
         raise GaitError(
@@ -99,4 +99,6 @@ def costs_of(asked: Any) -> dict[Cost, float] | OwnCost:
             f"{{'torque': 1.0, 'mechanical_energy': 10.0}}, or a function of an instant, "
             f"got {asked!r}"
         )
+    if len(weights) < len(named):
+        raise GaitError(f"cost names one cost twice: {asked!r}. Give one weight to each.")
     return weights

@@ -9,6 +9,7 @@ from typing import Any
 import casadi
 import numpy as np
 
+from heelstrike.arguments import shown
 from heelstrike.dynamics.queries.symbolic import expression
 from heelstrike.errors import GaitError
 from heelstrike.gait.cost import Cost, Instant, OwnCost
@@ -122,7 +123,7 @@ def own_expression(what: str, function: Callable[[Instant], Any], now: Instant) 
     """
     absent = [each.name for each in fields(now) if getattr(now, each.name) is None]
     try:
-        found = casadi.SX(function(now))
+        value = function(now)
     except Exception as error:
         said = f"the {what} function failed: {type(error).__name__}: {error}"
         if absent and "None" in str(error):
@@ -131,6 +132,15 @@ def own_expression(what: str, function: Callable[[Instant], Any], now: Instant) 
                 "of one step these are None."
             )
         raise GaitError(said) from error
+    try:
+        found = casadi.SX(value)
+    except (TypeError, ValueError, NotImplementedError):
+        raise GaitError(
+            f"the {what} function must return a number or an expression of CasADi, got "
+            f"{shown(value)}"
+        ) from None
+    if any(each.is_constant() and not each.is_regular() for each in found.elements()):
+        raise GaitError(f"the {what} function returns what is no finite number: {found}")
     known = casadi.vertcat(now.position, now.velocity, now.torque, now.force)
     for each in (now.acceleration, now.time, now.stands, now.share, now.torque_rate):
         if each is not None:
@@ -141,6 +151,22 @@ def own_expression(what: str, function: Callable[[Instant], Any], now: Instant) 
             f"the {what} function uses symbols that no instant has: {', '.join(sorted(unknown))}"
         )
     return found
+
+
+def undefined(what: str, where: str) -> GaitError:
+    """Error of a function of one's own that has no value.
+
+    Parameters
+    ----------
+    what : str
+        What it is: a cost, a constraint.
+    where : str
+        Of which motion it has none.
+    """
+    return GaitError(
+        f"the {what} function is no finite number {where}. It must be one for every motion, those "
+        "that break limits included: look at its roots, logarithms and quotients."
+    )
 
 
 def instant_of(

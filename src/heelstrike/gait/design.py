@@ -10,6 +10,7 @@ from itertools import islice
 import numpy as np
 
 from heelstrike.gait.clearance import ClearanceProfile
+from heelstrike.gait.cost_rate import undefined
 from heelstrike.gait.gait import Footing, Gait, Phase, actuated_joints, fingerprint
 from heelstrike.gait.infeasible import nearest_to_feasible
 from heelstrike.gait.margins import Margins
@@ -33,6 +34,8 @@ def designed(request: Request, profile: ClearanceProfile, report: Callable[[floa
     report(0.05)
     best = _best_of_starts(program, report)
     unknowns, optimal = held_between_nodes(program, best)
+    if not np.isfinite(program.cost(unknowns)):
+        raise undefined("cost", "of a gait that meets the request")
     report(1.0)
     return designed_gait(program, unknowns, optimal)
 
@@ -56,6 +59,8 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
             return solution
     rough = coarse(program)
     guesses = [rough.sampled(start) for start in islice(starts(request), request.starts)]
+    if not any(np.isfinite(rough.at(guess).objective) for guess in guesses):
+        raise undefined("cost", "of any motion from which the optimiser starts")
     solutions = [replace(rough, hasty=True).solve(guesses[0])]
     if not solutions[0].converged:
         # Perhaps no start can succeed, which ends here in an error that tells why. Otherwise a

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import enum
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from contextlib import suppress
 from itertools import product
 from os import PathLike
 from pathlib import Path
@@ -12,13 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import is_number, refusal, takes
 from heelstrike.errors import GaitError, InfeasibleGaitError, WriteError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.branches import Pair, Place, on_the_cheaper_branch, spending
 from heelstrike.gait.file import LARGEST_NUMBER, check_robot, entries_of, gait_of
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.optimize import optimize_gait, request_of
+from heelstrike.gait.request import STEP_UNITS
 from heelstrike.json_checksum import Entries, json_text, reading_json
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -57,6 +60,14 @@ class GaitFamily:
 
     def __getitem__(self, place: int | Place) -> Gait | None:
         where = place if isinstance(place, tuple) else (place,)
+        sizes = tuple(axis.size for axis in self.axes.values())
+        if len(where) != len(sizes) or not all(
+            i in range(size) for i, size in zip(where, sizes, strict=True)
+        ):
+            raise GaitError(
+                f"the family has {' x '.join(str(size) for size in sizes)} places, over "
+                f"{', '.join(self.axes)}: give an index of each axis, from 0 on; got {place!r}"
+            )
         return self.gaits.get(where)
 
     def at(self, **values: float) -> Gait:
@@ -110,6 +121,8 @@ class GaitFamily:
         along: list[list[tuple[int, float]]] = []
         for name, axis in self.axes.items():
             value = values[name]
+            if not is_number(value):
+                raise GaitError(refusal(name, value, ("float",)))
             if not axis[0] <= value <= axis[-1]:
                 raise GaitError(
                     f"{name} = {value:g} is outside of the family, {axis[0]:g} to {axis[-1]:g}"
@@ -231,13 +244,30 @@ def gait_family(
     unknown = set(asked).difference(inspect.signature(optimize_gait).parameters)
     if unknown:
         raise GaitError(f"optimize_gait takes no {', '.join(sorted(unknown))}")
+    if "warm_start" in asked:
+        raise GaitError(
+            "leave out warm_start: each gait of a family is started from its nearest neighbour"
+        )
     if not axes:
         raise GaitError(f"give a sequence of values of at least one of {', '.join(AXES)}")
-    fixed = {name: value for name, value in given.items() if np.ndim(value) == 0 and value}
+    if file is not None and callable(asked.get("cost")):
+        raise GaitError(
+            "a cost that is a function cannot be written to a file: leave out file, or ask for one "
+            "of the costs that have names"
+        )
+    fixed = {
+        name: value
+        for name, value in given.items()
+        if np.ndim(value) == 0 and value is not None and (value or name in STEP_UNITS)
+    }
     gaits: dict[Place, Gait] = {}
     gaps: dict[Place, str] = {}
     settled: set[Pair] = set()
-    family = GaitFamily(robot, axes, {**asked, **fixed}, gaits, gaps, settled)
+    family = GaitFamily(robot, axes, _as_written({**asked, **fixed}), gaits, gaps, settled)
+    places = list(_from_the_middle([axis.size for axis in axes.values()]))
+    for place in places:  # what makes no sense anywhere is refused before anything is designed
+        with suppress(InfeasibleGaitError):
+            request_of(robot, **family.asked, **_point(axes, place))
     if file is not None and Path(file).exists():
         saved = load_gait_family(file, robot)
         _check_same(family, saved)
@@ -246,10 +276,7 @@ def gait_family(
         settled.update(saved.settled)
 
     def designed(place: Place, near: Gait | None) -> Gait:
-        point: dict[str, Any] = {
-            name: float(axis[i]) for (name, axis), i in zip(axes.items(), place, strict=True)
-        }
-        return optimize_gait(robot, **family.asked, **point, warm_start=near)
+        return optimize_gait(robot, **family.asked, **_point(axes, place), warm_start=near)
 
     def sought(place: Place, near: Gait) -> Gait | None:
         try:
@@ -266,7 +293,6 @@ def gait_family(
         if progress is not None:
             progress(FIRST + (1.0 - FIRST) * share)
 
-    places = list(_from_the_middle([axis.size for axis in axes.values()]))
     for done, place in enumerate(places):
         if progress is not None:
             progress(FIRST * done / len(places))
@@ -341,6 +367,22 @@ def _axis(name: str, values: Any) -> Floats:
     ):
         raise GaitError(f"{name} must be a number, or numbers in rising order, got {values!r}")
     return axis
+
+
+def _point(axes: Mapping[str, Floats], place: Place) -> dict[str, Any]:
+    """Values of the axes at a place."""
+    return {name: float(axis[i]) for (name, axis), i in zip(axes.items(), place, strict=True)}
+
+
+def _as_written(value: Any) -> Any:
+    """Return arguments as a file has them: names of enums, numbers of Python, lists."""
+    if isinstance(value, Mapping):
+        return {_as_written(name): _as_written(each) for name, each in value.items()}
+    if isinstance(value, enum.Enum):
+        return value.value
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return [_as_written(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 def _check_same(family: GaitFamily, saved: GaitFamily) -> None:

@@ -270,6 +270,7 @@ class Gait(ShownInNotebooks):
                 "gait with optimize_gait."
             )
 
+    @takes(GaitError)
     def position(self, t: ArrayLike) -> Floats:
         """Joint positions at times of the walk, (..., nu), in rad.
 
@@ -287,6 +288,7 @@ class Gait(ShownInNotebooks):
         """
         return self._walk(t, 0)
 
+    @takes(GaitError)
     def velocity(self, t: ArrayLike) -> Floats:
         """Joint velocities at times of the walk, (..., nu), in rad/s.
 
@@ -304,6 +306,7 @@ class Gait(ShownInNotebooks):
         """
         return self._walk(t, 1)
 
+    @takes(GaitError)
     def acceleration(self, t: ArrayLike) -> Floats:
         """Joint accelerations at times of the walk, (..., nu), in rad/s². See :meth:`position`.
 

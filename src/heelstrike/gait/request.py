@@ -43,6 +43,9 @@ NUMBERS = {
 STEEPEST = 1.0
 """Slope (rad) from which on no gait is looked for."""
 
+ROUNDING = 1e-12
+"""Difference of angles (rad) that counts as rounding."""
+
 SHORTEST_STEP, LONGEST_STEP = 0.2, 40.0
 """Step durations that are considered, in units of the pendulum time sqrt(height / gravity)."""
 SHORTEST_FREE, LONGEST_FREE = 0.5, 8.0
@@ -144,11 +147,27 @@ class Request:
                 f"{self.stance.half_length:g} m to each side of its middle. Ask for "
                 "less."
             )
-        if self.force_margin >= robot.weight:
-            raise GaitError(
-                f"force_margin = {self.force_margin:g} N is more than the robot's weight, "
-                f"{robot.weight:g} N, which the ground carries on average."
+        falls = self.profiles == (ClearanceProfile.PARABOLA,) and self.clearance > 0.0
+        if falls and not self.impact:
+            raise InfeasibleGaitError(
+                "the clearance_profile 'parabola' comes down at an angle, and without impact the "
+                "foot comes to rest as it lands: it cannot stay above. Ask for 'smooth', or leave "
+                "the profile out."
             )
+        self._check_weight()
+
+    def _check_weight(self) -> None:
+        """Refuse forces that cannot carry the weight: over a step, that is what the ground does."""
+        robot, carried = self.robot, self.robot.weight * float(np.cos(self.slope))
+        if self.force_margin >= carried:
+            more = f"the robot's weight, {robot.weight:g} N, which"
+            if self.slope:
+                more = f"the {carried:g} N of the robot's weight that, across this slope,"
+            raise GaitError(
+                f"force_margin = {self.force_margin:g} N is more than {more} the ground carries on "
+                "average. Ask for less."
+            )
+        check_slope(robot, self.slope, self.friction, self._scale)
 
     def _check_number(self, name: str, unit: str) -> None:
         """Make a number a float, once it is one: positive, of some unit, or not negative."""
@@ -226,8 +245,13 @@ class Request:
     @property
     def cone(self) -> float:
         """Coefficient of friction under the feet: that of the ground, as their points scale it."""
+        return self.friction * self._scale
+
+    @property
+    def _scale(self) -> float:
+        """What friction of the ground is multiplied by under the feet."""
         under = [i for foot in self.robot.feet for i in foot.contacts]
-        return self.friction * float(self.robot.model.friction_scale[under].min())
+        return float(self.robot.model.friction_scale[under].min())
 
     @property
     def pendulum_time(self) -> float:
@@ -256,7 +280,41 @@ class Request:
     def __str__(self) -> str:
         given = [name for name in STEP_UNITS if getattr(self, name) is not None]
         asked = [f"{name} = {getattr(self, name):g} {STEP_UNITS[name]}" for name in given]
+        ground = {"slope": (self.slope, "rad"), "rise": (self.rise, "m")}
+        asked += [f"{name} = {value:g} {unit}" for name, (value, unit) in ground.items() if value]
         return ", ".join([*asked, f"friction = {self.friction:g}"])
+
+
+def check_slope(robot: Robot, slope: float, friction: float, scale: float) -> None:
+    """Refuse slopes on which friction cannot carry a robot that repeats its motion.
+
+    In the mean over a repetition the ground carries the weight, by forces and by impulses of
+    landings, and the mean of what is in a cone is in it, too. Gravity points down.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    slope : float
+        Angle of the ground (rad).
+    friction : float
+        Coefficient of friction of the ground.
+    scale : float
+        What that is multiplied by under the feet, at most.
+
+    Raises
+    ------
+    InfeasibleGaitError
+        If friction is too small.
+    """
+    steepest = float(np.arctan(friction * scale))
+    if abs(slope) > steepest + ROUNDING:
+        least = np.tan(abs(slope)) / scale if scale > 0.0 else np.inf
+        raise InfeasibleGaitError(
+            f"robot {robot.name!r} cannot stay on a slope of {slope:g} rad with friction = "
+            f"{friction:g}: to carry its weight there, the ground needs friction of at least "
+            f"{least:.4g}. Ask for that, or for slopes up to {steepest:.4g} rad."
+        )
 
 
 def _profiles(

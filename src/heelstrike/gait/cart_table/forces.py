@@ -70,9 +70,11 @@ def shared_forces(
 def _cones(robot: Robot, stands: Standing, friction: float) -> Floats:
     """Rows that are not negative where the ground pushes and no foot slips, by the forces."""
     unit = dict(zip(stands.forces, np.eye(len(stands.forces)), strict=True))
-    link, rows = robot.model.contact_link, [unit[2 * i] for i in stands.normal]
+    link, scale = robot.model.contact_link, robot.model.friction_scale
+    rows = [unit[2 * i] for i in stands.normal]
     for i in stands.tangent:
-        normal = np.sum([unit[2 * j] for j in stands.normal if link[j] == link[i]], axis=0)
+        foot = [j for j in stands.normal if link[j] == link[i]]
+        normal = np.sum([scale[j] * unit[2 * j] for j in foot], axis=0)
         rows += [friction * normal + unit[2 * i + 1], friction * normal - unit[2 * i + 1]]
     return np.array(rows)
 

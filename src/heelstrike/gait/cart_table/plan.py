@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from heelstrike.arguments import takes
@@ -34,6 +37,13 @@ HEIGHTS = np.arange(0.99, 0.7, -0.01)
 """Heights of the centre of mass that are tried, as shares of that of the standing robot."""
 PIECES = (8, 16)
 """Pieces of polynomials in double and in single support."""
+ROUGH = 1e3
+"""Coefficient of friction with which nothing slips."""
+SHORTEST_PART = 0.02
+"""Duration (s) of double and of single support from which on the plan, which has a sample every
+5 ms, knows of them."""
+SMALLER = (0.75, 0.5, 0.25, 0.1)
+"""Shares of clearance and length at which steps are tried where legs do not reach."""
 SHORTEST, LONGEST = 0.1, 10.0
 """Durations (s) of steps that are planned."""
 CORRECTIONS = 2
@@ -138,17 +148,19 @@ def _check_numbers(
         ("step_length", step_length, " (m)"), ("step_duration", step_duration, " (s)"),
         ("height", 1.0 if height is None else height, " (m)"), ("clearance", clearance, " (m)"),
     ):  # fmt: skip
-        if not (np.isfinite(value) and value > 0.0):
+        if np.ndim(value) or not (np.isfinite(value) and value > 0.0):
             raise GaitError(f"{name} must be a positive number{unit}, got {value!r}")
     if not SHORTEST <= step_duration <= LONGEST:
         raise GaitError(
             f"step_duration must be from {SHORTEST:g} to {LONGEST:g} s, got {step_duration:g}"
         )
-    if not 0.0 < double_support < 1.0:
+    least = SHORTEST_PART / step_duration
+    if np.ndim(double_support) or not least <= double_support <= 1.0 - least:
         raise GaitError(
-            f"double_support is a part of the step, between 0 and 1, not {double_support}"
+            f"double_support is a part of the step, between {least:.3g} and {1.0 - least:.3g} of "
+            f"one of {step_duration:g} s, so that the plan sees both parts; got {double_support}"
         )
-    if not (isinstance(corrections, int) and 0 <= corrections <= 10):
+    if not (isinstance(corrections, int | np.integer) and 0 <= corrections <= 10):
         raise GaitError(f"corrections must be a whole number from 0 to 10, got {corrections!r}")
 
 
@@ -167,23 +179,58 @@ def _check_robot(robot: Robot) -> None:
 def _planned(step: Step, planner: Planner, height: float | None, corrections: int) -> Planned:
     """Plan at a height, or at the greatest at which no leg is stretched."""
     robot = step.robot
-    if height is not None:
-        return _corrected(step, planner, height, corrections)
     state = robot.reference_state()
     soles = [sole(robot, foot) for foot in robot.feet]
     standing = float(center_of_mass(robot, state.q)[1]) - lowest(robot, state.q, soles)
+    if height is not None:
+        try:
+            planned = _corrected(step, planner, height, corrections)
+            planned.coordinates(step.samples)
+        except (InfeasibleGaitError, np.linalg.LinAlgError) as error:
+            raise InfeasibleGaitError(_at_another(step, planner, height, standing, error)) from None
+        return planned
+    found = _highest(step, planner, standing)
+    if found is not None:
+        return _corrected(step, planner, found.height, corrections)
+    short = (
+        f"the legs of robot {robot.name!r} are too short for steps of {step.length:.3g} m with a "
+        f"clearance of {step.clearance:.3g} m at any height of the centre of mass from "
+        f"{HEIGHTS[-1] * standing:.3g} m on."
+    )
+    for name, told in (("clearance", "clearance"), ("length", "step_length")):
+        for share in SMALLER:
+            value = share * getattr(step, name)
+            if _highest(replace(step, **{name: value}), planner, standing) is not None:
+                raise InfeasibleGaitError(f"{short} They reach with {told} = {value:.3g} m.")
+    raise InfeasibleGaitError(f"{short} Ask for shorter steps and less clearance.")
+
+
+def _at_another(
+    step: Step, planner: Planner, height: float, standing: float, error: Exception
+) -> str:
+    """Say what is wrong at a height, and at which legs reach."""
+    wrong = str(error)
+    if not isinstance(error, InfeasibleGaitError):  # a matrix without an inverse
+        wrong = (
+            f"with the centre of mass at {height:.3g} m a leg of robot {step.robot.name!r} is "
+            "straight or folded up, so that its joints do not follow from the feet."
+        )
+    found = _highest(step, planner, standing)
+    if found is None:
+        return f"{wrong} Leave the height out, and you are told which steps the legs reach."
+    return f"{wrong} They reach with height = {found.height:.3g} m."
+
+
+def _highest(step: Step, planner: Planner, standing: float) -> Planned | None:
+    """Plan at the greatest height at which no leg is stretched, if there is one."""
     for share in HEIGHTS:
         try:
             planned = _corrected(step, planner, share * standing, 0)
             if _stretched(planned) <= STRETCHED:
-                return _corrected(step, planner, share * standing, corrections)
+                return planned
         except (InfeasibleGaitError, np.linalg.LinAlgError):
             continue
-    raise InfeasibleGaitError(
-        f"the legs of robot {robot.name!r} are too short for steps of {step.length:.3g} m at any "
-        f"height of the centre of mass from {HEIGHTS[-1] * standing:.3g} m on. Ask for shorter "
-        "steps."
-    )
+    return None
 
 
 def _stretched(planned: Planned) -> float:
@@ -233,13 +280,25 @@ def _unknowns(program: MotionProgram, planned: Planned, friction: float) -> Floa
         for t, *state in zip(inner.tolist(), *motion, strict=True):
             force = shared_forces(step.robot, program.request.standing[p], friction, *state)
             if force is None:
-                there = zero_moment_point(step.robot, *(each[None] for each in state))[0]
-                raise InfeasibleGaitError(
-                    f"at {t:.3g} s of the step the ground would have to pull, or "
-                    f"friction to exceed its limit: the zero moment point is {there:.3g} "
-                    "m ahead of the middle of the front foot. Ask for slower or shorter "
-                    "steps, or for more corrections."
-                )
+                raise InfeasibleGaitError(_not_carried(step, program, p, t, state))
             found.append(force)
         forces.append(np.array(found).T)
     return program.packed(positions, velocities, accelerations, forces, durations, step.length)
+
+
+def _not_carried(
+    step: Step, program: MotionProgram, p: int, t: float, state: Sequence[Floats]
+) -> str:
+    """Say why the ground cannot move the robot so at a time of the step (s)."""
+    robot = step.robot
+    if shared_forces(robot, program.request.standing[p], ROUGH, *state) is not None:
+        return (
+            f"at {t:.3g} s of the step friction would have to exceed its limit. Ask for more "
+            "friction, or for slower or shorter steps."
+        )
+    there = zero_moment_point(robot, *(each[None] for each in state))[0]
+    return (
+        f"at {t:.3g} s of the step the ground would have to pull: the zero moment point is "
+        f"{there:.3g} m ahead of the middle of the front foot. Ask for slower or shorter steps, "
+        "for more double support, or for more corrections."
+    )

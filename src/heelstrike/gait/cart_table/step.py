@@ -128,8 +128,7 @@ class Planned:
             q = q + change / max(1.0, 2.0 * np.abs(change).max())
         raise InfeasibleGaitError(
             f"the legs of robot {robot.name!r} do not reach with the centre of mass at "
-            f"{self.height:.3g} m: {np.abs(missing).max():.2g} m are missing. Ask for a lower "
-            "height or a shorter step."
+            f"{self.height:.3g} m: {np.abs(missing).max():.2g} m are missing."
         )
 
 

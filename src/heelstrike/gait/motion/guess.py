@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from heelstrike.arguments import are_numbers, shown
 from heelstrike.dynamics import contact_positions, inverse_kinematics
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.errors import GaitError, RobotError
@@ -116,11 +117,17 @@ class _Given(_Drawing):
         del phase
         request = self._request
         assert request.guess is not None
-        found = np.asarray(request.guess(time), dtype=np.float64)
+        try:
+            given = request.guess(time)
+        except Exception as error:
+            raise GaitError(
+                f"the guess function failed at {time:.3g} s: {type(error).__name__}: {error}"
+            ) from error
+        found = np.asarray(given if are_numbers(given) else np.nan, dtype=np.float64)
         if found.shape != (request.robot.nv,) or not np.all(np.isfinite(found)):
             raise GaitError(
                 f"guess must return {request.robot.nv} finite positions, of all coordinates; at "
-                f"{time:.3g} s it returned {found!r}"
+                f"{time:.3g} s it returned {shown(given)}"
             )
         return found
 

@@ -232,11 +232,11 @@ class MotionFunctions:
         self, rows: Rows, pushes: Symbols, kinds: tuple[Kind, Kind], unit: float
     ) -> None:
         """Every point pushes, and the points of a foot together stay in its friction cone."""
-        robot = self.robot
+        robot, scale = self.robot, self.robot.model.friction_scale.tolist()
         for i, name in enumerate(robot.contact_names):
             rows.add(kinds[0], pushes[2 * i], subject=name, unit=unit, of=i)
         for contacts, name in links_with_points(robot):
-            normal = sum(pushes[2 * i] for i in contacts)
+            normal = sum(scale[i] * pushes[2 * i] for i in contacts)
             tangent = sum(pushes[2 * i + 1] for i in contacts)
             for side in (1.0, -1.0):
                 cone = self.friction * normal - side * tangent

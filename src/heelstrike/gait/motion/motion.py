@@ -187,6 +187,7 @@ class Motion(ShownInNotebooks):
         """Times at which the phases end, (phases,), in s."""
         return np.cumsum([phase.duration for phase in self.phases])
 
+    @takes(GaitError)
     def position(self, t: ArrayLike) -> Floats:
         """All coordinates at times of the motion, (..., nv).
 
@@ -203,6 +204,7 @@ class Motion(ShownInNotebooks):
         """
         return self._whole(t, 0)
 
+    @takes(GaitError)
     def velocity(self, t: ArrayLike) -> Floats:
         """Velocities at times of the motion, (..., nv): just after a landing, at one.
 
@@ -218,6 +220,7 @@ class Motion(ShownInNotebooks):
         """
         return self._whole(t, 1)
 
+    @takes(GaitError)
     def acceleration(self, t: ArrayLike) -> Floats:
         """Accelerations at times of the motion, (..., nv).
 

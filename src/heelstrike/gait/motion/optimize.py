@@ -19,9 +19,10 @@ from heelstrike.dynamics import (
     loop_jacobian,
     point_jacobian,
 )
-from heelstrike.errors import GaitError, GaitNotFoundError
+from heelstrike.errors import GaitError, GaitNotFoundError, InfeasibleGaitError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.cost import Cost, OwnConstraint, OwnCost, costs_of
+from heelstrike.gait.cost_rate import undefined
 from heelstrike.gait.gait import fingerprint
 from heelstrike.gait.motion.closing import Follower
 from heelstrike.gait.motion.guess import guess_of
@@ -43,6 +44,7 @@ from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.gait.motion.rows import Kind
 from heelstrike.gait.polynomials import Instants
 from heelstrike.gait.program import CLOSE, FEASIBLE
+from heelstrike.gait.request import check_slope
 from heelstrike.robot.loops import refuse_loops, row_names
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -259,13 +261,12 @@ def checked_request(
         )
     if len(phases) == 0 or not all(isinstance(each, ContactPhase) for each in phases):
         raise GaitError("phases must be one ContactPhase or more, in their order")
-    asked = {"duration": duration, "speed": speed}
-    for name, value in asked.items():
-        if value is not None and not (np.isfinite(value) and value > 0.0):
-            raise GaitError(f"{name} must be positive, got {value}")
+    speed, duration = (
+        _positive(name, value) for name, value in (("speed", speed), ("duration", duration))
+    )
     for name in ("friction", "clearance", "force_margin", "landing_speed"):
         if not (np.isfinite(others[name]) and others[name] >= 0.0):
-            raise GaitError(f"{name} must not be negative, got {others[name]}")
+            raise GaitError(f"{name} must not be negative or infinite, got {others[name]}")
     if not abs(others["slope"]) < STEEPEST:
         raise GaitError(f"slope must be between -{STEEPEST} and {STEEPEST} rad")
     fixed = goes_on is Repeat.NEVER
@@ -297,9 +298,55 @@ def checked_request(
         total=duration, distance=(low, high), **others,
     )  # fmt: skip
     request = _check_states(request)
-    if goes_on is not Repeat.NEVER and not any(each.points for each in request.standing):
-        raise GaitError("a motion that repeats needs a phase in which something stands")
+    if goes_on is not Repeat.NEVER:
+        _check_repetition(request)
     return request
+
+
+def _positive(name: str, value: Any) -> float | None:
+    """Return a number that was asked for, if it was."""
+    if value is None:
+        return None
+    if np.ndim(value) or not (np.isfinite(value) and value > 0.0):
+        raise GaitError(f"{name} must be positive, got {value}")
+    return float(value)
+
+
+def _check_repetition(request: MotionRequest) -> None:
+    """Refuse a motion that repeats where the ground cannot carry the weight, or feet not move."""
+    robot, model = request.robot, request.robot.model
+    if not any(each.points for each in request.standing):
+        raise GaitError("a motion that repeats needs a phase in which something stands")
+    if model.gravity[0] == 0.0 and model.gravity[1] < 0.0:
+        check_slope(robot, request.slope, request.friction, float(model.friction_scale.max()))
+        _check_force_margin(request)
+    low, high = request.distance
+    asked = f"{low:g} m" if low == high else f"{low:g} to {high:g} m"
+    if request.speed is not None:
+        asked = f"{request.speed:g} m/s"
+    for i in sorted(request.always_standing):
+        moves = request.speed is not None or not low <= 0.0 <= high
+        if moves and model.contact_radius[i] == 0.0:
+            raise InfeasibleGaitError(
+                f"{robot.contact_names[i]!r} stands in all phases, and as the motion repeats: it "
+                f"covers no distance, and {asked} are asked for. Add a phase in which it is in the "
+                "air, or ask for a distance of 0."
+            )
+
+
+def _check_force_margin(request: MotionRequest) -> None:
+    """Refuse forces on soles that are more than the weight, which the ground carries on average."""
+    ends = min(
+        sum(request.force_margin_of(p, point) > 0.0 for point in each.normal)
+        for p, each in enumerate(request.standing)
+    )
+    carried = request.robot.weight * float(np.cos(request.slope))
+    if ends * request.force_margin > carried:
+        raise InfeasibleGaitError(
+            f"force_margin = {request.force_margin:g} N at each of {ends} ends of soles or more at "
+            f"all times is more than the {carried:g} N of the robot's weight that the ground "
+            f"carries on average. Ask for less than {carried / ends:g} N."
+        )
 
 
 def _check_states(request: MotionRequest) -> MotionRequest:
@@ -318,6 +365,16 @@ def _check_states(request: MotionRequest) -> MotionRequest:
     ):
         if state is None:
             continue
+        if not (np.all(np.isfinite(state.q)) and np.all(np.isfinite(state.v))):
+            raise GaitError(f"{name} must have finite positions and velocities")
+        beyond = np.maximum(robot.model.lower - state.q, state.q - robot.model.upper)
+        if beyond.max() > ON_THE_GROUND:
+            j = int(np.argmax(beyond))
+            raise GaitError(
+                f"at the {name} {robot.joint_names[j]} is at {state.q[j]:.3g}, beyond its range "
+                f"from {robot.model.lower[j]:.3g} to {robot.model.upper[j]:.3g}. Give a state "
+                "within the ranges of all joints."
+            )
         centers = contact_positions(robot, state.q)
         heights = centers @ up - robot.model.contact_radius
         for i in sorted(stands.points):
@@ -425,13 +482,18 @@ def _distances(
         if speed is None:
             raise GaitError("give the distance or the speed of a motion that repeats")
         return 0.0, FARTHEST
-    given = distance if are_numbers(distance) else np.nan
+    given = distance if are_numbers(distance) and not isinstance(distance, bool) else np.nan
     bounds = np.atleast_1d(np.asarray(given, dtype=np.float64))
     bounds = np.repeat(bounds, 2) if bounds.size == 1 else bounds
     if bounds.shape != (2,) or not np.all(np.isfinite(bounds)) or bounds[0] > bounds[1]:
         raise GaitError(f"distance must be a number (m), or the least and greatest, got {distance}")
     if bounds[0] < 0.0 < bounds[1]:
         raise GaitError("a distance is forwards or backwards; its bounds must not have both signs")
+    if speed is not None and bounds[1] < 0.0:
+        raise GaitError(
+            f"a speed is forwards, and a distance of {distance} m is backwards. Give the distance "
+            "and a duration."
+        )
     if speed is not None and duration is not None and bounds[0] == bounds[1]:
         raise GaitError("give two of distance, duration and speed, not all three")
     return float(bounds[0]), float(bounds[1])
@@ -466,17 +528,21 @@ def _solved(
         starts = 1  # the straight way from one state to the other, or that which is known
     drawn = (guess_of(program, lean=lean, lowered=lowered) for lean, lowered in STARTS[:starts])
     for k, start in enumerate(chain(known, drawn)):
+        if not all(np.all(np.isfinite(np.array(each))) for each in program.value(start)):
+            continue  # only functions of one's own have no value
         unknowns, multipliers, told = program.solve(start)
         if told["return_status"] == "Solve_Succeeded":
             return _Found(program, unknowns, multipliers, True)
         missing = float(np.abs(program.violations(unknowns)).max())
         if missing <= FEASIBLE and feasible is None:
             feasible = _Found(program, unknowns, multipliers, False)
-        if missing < least:
+        if missing < least or not nearest.size:
             nearest, least = unknowns, missing
         report(0.1 + 0.6 * (k + 1) / starts)
     if feasible is not None:
         return feasible
+    if not nearest.size:
+        raise undefined("cost or constraint", "of any motion from which the optimiser starts")
     raise GaitNotFoundError(_not_found(program, nearest))
 
 
@@ -513,12 +579,14 @@ def _not_found(program: MotionProgram, unknowns: Floats) -> str:
         row, phase, _ = program.labels[k]
         text = f"{row.kind.text} ({row.subject}) in phase {phase + 1}"
         if missing[k] > FEASIBLE and not any(line.startswith(text) for line in lines):
-            lines.append(f"{text}: {missing[k] * row.unit:.3g} {row.kind.unit}")
+            lines.append(f"{text}: {missing[k] * row.unit:.3g} {row.kind.unit}".rstrip())
     if not lines:
         lines.append("pieces and phases that join, and what is asked of the whole motion")
+    own = any(line.startswith(Kind.OWN.text) for line in lines[:4])
+    advice = "Ask less of your own constraint, or give" if own else "Give"
     return (
         "no such motion was found, which does not mean that there is none. Where the optimiser "
-        f"came nearest, these are violated: {'; '.join(lines[:4])}. Give the phases more time, "
+        f"came nearest, these are violated: {'; '.join(lines[:4])}. {advice} the phases more time, "
         "more friction, a shorter distance, or durations nearer to what you expect."
     )
 

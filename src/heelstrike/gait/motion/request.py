@@ -77,6 +77,15 @@ class MotionRequest:
         return frozenset.intersection(*(each.points for each in self.standing))
 
     @cached_property
+    def always_standing(self) -> frozenset[int]:
+        """Points of a motion that repeats which stand in all phases of all repetitions."""
+        if self.repeat is not Repeat.MIRRORED:
+            return self.never_lifted
+        assert self.robot.mirror is not None
+        counterpart = self.robot.mirror.contact
+        return frozenset(i for i in self.never_lifted if int(counterpart[i]) in self.never_lifted)
+
+    @cached_property
     def standing_after(self) -> Standing:
         """What holds it after the last phase, as it goes on."""
         first = self.standing[0]

@@ -56,6 +56,8 @@ def times_at(rate: float, duration: float) -> Floats:
         If the rate makes no sense, or there were fewer times than a recording has.
     """
     check_rate(rate)
+    if not duration > 0.0:
+        raise GaitError(f"a table of {duration:.3g} s has no rows: ask for one repetition or more")
     count = round(rate * duration)
     if count + 1 < FEWEST:
         raise GaitError(
