@@ -15,14 +15,10 @@ lets it walk on ground on which it slips, and on ground on which it does not.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-
-# Matrices are small here: with several threads the processor is busy four times as long.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 

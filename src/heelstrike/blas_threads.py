@@ -24,7 +24,7 @@ def _threadpools() -> Any:
     """Return threadpoolctl, which knows the library of CasADi by its name."""
     import threadpoolctl
 
-    class CasadiBlas(threadpoolctl.OpenBLASController):
+    class CasadiBlas(threadpoolctl.OpenBLASController):  # type: ignore[misc]
         """OpenBLAS in CasADi's wheels, which IPOPT's linear solver calls."""
 
         filename_prefixes = ("libcasadi-tp-openblas",)

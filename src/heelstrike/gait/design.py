@@ -12,7 +12,7 @@ import numpy as np
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.cost_rate import undefined
 from heelstrike.gait.gait import Footing, Gait, Phase, actuated_joints, fingerprint
-from heelstrike.gait.infeasible import nearest_to_feasible
+from heelstrike.gait.infeasible import ATTEMPTS, nearest_to_feasible
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.program import Program, Solution, coarse, first_instants
 from heelstrike.gait.refinement import checked_instants, held_between_nodes, solved_again
@@ -65,8 +65,8 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
     if not solutions[0].converged:
         # Perhaps no start can succeed, which ends here in an error that tells why. Otherwise a
         # point that satisfies all constraints is as good a start as can be.
-        left = program.profile is not request.profiles[-1]
-        feasible = nearest_to_feasible(rough, *([1] if left else []))
+        last = program.profile is request.profiles[-1]
+        feasible = nearest_to_feasible(rough, ATTEMPTS if last else 1)
         solutions = [replace(rough, inside=True).solve(feasible), rough.solve(guesses[0])]
     for k, guess in enumerate(guesses[1:]):
         report(0.05 + 0.75 * (k + 1) / (len(guesses) + 1))

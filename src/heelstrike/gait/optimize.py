@@ -118,7 +118,8 @@ def optimize_gait(
         Intervals of the Gauss-Lobatto grid for quadrature and constraints, 26 by default; on point
         feet, intervals of the collocation mesh, 12 by default.
     starts : int
-        Starting points; the best of the optima reached from them is kept.
+        Starting points; the best of the optima reached from them is kept. On flat feet it is chosen
+        on a coarser grid.
     progress : callable, optional
         Called now and then with the fraction of the work that is done.
 

@@ -155,11 +155,11 @@ class Instants:
 
     def after(self, others: Instants) -> Instants | None:
         """Return those that were joined to others; None if these do not begin with the others."""
-        first, count = (self.piece, self.share, self.weight), others.share.size
-        known = (others.piece, others.share, others.weight)
-        if any(not np.array_equal(a[:count], b) for a, b in zip(first, known, strict=True)):
-            return None
-        return Instants(self.pieces, *(each[count:] for each in first))
+        count = others.share.size
+        for name in ("piece", "share", "weight"):
+            if not np.array_equal(getattr(self, name)[:count], getattr(others, name)):
+                return None
+        return Instants(self.pieces, self.piece[count:], self.share[count:], self.weight[count:])
 
     def matrix(self, degree: int, order: int) -> Floats:
         """Derivatives of all shape functions of all pieces, ((degree + 1) pieces, N).

@@ -23,9 +23,9 @@ MOST_STEPS = 12
 """Steps after which the start was not near enough: from the neighbour of a gait it takes 4 to 6."""
 STATIONARY = 1e-9
 """Size of the Lagrangian's gradient, relative to the cost's, that counts as zero."""
-MISSED = 1e-10
+SATISFIED = 1e-10
 """Violation of a scaled constraint that counts as zero."""
-DEPENDENT = 1e-10
+NEARLY_DEPENDENT = 1e-10
 """Relative size of a diagonal entry of R from which on constraints depend on each other."""
 
 Derivatives = tuple[Floats, Floats, Floats]
@@ -65,7 +65,7 @@ def optimum_near(
         missed = np.maximum(lower - value, value - upper).max()
         apart = np.where(priced > 0.0, upper - value, value - lower)[priced != 0.0]
         rest = np.abs(slope + slopes.T @ priced).max() / max(1.0, np.abs(slope).max())
-        if strict and max(missed, apart.max(initial=0.0)) <= MISSED and rest <= STATIONARY:
+        if strict and max(missed, apart.max(initial=0.0)) <= SATISFIED and rest <= STATIONARY:
             return unknowns, priced
         if step == MOST_STEPS:
             break
@@ -90,7 +90,7 @@ def _active(slope: Floats, slopes: Floats, bend: Floats, room: tuple[Floats, Flo
     held, free = _spaces(slopes[exact])
     begun = held @ low[exact]
     values, axes = np.linalg.eigh(free.T @ bend @ free)
-    least = DEPENDENT * np.abs(values).max(initial=0.0)
+    least = NEARLY_DEPENDENT * np.abs(values).max(initial=0.0)
     if values.size and not least > 0.0:
         raise np.linalg.LinAlgError("the Lagrangian has no curvature")
     wide = free @ (axes / np.sqrt(np.maximum(np.abs(values), least)))  # so that wideᵀ W wide = 1
@@ -138,6 +138,6 @@ def _spaces(rows: Floats) -> tuple[Floats, Floats]:
     basis, factor = np.linalg.qr(rows.T, mode="complete")
     factor = factor[:count]
     size = np.abs(np.diag(factor))
-    if count and size.min() < DEPENDENT * size.max():
+    if count and size.min() < NEARLY_DEPENDENT * size.max():
         raise np.linalg.LinAlgError("constraints depend on each other")
     return basis[:, :count] @ np.linalg.inv(factor).T, basis[:, count:]
