@@ -23,6 +23,12 @@ from heelstrike.robot.model import Floats
 from heelstrike.robot.motors import torque_range
 from heelstrike.robot.state import State
 
+SAME_COST = 1e-6
+"""Relative difference of the costs of two optima of the coarse grid from which on they differ."""
+NEARLY_BEST = 0.1
+"""How much dearer than the best of them one may be, relative to it, that is solved on the whole
+grid, too: there the order may be another."""
+
 
 def designed(request: Request, profile: ClearanceProfile, report: Callable[[float], None]) -> Gait:
     """Design a gait whose swing foot keeps above a profile; `report` is told the share of it.
@@ -58,25 +64,47 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
         if solution.converged:
             return solution
     rough = coarse(program)
-    guesses = [rough.sampled(start) for start in islice(starts(request), request.starts)]
+    begun = list(islice(starts(request), request.starts))
+    guesses = [rough.sampled(start) for start in begun]
     if not any(np.isfinite(rough.at(guess).objective) for guess in guesses):
         raise undefined("cost", "of any motion from which the optimiser starts")
     solutions = [replace(rough, hasty=True).solve(guesses[0])]
+    inside: list[Solution] = []
     if not solutions[0].converged:
         # Perhaps no start can succeed, which ends here in an error that tells why. Otherwise a
         # point that satisfies all constraints is as good a start as can be.
         last = program.profile is request.profiles[-1]
         feasible = nearest_to_feasible(rough, ATTEMPTS if last else 1)
-        solutions = [replace(rough, inside=True).solve(feasible), rough.solve(guesses[0])]
+        inside = [replace(rough, inside=True).solve(feasible)]
+        solutions = [rough.solve(guesses[0])]
     for k, guess in enumerate(guesses[1:]):
-        report(0.05 + 0.75 * (k + 1) / (len(guesses) + 1))
+        report(0.05 + 0.7 * (k + 1) / len(guesses))
         solutions.append(rough.solve(guess))
-    report(0.8)
-    good = [solution for solution in solutions if solution.converged]
+    report(0.75)
+    good = [solution for solution in (*inside, *solutions) if solution.converged]
+    if rough is not program and good:
+        # Optima that only the whole grid has are looked for, too.
+        lost = [start for start, at in zip(begun, solutions, strict=True) if not at.converged]
+        whole = [replace(program, near=True).solve(each.unknowns) for each in _different(good)]
+        whole += [program.solve(program.sampled(start)) for start in lost]
+        if found := [solution for solution in whole if solution.converged]:
+            return min(found, key=lambda solution: solution.objective)
     # Without an optimum, the best of the points that satisfy all constraints is better than none.
-    good = good or [rough.at(feasible), *filter(rough.satisfied_by, solutions)]
+    good = good or [rough.at(feasible), *filter(rough.satisfied_by, (*inside, *solutions))]
     best = min(good, key=lambda solution: solution.objective)
     return best if rough is program else solved_again(program, best.unknowns)
+
+
+def _different(optima: Sequence[Solution]) -> list[Solution]:
+    """Return one of those that cost the same each, of those that are nearly as good as the best."""
+    kept: list[Solution] = []
+    for each in sorted(optima, key=lambda solution: solution.objective):
+        if not kept or (
+            each.objective > (1.0 + SAME_COST) * kept[-1].objective
+            and each.objective <= (1.0 + NEARLY_BEST) * kept[0].objective
+        ):
+            kept.append(each)
+    return kept
 
 
 def designed_gait(program: Program, unknowns: Floats, optimal: bool) -> Gait:
