@@ -9,8 +9,10 @@ from __future__ import annotations
 import ctypes
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import casadi
@@ -68,6 +70,24 @@ def test_in_a_block_all_libraries_use_one_thread() -> None:
     assert set(before.values()) == {2}
     with one_blas_thread():
         assert set(threads().values()) == {1}
+    assert threads() == before
+
+
+def test_blocks_of_two_threads_end_with_the_last_of_them() -> None:
+    before, begun, ended = threads(), Event(), Event()
+
+    def block() -> None:
+        with one_blas_thread():
+            begun.set()
+            ended.wait(60.0)
+
+    with ThreadPoolExecutor(1) as pool:
+        with one_blas_thread():
+            other = pool.submit(block)
+            assert begun.wait(60.0)
+        assert set(threads().values()) == {1}
+        ended.set()
+        other.result()
     assert threads() == before
 
 

@@ -9,6 +9,7 @@ from itertools import islice
 
 import numpy as np
 
+from heelstrike.blas_threads import one_blas_thread
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.cost_rate import undefined
 from heelstrike.gait.gait import Footing, Gait, Phase, actuated_joints, fingerprint
@@ -30,6 +31,7 @@ NEARLY_BEST = 0.1
 grid, too: there the order may be another."""
 
 
+@one_blas_thread()
 def designed(request: Request, profile: ClearanceProfile, report: Callable[[float], None]) -> Gait:
     """Design a gait whose swing foot keeps above a profile; `report` is told the share of it.
 

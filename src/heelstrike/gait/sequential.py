@@ -127,7 +127,9 @@ def _held(
     moved = moved - free @ np.linalg.solve(inner, free.T @ (slope + bend @ moved))
     priced = np.zeros(len(slopes))
     priced[chosen] = -held.T @ (slope + bend @ moved)
-    return moved, priced, bool(np.linalg.eigvalsh(inner).min(initial=1.0) > 0.0)
+    values = np.linalg.eigvalsh(inner)
+    strict = values.min(initial=1.0) > DEPENDENT * np.abs(values).max(initial=0.0)
+    return moved, priced, bool(strict)
 
 
 def _spaces(rows: Floats) -> tuple[Floats, Floats]:
