@@ -43,7 +43,7 @@ NUMBERS = {
 STEEPEST = 1.0
 """Slope (rad) from which on no gait is looked for."""
 
-ROUNDING = 1e-12
+SAME_ANGLE = 1e-12
 """Difference of angles (rad) that counts as rounding."""
 
 SHORTEST_STEP, LONGEST_STEP = 0.2, 40.0
@@ -308,7 +308,7 @@ def check_slope(robot: Robot, slope: float, friction: float, scale: float) -> No
         If friction is too small.
     """
     steepest = float(np.arctan(friction * scale))
-    if abs(slope) > steepest + ROUNDING:
+    if abs(slope) > steepest + SAME_ANGLE:
         least = np.tan(abs(slope)) / scale if scale > 0.0 else np.inf
         raise InfeasibleGaitError(
             f"robot {robot.name!r} cannot stay on a slope of {slope:g} rad with friction = "

@@ -128,7 +128,7 @@ def _held(
     priced = np.zeros(len(slopes))
     priced[chosen] = -held.T @ (slope + bend @ moved)
     values = np.linalg.eigvalsh(inner)
-    strict = values.min(initial=1.0) > DEPENDENT * np.abs(values).max(initial=0.0)
+    strict = values.min(initial=1.0) > NEARLY_DEPENDENT * np.abs(values).max(initial=0.0)
     return moved, priced, bool(strict)
 
 
