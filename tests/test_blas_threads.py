@@ -73,7 +73,8 @@ def test_in_a_block_all_libraries_use_one_thread() -> None:
     assert threads() == before
 
 
-def test_blocks_of_two_threads_end_with_the_last_of_them() -> None:
+@pytest.mark.parametrize("longer", [False, True])
+def test_blocks_of_two_threads_leave_all_as_it_was(longer: bool) -> None:
     before, begun, ended = threads(), Event(), Event()
 
     def block() -> None:
@@ -85,7 +86,10 @@ def test_blocks_of_two_threads_end_with_the_last_of_them() -> None:
         with one_blas_thread():
             other = pool.submit(block)
             assert begun.wait(60.0)
-        assert set(threads().values()) == {1}
+            if not longer:
+                ended.set()
+                other.result()
+            assert set(threads().values()) == {1}
         ended.set()
         other.result()
     assert threads() == before

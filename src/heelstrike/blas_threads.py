@@ -9,32 +9,28 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from threading import Lock
+from threading import RLock
 from typing import Any
 
-_LOCK = Lock()
-_USERS: list[Any] = []
-"""Limits of all blocks that have begun since there was none; each knows what was before it."""
-_RUNNING = 0
+_ONE_THREAD_LIMITS = RLock()
+"""What thread of Python limits the libraries: they are of the whole process."""
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Let all libraries of linear algebra that are loaded use one thread, until the block ends.
 
-    Where blocks of several threads overlap, until the last of them ends.
+    A block that another thread begins meanwhile changes nothing: what it would put back at its end
+    might be one thread.
     """
-    global _RUNNING
-    with _LOCK:
-        _USERS.append(_threadpools().threadpool_limits(1, user_api="blas"))
-        _RUNNING += 1
-    try:
+    if not _ONE_THREAD_LIMITS.acquire(blocking=False):
         yield
+        return
+    try:
+        with _threadpools().threadpool_limits(1, user_api="blas"):
+            yield
     finally:
-        with _LOCK:
-            _RUNNING -= 1
-            while not _RUNNING and _USERS:
-                _USERS.pop().restore_original_limits()
+        _ONE_THREAD_LIMITS.release()
 
 
 @cache
