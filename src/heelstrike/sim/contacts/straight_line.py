@@ -90,6 +90,7 @@ def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
                 kernel,
                 {name: known[name] for name in inspect.signature(kernel).parameters},
                 scratch=(*scratch, "matrix", "rows", "force"),
+                side_by_side=kernel is point_delassus,
             )
             for kernel in KERNELS[:count]
         ],

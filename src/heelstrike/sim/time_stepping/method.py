@@ -36,10 +36,11 @@ from heelstrike.arguments import check_fields
 from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.sets import INTERVAL, ImpulseSet
+from heelstrike.contact.sets import EVERY_ROW, INTERVAL, ImpulseSet, row_of
 from heelstrike.contact.workspace import ContactProblem, ContactWorkspace
 from heelstrike.dynamics.kernels import integrate, passive_force
 from heelstrike.dynamics.workspace import Workspace
@@ -462,7 +463,7 @@ def select_candidates(
     near = 0
     for contact in range(model.nc):
         if contacts.gap[contact] <= farthest:
-            candidate[near] = contact
+            candidate[near & EVERY_ROW] = contact
             near += 1
     if near == 0:
         return 0
@@ -471,7 +472,7 @@ def select_candidates(
     velocity = usual.point_velocity
     count = 0
     for place in range(near):
-        contact = candidate[place]
+        contact = row_of(place, candidate)
         gap = contacts.gap[contact]
         normal = velocity[contact, 0]
         if curved and linearised:
@@ -691,8 +692,9 @@ def push_candidates(
         for k in range(2):
             point_impulse[contact, k] = 0.0
     for place in range(near):
+        contact = row_of(place, candidate)
         for k in range(2):
-            point_impulse[candidate[place], k] = impulse[2 * place + k]
+            point_impulse[contact, k] = impulse[2 * place + k]
     if near > 0:
         play(
             equations.programs[PUSH],
@@ -1060,8 +1062,7 @@ def move(
         integrate(model, q, v, work.step, q)
     else:
         integrate(model, q, next_v, work.step, q)
-    for i in range(model.nv):
-        v[i] = next_v[i]
+    copy_words(next_v, v)
     has_loops = rows_of(memory.loops) > 0
     if has_loops and not close_loops(model, memory.equations, memory.loops, q):
         return DIVERGED
