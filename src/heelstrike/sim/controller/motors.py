@@ -109,15 +109,14 @@ def are_obeyed(model: Any, voltage: int, commands: Floats) -> bool:
 
     Asked without a branch, since it is so as a rule.
     """
-    good = 0
+    beyond, nothing, stall = -INFINITY, 0.0, INFINITY
     for i in range(commands.shape[0]):
-        within_limits = (model.torque_lower[i] <= commands[i]) & (
-            commands[i] <= model.torque_upper[i]
-        )
-        good += within_limits & (abs(commands[i]) < INFINITY)
+        command = commands[i]
+        beyond = max(beyond, model.torque_lower[i] - command, command - model.torque_upper[i])
+        nothing += 0.0 * command  # or no number, if it is not finite
     for joint in range(model.stall_torque.shape[0]):
-        good += model.stall_torque[joint] == INFINITY
-    return voltage == 0 and good == commands.shape[0] + model.stall_torque.shape[0]
+        stall = min(stall, model.stall_torque[joint])
+    return voltage == 0 and beyond <= 0.0 and nothing == 0.0 and stall == INFINITY
 
 
 @dissolved_kernel

@@ -71,7 +71,7 @@ from heelstrike.sim.contacts.geometry import (
     contact_velocity,
     curvature_acceleration,
     evaluate_equations,
-    locate_contacts,
+    locate_in_straight_line,
     row_product,
     solve_mass_matrix,
     weigh,
@@ -94,7 +94,7 @@ from heelstrike.sim.contacts.rows import (
     Rows,
     lay_out_rows,
 )
-from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
+from heelstrike.sim.contacts.straight_line import DELASSUS, FREE, LOCATE, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.contacts.writers import Writers, rate_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
@@ -373,7 +373,10 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
     elif work.scheme == MOREAU_JEAN:
         add_springs(model, 0.5 * work.step, model.stiffness, model.damping, equations.added)
     evaluate_equations(model, memory.q, memory.v, equations)
-    locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
+    program = equations.programs[LOCATE]
+    locate_in_straight_line(
+        model, ground, program, equations.tree, memory.contacts, memory.surface
+    )
     if memory.loops.unknown.shape[0] > 0:
         find_loops_of_step(model, memory.q, memory.v, equations.tree, memory.loops)
     if memory.rows.outside.kernel.shape[0] > 0:
@@ -396,6 +399,31 @@ def free_velocity(
     they were armature; `stiffness` is that of the joints and of the controller.
     """
     force, rate = equations.force, equations.rate
+    if equations.programs[FREE] != 0 and scheme not in (LINEARLY_IMPLICIT, MOREAU_JEAN):
+        play(
+            equations.programs[FREE],
+            (model, q, v, torque, equations.bias, equations.factor, force, rate),
+        )
+        for i in range(model.nv):
+            next_v[i] = v[i] + step * rate[i]
+    else:
+        implicit_velocity(model, step, scheme, q, v, torque, stiffness, equations, next_v)
+    if share_over_step(time, step, pushes):
+        for i in range(model.nv):
+            rate[i] = 0.0
+        add_pushes(model, equations.tree, pushes, rate)
+        solve_mass_matrix(model, equations, rate)
+        for i in range(model.nv):
+            next_v[i] += step * rate[i]
+
+
+@kernel
+def implicit_velocity(
+    model: Model, step: float, scheme: int, q: Floats, v: Floats, torque: Floats,
+    stiffness: Floats, equations: Equations, next_v: Floats,
+) -> None:  # fmt: skip
+    """Velocity at the end of the step without ground or pushes, whatever the scheme and robot."""
+    force, rate = equations.force, equations.rate
     passive_force(model, q, v, force)
     for i in range(model.nu):
         force[model.actuator_joint[i]] += torque[i]
@@ -414,13 +442,6 @@ def free_velocity(
     solve_mass_matrix(model, equations, rate)
     for i in range(model.nv):
         next_v[i] = v[i] + rate[i]
-    if share_over_step(time, step, pushes):
-        for i in range(model.nv):
-            rate[i] = 0.0
-        add_pushes(model, equations.tree, pushes, rate)
-        solve_mass_matrix(model, equations, rate)
-        for i in range(model.nv):
-            next_v[i] += step * rate[i]
 
 
 @dissolved_kernel
