@@ -36,7 +36,7 @@ from heelstrike.arguments import check_fields
 from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
-from heelstrike.compiler.words import copy_words
+from heelstrike.compiler.words import bits_of, copy_words, stay_below
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
@@ -167,6 +167,7 @@ CLOSING_SPEED = 5.0
 FAR_STEPS = 20.0
 # The same for joint stops (rad/s or m/s).
 CLOSING_RATE = 20.0
+CLOSING_RATE_BITS = bits_of(CLOSING_RATE)
 # Contact points deeper in the ground (m) than this, and than the run began, put it in doubt.
 SUNK = 1e-2
 # The same of joints beyond their stops (rad, m): 20 rad/s for a millisecond.
@@ -522,10 +523,11 @@ def select_candidates(
 def stops_are_near(model: Model, step: float, q: Floats, v: Floats) -> bool:
     """Whether any joint stop could act in a step that bounds the gap at its end."""
     near = 0
-    for joint in range(model.nv):
+    for joint in range(model.nv):  # by signs, so that several are found at once
         reach = step * max(CLOSING_RATE, 2.0 * abs(v[joint]))
-        near += (q[joint] - model.lower[joint] < reach) | (model.upper[joint] - q[joint] < reach)
-    return near > 0
+        near |= np.float64(q[joint] - model.lower[joint] - reach).view(np.int64)
+        near |= np.float64(model.upper[joint] - q[joint] - reach).view(np.int64)
+    return near < 0
 
 
 @dissolved_kernel
@@ -870,10 +872,7 @@ def may_go_through(
     """
     if count == 0:
         return False
-    thrown = 0
-    for joint in range(model.nv):
-        thrown += abs(v[joint]) > CLOSING_RATE
-    if thrown > 0 or outside:
+    if not stay_below(CLOSING_RATE_BITS, v) or outside:
         return True
     known = near == count and not strikes
     for contact in range(model.nc):
