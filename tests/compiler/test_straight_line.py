@@ -20,6 +20,7 @@ from heelstrike.compiler.recordings import trigonometry
 from heelstrike.compiler.recordings.recording import Program, Recording
 from heelstrike.compiler.recordings.tape import Tape, Value
 from heelstrike.compiler.straight_line import add_function, play
+from heelstrike.contact.ground import Ground
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.sim.contacts.straight_line import (
     KERNELS,
@@ -54,22 +55,29 @@ def arguments(case: RobotCase, seed: int) -> list[tuple[Any, ...]]:
     points = usual_points(case.robot())
     size = 2 * len(points)
     rows, delassus = np.zeros((size, nv)), np.zeros((size, size))
+    torque, bias = rng.uniform(-9.0, 9.0, case.robot().nu), np.zeros(nv)
+    ground = Ground(slope=rng.uniform(-0.5, 0.5), friction=0.7, restitution=0.2).model()
+    located = Contacts.allocate(model.extents, components=2)
     return [
-        (model, q, v, tree, matrix, factor, np.zeros(nv)),
+        (model, q, v, tree, matrix, factor, bias),
         (model, factor, x),
         (model, points, tree, contacts, factor, rows, delassus),
         (model, points, contacts, v, tree, np.zeros((nc, 2))),
         (model, points, contacts, factor, impulse, tree, np.zeros(nv), w),
+        (model, q, v, torque, bias, factor, np.zeros(nv), np.zeros(nv)),
+        (model, ground, tree, located, np.zeros(nc), np.zeros(nc)),
     ]
 
 
 def results(arguments: list[tuple[Any, ...]]) -> dict[str, Any]:
-    (_, _, _, tree, _, factor, bias), (*_, x), (*_, delassus), (*_, velocity), (*_, w) = arguments
+    (_, _, _, tree, _, factor, bias), (*_, x), (*_, delassus), (*_, velocity), *more = arguments
+    (*_, w), (*_, v_dot), (_, _, _, located, friction, restitution) = more
     scratch = ("acceleration", "force", "composite", "zero")
     kept = {name: array for name, array in tree.members().items() if name not in scratch}
     return kept | {
         "factor": factor, "bias": bias, "solved": x, "delassus": delassus, "velocity": velocity,
-        "pushed": w,
+        "pushed": w, "v_dot": v_dot, "friction": friction, "restitution": restitution,
+        "position": located.position, "normal": located.normal, "gap": located.gap,
     }  # fmt: skip
 
 

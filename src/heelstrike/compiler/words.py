@@ -39,7 +39,7 @@ def bits_of(number: float) -> int:
 
 @kernel
 def stay_below(limit: int, numbers: Any) -> bool:
-    """Whether all numbers of an array are at most as large as one, either way, whose bits are given.
+    """Whether no number of an array is larger, either way, than the one with the bits `limit`.
 
     Bits of positive numbers have the order of the numbers, so that several can be compared at once
     without a branch. What is no number is larger than any.

@@ -375,9 +375,7 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
         add_springs(model, 0.5 * work.step, model.stiffness, model.damping, equations.added)
     evaluate_equations(model, memory.q, memory.v, equations)
     program = equations.programs[LOCATE]
-    locate_in_straight_line(
-        model, ground, program, equations.tree, memory.contacts, memory.surface
-    )
+    locate_in_straight_line(model, ground, program, equations.tree, memory.contacts, memory.surface)
     if memory.loops.unknown.shape[0] > 0:
         find_loops_of_step(model, memory.q, memory.v, equations.tree, memory.loops)
     if memory.rows.outside.kernel.shape[0] > 0:
