@@ -16,6 +16,7 @@ from robot_cases import NAMED, RANDOM, RobotCase
 from heelstrike.compiler import machine_code
 from heelstrike.compiler.bundle import Bundle, array, cell
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.fingerprint import fingerprint
 from heelstrike.compiler.recordings import trigonometry
 from heelstrike.compiler.recordings.recording import Program, Recording
 from heelstrike.compiler.recordings.tape import Tape, Value
@@ -32,6 +33,7 @@ from heelstrike.sim.controller.interface import Contacts
 
 # Both sides do the same few hundred operations in another order, with products and sums fused.
 ROUNDING = 1e-11
+WRITER = fingerprint(add_function)
 
 
 @numba.njit
@@ -179,9 +181,24 @@ def test_everything_is_read_before_anything_is_written() -> None:
     x, y = np.array([1.0, 2.0]), np.array([3.0])
     module = ir.Module("exchange")
     add_function(module, Recording(Program(exchange, {"x": x, "y": y})))
-    (address,) = machine_code.addresses(["exchange"], b"test of exchange", "", lambda: module)
+    (address,) = machine_code.addresses(["exchange"], b"exchange", WRITER, lambda: module)
     called(address, x, y)
     assert (x.tolist(), y.tolist()) == ([2.0, 3.0], [1.0])
+
+
+@kernel
+def cross(x: np.ndarray, y: np.ndarray) -> None:
+    y[1] = x[0] + 1.0
+    y[0] = x[1] + 1.0
+
+
+def test_arguments_may_be_the_same_array() -> None:
+    x = np.array([1.0, 5.0])
+    module = ir.Module("cross")
+    add_function(module, Recording(Program(cross, {"x": x, "y": np.zeros(2)})))
+    (address,) = machine_code.addresses(["cross"], b"cross", WRITER, lambda: module)
+    called(address, x, x)
+    assert x.tolist() == [6.0, 2.0]
 
 
 class Counted(Bundle):

@@ -97,6 +97,8 @@ class _Writer:
         self._stored: dict[Value, tuple[str, int]] = {}
         self._since: dict[Value, int] = {}
         self._count = 0
+        self._read_arrays: set[str] = set()
+        self._unread: set[Entry] = set()
         self._unknown: dict[str, Any] = {}
 
     def write(self) -> None:
@@ -108,6 +110,9 @@ class _Writer:
             self._count += 1
             self._since[value] = self._count
             for name, index in early.get(value, ()):
+                if "." not in name and self._unread:
+                    late.append((name, index, value))
+                    continue
                 self.builder.store(number, self._slot(name, index))
                 self._stored[value] = name, index
         stores = [(self._emitted(value), name, index) for name, index, value in late]
@@ -126,19 +131,22 @@ class _Writer:
             new = {each for each in operands if isinstance(each, Value)} - found
             found |= new
             waiting += new
-        self._entries = {value.array for value in found if isinstance(value, Entry)}
+        entries = [value for value in found if isinstance(value, Entry)]
+        self._read_arrays = {entry.array for entry in entries}
+        self._unread = {entry for entry in entries if "." not in entry.array}
         kept = (value for value in self.recording.tape.values if value in found)
         return [value for value in kept if isinstance(value, Result)]
 
     def _stores(self) -> tuple[dict[Value, list[tuple[str, int]]], list[tuple[str, int, Any]]]:
         """What is stored as soon as it is there, and what when all has been read.
 
-        Nothing of an array is stored early of which something is read.
+        Nothing of an array is stored early of which something is read. Arrays that are arguments
+        themselves may be the same: they are stored when all of these have been read.
         """
         early: dict[Value, list[tuple[str, int]]] = {}
         late = []
         for name, index, value in self.recording.written():
-            at_once = isinstance(value, Result) and name not in self._entries
+            at_once = isinstance(value, Result) and name not in self._read_arrays
             if at_once and not self.recording.program.side_by_side:
                 early.setdefault(value, []).append((name, index))
             else:
@@ -170,6 +178,7 @@ class _Writer:
         return self.builder.load(self.builder.gep(self._unknown[name], place, inbounds=True))
 
     def _read(self, entry: Entry) -> Any:
+        self._unread.discard(entry)
         number = self.builder.load(self._slot(entry.array, entry.index))
         if entry.array.startswith(CONSTANT + "."):
             number.set_metadata("invariant.load", self._unchanging)

@@ -40,7 +40,8 @@ class Program:
     """The kernel. It may branch on integers, and on numbers of the model where they are 0, 1 or
     -1."""
     arguments: Mapping[str, Any]
-    """Its arguments in order, bundles and arrays, with their true shapes."""
+    """Its arguments in order, bundles and arrays, with their true shapes. Arrays may be the same,
+    those in bundles may not."""
     scratch: tuple[str, ...] = ()
     """Arrays, ``argument`` or ``argument.member``, and bundles whose contents nobody reads
     afterwards."""
