@@ -82,7 +82,7 @@ def has_programs(nv: int) -> bool:
 
 def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
     nv, size = model.nv, len(points)
-    left_out = () if size > 0 else (point_delassus, point_velocities, push_points)
+    left_out: tuple[Any, ...] = () if size > 0 else (point_delassus, point_velocities, push_points)
     if model.nc == 0 or model.nc > MOST_POINTS:
         left_out += (locate_points,)
     kernels = [each for each in KERNELS if each not in left_out]

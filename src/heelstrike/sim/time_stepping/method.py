@@ -28,7 +28,7 @@ the work K (q + Δq/2) Δq. The linearly implicit scheme has θ = 1.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -520,7 +520,7 @@ def select_candidates(
 @dissolved_kernel
 def stops_are_near(model: Model, step: float, q: Floats, v: Floats) -> bool:
     """Whether any joint stop could act in a step that bounds the gap at its end."""
-    near = 0
+    near: Any = 0
     for joint in range(model.nv):  # by signs, so that several are found at once
         reach = step * max(CLOSING_RATE, 2.0 * abs(v[joint]))
         near |= np.float64(q[joint] - model.lower[joint] - reach).view(np.int64)
