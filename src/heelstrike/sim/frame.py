@@ -280,7 +280,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
 
 
 PLAIN: Fixed = (
-    ("loops", 0), ("couplings", 0), ("latches", 0), ("brakes", 0), ("loop_rows", 0), ("dry", 0),
+    ("loops", 0), ("couplings", 0), ("latches", 0), ("brakes", 0), ("loop_rows", 0), ("nd", 0),
     ("segments", 1), ("concave", 0), ("curved", 0), ("constraints", 0), ("ties", 0), ("axes", 2),
     ("components", 2),
 )  # fmt: skip

@@ -121,7 +121,7 @@ def list_dry_joints(
     friction is of each joint is its `breakaway`.
     """
     problem = listing.problem
-    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT] if rows.dry > 0 else 0):
+    for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
         joint = rows.owner[dry]
         if breakaway[joint] > 0.0:
             row = list_candidate(dry, count, 2, listing)
@@ -206,8 +206,7 @@ def note_answer(span: float, memory: Memory) -> None:
     keep_stops(span, rows.owner, rows.side, assembly, reaction.stop_torque, reaction.mode)
     if loops.constraint_force.shape[0] > 0:
         keep_constraints(span, rows, assembly, loops.constraint_force, reaction.mode)
-    if rows.dry > 0:
-        keep_dry_joints(span, rows.owner, assembly, reaction.friction_torque, reaction.mode)
+    keep_dry_joints(span, rows.owner, assembly, reaction.friction_torque, reaction.mode)
     keep_second_faces(span, rows.owner, assembly, memory.second_faces.force, reaction.mode)
     first, impulse = assembly.problem.first, assembly.answer.impulse
     note_loops(rows, assembly.until[LOOP], span, first, impulse, loops)

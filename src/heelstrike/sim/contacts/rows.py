@@ -29,7 +29,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, array, number, part
+from heelstrike.compiler.bundle import Bundle, array, part
 from heelstrike.compiler.compilation import dissolved_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE, components_of
 from heelstrike.dynamics.loops import count_rows
@@ -95,8 +95,6 @@ class Rows(Bundle):
     normal: Floats = array("entries", "axes")
     """position, normal: Where each contact point is on its face, and the normal of that, of points
     and second faces as they were located last."""
-    dry: int = number(int)
-    """How many dry joints there are."""
     latch_stop: Integers = array("latches", of=int)
     """The stop that each latch is."""
     outside: Writers = part(Writers)
@@ -164,7 +162,6 @@ def lay_out_rows(robot: Robot) -> Rows:
         end=end,
         set=np.repeat([kind.set for kind in KINDS], sizes),
         outside=outside,
-        dry=sizes[DRY_JOINT],
         kind=np.repeat(np.arange(len(KINDS)), sizes),
         owner=np.concatenate(owners).astype(np.int64),
         latch_stop=first[STOP]

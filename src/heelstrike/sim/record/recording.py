@@ -109,8 +109,7 @@ def note_events(
             note_stop(model, end, step, steps, joint, torque, q, v, told, reported.stopped)
     if constraint_force.shape[0] > 0:
         note_constraints(time, end, step, steps, constraint_force, rows, told, reported.closed)
-    if rows.dry > 0:
-        note_dry_joints(end, v, next_v, breakaway, rows, told, reported.resting)
+    note_dry_joints(end, v, next_v, breakaway, rows, told, reported.resting)
 
 
 @dissolved_kernel
