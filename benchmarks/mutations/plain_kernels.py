@@ -69,6 +69,10 @@ def _copy_words(source: np.ndarray, target: np.ndarray) -> None:
     target.reshape(-1)[:count] = source.reshape(-1)[:count]
 
 
+def _word_at(array: np.ndarray, place: int) -> int:
+    return ctypes.c_int64.from_address(array.ctypes.data + 8 * int(place)).value
+
+
 def _copy_between(source: int, target: int, count: int) -> None:
     ctypes.memmove(int(target), int(source), 8 * int(count))
 
@@ -79,6 +83,7 @@ def _keep_value(function: Any, place: np.ndarray) -> None:
 
 bundles.Bundle._new_table = _new_table  # type: ignore[method-assign]
 words.copy_words = _copy_words
+words.word_at = _word_at
 words.copy_between = _copy_between
 words.word_from = lambda address: ctypes.c_int64.from_address(int(address)).value
 words.keep_value = _keep_value
@@ -153,12 +158,3 @@ def _straight_line_code(programs: Sequence[Any], known: Any = None) -> tuple[int
 
 
 straight_line.straight_line_code = _straight_line_code
-
-from heelstrike.sim.controller import guard  # noqa: E402
-
-
-def _word_at(array: np.ndarray, place: int) -> int:
-    return ctypes.c_int64.from_address(array.ctypes.data + 8 * int(place)).value
-
-
-guard.word_at = _word_at

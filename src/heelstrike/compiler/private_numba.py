@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 from llvmlite.binding import parse_assembly, parse_bitcode
-from numba import TypingError, njit, types
+from numba import TypingError, config, njit, types
 from numba.core.caching import NullCache
 from numba.core.cgutils import normalize_ir_text
 from numba.core.codegen import JITCodeLibrary
@@ -285,7 +285,8 @@ def _finished(codegen: Any, parts: tuple[Any, ...], fixed: Fixed) -> tuple[Any, 
     about.mangled_name = f"{about.mangled_name}_{own}"
     library = codegen.create_library(f"{name}_{own}")
     library._final_module = module
-    library._optimize_final_module()
+    with _replaced(config, "SLP_VECTORIZE", 1):  # the same with several numbers at once
+        library._optimize_final_module()
     library._final_module.verify()
     code = codegen._tm.emit_object(library._final_module), _names_alone(names)
     return (library.name, "object", code), about, *more

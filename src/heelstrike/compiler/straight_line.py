@@ -11,6 +11,7 @@ The function computes what the kernel computes, to rounding.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from llvmlite import ir
@@ -28,6 +29,8 @@ _DOUBLE = ir.DoubleType()
 _WORD = ir.IntType(64)
 _POINTER = _WORD.as_pointer()
 _ANGLES_AT_ONCE = 8
+_FAR = 20
+"""After so many results more, what stands in memory is read again from there: registers are few."""
 
 
 def straight_line_code(
@@ -44,12 +47,13 @@ def straight_line_code(
     """
     known = dict(known or {})
 
-    def write() -> ir.Module:
+    def write(vectors: bool) -> ir.Module:
         module = ir.Module("straight_line")
         seen = dict(known)
         for program in programs:
             recording = Recording(program, seen)
-            add_function(module, recording)
+            if program.side_by_side == vectors:
+                add_function(module, recording)
             seen |= recording.left()
         return module
 
@@ -58,8 +62,15 @@ def straight_line_code(
     made_of = fingerprint(
         Recording, Program, add_function, *(program.kernel for program in programs)
     )
-    names = [program.name for program in programs]
-    return addresses(names, b"\0".join(described), made_of, write)
+    found: dict[str, int] = {}
+    for vectors in (False, True):
+        names = [program.name for program in programs if program.side_by_side == vectors]
+        if names:
+            made = addresses(
+                names, b"\0".join(described), made_of, partial(write, vectors), vectors=vectors
+            )
+            found |= zip(names, made, strict=True)
+    return tuple(found[program.name] for program in programs)
 
 
 def add_function(module: ir.Module, recording: Recording) -> None:
@@ -83,19 +94,64 @@ class _Writer:
         self._arrays: dict[str, Any] = {}
         self._values: dict[Value, Any] = {}
         self._unchanging = builder.module.add_metadata([])
+        self._stored: dict[Value, tuple[str, int]] = {}
+        self._since: dict[Value, int] = {}
+        self._count = 0
+        self._read_arrays: set[str] = set()
+        self._unread: set[Entry] = set()
+        self._unknown: dict[str, Any] = {}
 
     def write(self) -> None:
-        results = [value for value in self.recording.tape.values if isinstance(value, Result)]
+        results = self._needed()
+        early, late = self._stores()
         self._angles(results)
         for value in results:
-            self._emitted(value)
-        stores = [
-            (self._emitted(value), name, index) for name, index, value in self.recording.written()
-        ]
+            number = self._emitted(value)
+            self._count += 1
+            self._since[value] = self._count
+            for name, index in early.get(value, ()):
+                if "." not in name and self._unread:
+                    late.append((name, index, value))
+                    continue
+                self.builder.store(number, self._slot(name, index))
+                self._stored[value] = name, index
+        stores = [(self._emitted(value), name, index) for name, index, value in late]
         # All that is read has been read: nothing is overwritten too early.
-        for value, name, index in stores:
-            self.builder.store(value, self._slot(name, index))
+        for number, name, index in stores:
+            self.builder.store(number, self._slot(name, index))
         self.builder.ret_void()
+
+    def _needed(self) -> list[Result]:
+        """Results on which something hangs that is written, in order."""
+        waiting = [value for *_, value in self.recording.written() if isinstance(value, Value)]
+        found = set(waiting)
+        while waiting:
+            value = waiting.pop()
+            operands = value.operands if isinstance(value, Result) else ()
+            new = {each for each in operands if isinstance(each, Value)} - found
+            found |= new
+            waiting += new
+        entries = [value for value in found if isinstance(value, Entry)]
+        self._read_arrays = {entry.array for entry in entries}
+        self._unread = {entry for entry in entries if "." not in entry.array}
+        kept = (value for value in self.recording.tape.values if value in found)
+        return [value for value in kept if isinstance(value, Result)]
+
+    def _stores(self) -> tuple[dict[Value, list[tuple[str, int]]], list[tuple[str, int, Any]]]:
+        """What is stored as soon as it is there, and what when all has been read.
+
+        Nothing of an array is stored early of which something is read. Arrays that are arguments
+        themselves may be the same: they are stored when all of these have been read.
+        """
+        early: dict[Value, list[tuple[str, int]]] = {}
+        late = []
+        for name, index, value in self.recording.written():
+            at_once = isinstance(value, Result) and name not in self._read_arrays
+            if at_once and not self.recording.program.side_by_side:
+                early.setdefault(value, []).append((name, index))
+            else:
+                late.append((name, index, value))
+        return early, late
 
     def _emitted(self, value: Any) -> Any:
         if not isinstance(value, Entry | Result):
@@ -104,9 +160,25 @@ class _Writer:
             self._values[value] = (
                 self._read(value) if isinstance(value, Entry) else self._emit(value)
             )
+        elif value in self._stored and self._count - self._since[value] > _FAR:
+            self._values[value] = self._read_again(*self._stored[value])
+            self._since[value] = self._count
         return self._values[value]
 
+    def _read_again(self, name: str, index: int) -> Any:
+        """Read what has been stored, through an address of which the compiler knows nothing.
+
+        Otherwise it would know the number, and keep it in a register, or another place.
+        """
+        if name not in self._unknown:
+            known = self._arrays[name]
+            same = ir.InlineAsm(ir.FunctionType(known.type, [known.type]), "", "=r,0")
+            self._unknown[name] = self.builder.call(same, [known])
+        place = [ir.Constant(_WORD, index)]
+        return self.builder.load(self.builder.gep(self._unknown[name], place, inbounds=True))
+
     def _read(self, entry: Entry) -> Any:
+        self._unread.discard(entry)
         number = self.builder.load(self._slot(entry.array, entry.index))
         if entry.array.startswith(CONSTANT + "."):
             number.set_metadata("invariant.load", self._unchanging)

@@ -5,9 +5,12 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
+
+from heelstrike.compiler.compilation import kernel
 
 
 def _word_at(context: Any, array: Any, place: Any) -> Any:
@@ -24,6 +27,27 @@ def _word_at(context: Any, array: Any, place: Any) -> Any:
 
 word_at: Any = intrinsic(_word_at)
 """``word_at(array, place)``: bits of the word so many after the first, inside the array or not."""
+
+_MAGNITUDE = 2**63 - 1
+"""All bits of a number but its sign."""
+
+
+def bits_of(number: float) -> int:
+    """Return the bits of a number."""
+    return int(np.float64(number).view(np.int64))
+
+
+@kernel
+def stay_below(limit: int, numbers: Any) -> bool:
+    """Whether no number of an array is larger, either way, than the one with the bits `limit`.
+
+    Bits of positive numbers have the order of the numbers, so that several can be compared at once
+    without a branch. What is no number is larger than any.
+    """
+    beyond = 0
+    for i in range(numbers.shape[0]):
+        beyond |= limit - (word_at(numbers, i) & _MAGNITUDE)
+    return beyond >= 0
 
 
 def _word_from(context: Any, address: Any) -> Any:

@@ -231,12 +231,18 @@ def solve_upper(model: Model, factor: Floats, x: Floats) -> None:
 
 @kernel
 def solve_lower(model: Model, factor: Floats, x: Floats) -> None:
-    """Replace x by L⁻¹ x."""
+    """Replace x by L⁻¹ x.
+
+    The parent is last to be taken off, since it is last to be known.
+    """
     for i in range(model.nv):
-        j = model.parent[i]
-        while j >= 0:
-            x[i] -= factor[i, j] * x[j]
-            j = model.parent[j]
+        parent = model.parent[i]
+        if parent >= 0:
+            j = model.parent[parent]
+            while j >= 0:
+                x[i] -= factor[i, j] * x[j]
+                j = model.parent[j]
+            x[i] -= factor[i, parent] * x[parent]
 
 
 @kernel
@@ -246,6 +252,20 @@ def solve_factorized(model: Model, factor: Floats, x: Floats) -> None:
     for i in range(model.nv):
         x[i] *= factor[i, i]
     solve_lower(model, factor, x)
+
+
+@kernel
+def free_acceleration(
+    model: Model, q: Floats, v: Floats, torque: Floats, bias: Floats, factor: Floats,
+    force: Floats, v_dot: Floats,
+) -> None:  # fmt: skip
+    """Acceleration if nothing touches the robot; `force` is scratch."""
+    passive_force(model, q, v, force)
+    for i in range(model.nu):
+        force[model.actuator_joint[i]] += torque[i]
+    for i in range(model.nv):
+        v_dot[i] = force[i] - bias[i]
+    solve_factorized(model, factor, v_dot)
 
 
 @kernel

@@ -40,12 +40,16 @@ class Program:
     """The kernel. It may branch on integers, and on numbers of the model where they are 0, 1 or
     -1."""
     arguments: Mapping[str, Any]
-    """Its arguments in order, bundles and arrays, with their true shapes."""
+    """Its arguments in order, bundles and arrays, with their true shapes. Arrays may be the same,
+    those in bundles may not."""
     scratch: tuple[str, ...] = ()
     """Arrays, ``argument`` or ``argument.member``, and bundles whose contents nobody reads
     afterwards."""
     name: str = ""
     """Name of the function that is made of it; else the kernel's."""
+    side_by_side: bool = False
+    """Whether it does the same with many numbers that stand side by side, so that machine code does
+    it with several at once. Of others it is made so that each result is out of the way soon."""
     derivatives: Mapping[str, tuple[str, tuple[str, ...]]] = field(default_factory=dict)
     """Arrays of arguments that the kernel does not take and that receive derivatives, (m, k): each
     with the array that the kernel has written, of m numbers, and those of k numbers by which."""
@@ -62,6 +66,7 @@ class Program:
     def description(self) -> bytes:
         """What its recording depends on besides the source of its kernel."""
         parts = [self.name, *self.scratch, repr(sorted(self.derivatives.items()))]
+        parts.append(repr(self.side_by_side))
         for name, value in self._members():
             parts.append(name)
             if isinstance(value, Bundle):  # it does not take part

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, STICK
-from heelstrike.contact.sets import INTERVAL, row_of
+from heelstrike.contact.sets import EVERY_ROW, INTERVAL, row_of
 from heelstrike.contact.workspace import ContactProblem
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
@@ -59,7 +59,7 @@ def list_candidate(entry: int, place: int, components: int, listing: Listing) ->
     Candidates are listed one after the other; `components` tells how many rows this one has.
     Returns the first of them.
     """
-    problem = listing.problem
+    problem, place, entry = listing.problem, place & EVERY_ROW, entry & EVERY_ROW
     first = row_of(place, problem.first)
     problem.first[place + 1] = first + components
     problem.set[place] = listing.set[entry]
@@ -204,7 +204,8 @@ def note_answer(span: float, memory: Memory) -> None:
         reaction.mode[entry] = OPEN
     keep_points(span, assembly, memory.contacts.force, reaction.slip, reaction.mode)
     keep_stops(span, rows.owner, rows.side, assembly, reaction.stop_torque, reaction.mode)
-    keep_constraints(span, rows, assembly, loops.constraint_force, reaction.mode)
+    if loops.constraint_force.shape[0] > 0:
+        keep_constraints(span, rows, assembly, loops.constraint_force, reaction.mode)
     keep_dry_joints(span, rows.owner, assembly, reaction.friction_torque, reaction.mode)
     keep_second_faces(span, rows.owner, assembly, memory.second_faces.force, reaction.mode)
     first, impulse = assembly.problem.first, assembly.answer.impulse
@@ -221,8 +222,9 @@ def keep_points(
         force[contact, 0] = 0.0
         force[contact, 1] = 0.0
         slip[contact] = 0.0
-    for place in range(assembly.begin[POINT], assembly.until[POINT]):
-        contact, row = assembly.candidate[place], row_of(place, first)
+    for listed in range(assembly.begin[POINT], assembly.until[POINT]):
+        place = listed & EVERY_ROW
+        contact, row = row_of(place, assembly.candidate), row_of(place, first)
         force[contact, 0] = answer.impulse[row] / span
         force[contact, 1] = answer.impulse[row + 1] / span
         slip[contact] = answer.velocity[row + 1]

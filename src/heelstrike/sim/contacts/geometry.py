@@ -6,7 +6,7 @@ import math
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
-from heelstrike.contact.ground import GroundModel, ground_contact, path_curvature
+from heelstrike.contact.ground import GroundModel, path_curvature
 from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.contact.workspace import ContactProblem
 from heelstrike.dynamics.articulated import articulate, carry_along, solve_articulated
@@ -17,13 +17,13 @@ from heelstrike.dynamics.kernels import (
     forward_kinematics,
     link_velocities,
     mass_matrix,
-    point_position,
     solve_lower,
 )
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.planar import plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.points import locate_points
 from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.contacts.straight_line import EQUATIONS, SOLVE
 from heelstrike.sim.controller.interface import Contacts
@@ -38,20 +38,23 @@ def locate_contacts(
     model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts | Rows, surface: Surface
 ) -> None:
     """Contact points, gaps, normals and coefficients of the state now (eq. 6, 7)."""
-    for i in range(model.nc):
-        point, normal = contacts.position[i], contacts.normal[i]
-        point_position(tree, model.contact_link[i], model.contact_position[i], point)
-        radius = model.contact_radius[i]
-        contacts.gap[i], friction, restitution = ground_contact(
-            ground, point[0], point[1], radius, normal
-        )
-        surface.friction[i] = model.friction_scale[i] * friction
-        surface.restitution[i] = model.restitution_scale[i] * restitution
-        if ground.curved == 1:
-            distance = contacts.gap[i] + radius
-            surface.curvature[i] = path_curvature(ground, point[0], distance, normal)
-        point[0] -= radius * normal[0]
-        point[1] -= radius * normal[1]
+    locate_points(model, ground, tree, contacts, surface.friction, surface.restitution)
+    for i in range(model.nc if ground.curved == 1 else 0):
+        radius, normal = model.contact_radius[i], contacts.normal[i]
+        x, distance = contacts.position[i, 0] + radius * normal[0], contacts.gap[i] + radius
+        surface.curvature[i] = path_curvature(ground, x, distance, normal)
+
+
+@dissolved_kernel
+def locate_in_straight_line(
+    model: Model, ground: GroundModel, program: int, tree: Workspace, contacts: Contacts,
+    surface: Surface,
+) -> None:  # fmt: skip
+    """Do the same as :func:`locate_contacts`, by a program if there is one for the ground."""
+    if program != 0 and ground.friction.shape[0] == 1 and ground.curved == 0:
+        play(program, (model, ground, tree, contacts, surface.friction, surface.restitution))
+    else:
+        locate_contacts(model, ground, tree, contacts, surface)
 
 
 @kernel

@@ -7,13 +7,35 @@ before tangent. Arrays of (nc, 2) have an entry for every contact point of the r
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.ground import GroundModel, ground_contact
 from heelstrike.dynamics.frames import into_frame, out_of_frame
-from heelstrike.dynamics.kernels import solve_factorized, solve_upper
+from heelstrike.dynamics.kernels import point_position, solve_factorized, solve_upper
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.planar import plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.controller.interface import Contacts
+
+
+@kernel
+def locate_points(
+    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts | Rows,
+    friction: Floats, restitution: Floats,
+) -> None:  # fmt: skip
+    """All contact points, gaps, normals and coefficients of the state now (eq. 6, 7).
+
+    On ground of one straight segment it has no branch.
+    """
+    for i in range(model.nc):
+        point, normal = contacts.position[i], contacts.normal[i]
+        point_position(tree, model.contact_link[i], model.contact_position[i], point)
+        radius = model.contact_radius[i]
+        contacts.gap[i], mu, bounce = ground_contact(ground, point[0], point[1], radius, normal)
+        friction[i] = model.friction_scale[i] * mu
+        restitution[i] = model.restitution_scale[i] * bounce
+        point[0] -= radius * normal[0]
+        point[1] -= radius * normal[1]
 
 
 @kernel

@@ -12,11 +12,17 @@ from numpy.typing import NDArray
 
 from heelstrike.compiler.recordings.recording import Program
 from heelstrike.compiler.straight_line import straight_line_code
-from heelstrike.dynamics.kernels import solve_factorized, state_equations
+from heelstrike.contact.ground import Ground
+from heelstrike.dynamics.kernels import free_acceleration, solve_factorized, state_equations
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.contacts.points import point_delassus, point_velocities, push_points
+from heelstrike.sim.contacts.points import (
+    locate_points,
+    point_delassus,
+    point_velocities,
+    push_points,
+)
 from heelstrike.sim.controller.interface import Contacts
 
 # Places in ``Equations.programs``; an address of zero means that there is none.
@@ -25,6 +31,8 @@ SOLVE = 1
 DELASSUS = 2
 VELOCITIES = 3
 PUSH = 4
+FREE = 5
+LOCATE = 6
 
 KERNELS: tuple[Callable[..., None], ...] = (
     state_equations,
@@ -32,7 +40,12 @@ KERNELS: tuple[Callable[..., None], ...] = (
     point_delassus,
     point_velocities,
     push_points,
+    free_acceleration,
+    locate_points,
 )
+
+SIDE_BY_SIDE = (point_delassus,)
+"""Those that do the same with many numbers."""
 
 MOST_COORDINATES = 12
 """Robots with more are left to the loops: straight-line code grows with the cube of the depth."""
@@ -53,7 +66,7 @@ _known: WeakKeyDictionary[Model, dict[bytes, NDArray[np.int64]]] = WeakKeyDictio
 def straight_line_programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the addresses of the straight-line programs of a robot, one for each kernel.
 
-    `points` are the contact points that the last three kernels are for.
+    `points` are the contact points that those of points are for but the last.
     """
     known = _known.setdefault(model, {})
     key = points.tobytes()
@@ -69,7 +82,10 @@ def has_programs(nv: int) -> bool:
 
 def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
     nv, size = model.nv, len(points)
-    count = len(KERNELS) if size > 0 else DELASSUS
+    left_out: tuple[Any, ...] = () if size > 0 else (point_delassus, point_velocities, push_points)
+    if model.nc == 0 or model.nc > MOST_POINTS:
+        left_out += (locate_points,)
+    kernels = [each for each in KERNELS if each not in left_out]
     programs = np.zeros(len(KERNELS), dtype=np.int64)
     if not has_programs(nv):
         return programs
@@ -81,17 +97,20 @@ def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
         "matrix": np.zeros((nv, nv)), "factor": np.zeros((nv, nv)), "bias": np.zeros(nv),
         "points": points, "contacts": Contacts.allocate(extents),
         "rows": np.zeros((2 * size, nv)), "delassus": np.zeros((2 * size, 2 * size)),
-        "velocity": pairs, "impulse": pairs, "force": np.zeros(nv),
+        "velocity": pairs, "impulse": pairs, "force": np.zeros(nv), "torque": np.zeros(model.nu),
+        "v_dot": np.zeros(nv), "ground": Ground().model(), "friction": np.zeros(model.nc),
+        "restitution": np.zeros(model.nc),
     }  # fmt: skip
     scratch = [f"tree.{name}" for name in ("acceleration", "force", "composite", "zero")]
-    programs[:count] = straight_line_code(
+    programs[[KERNELS.index(each) for each in kernels]] = straight_line_code(
         [
             Program(
                 kernel,
                 {name: known[name] for name in inspect.signature(kernel).parameters},
                 scratch=(*scratch, "matrix", "rows", "force"),
+                side_by_side=kernel in SIDE_BY_SIDE,
             )
-            for kernel in KERNELS[:count]
+            for kernel in kernels
         ],
         known={"tree.zero": np.zeros(nv)},
     )

@@ -9,6 +9,7 @@ import numpy as np
 from heelstrike.compiler.bundle_type import address_of
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.words import copy_words
+from heelstrike.contact.sets import row_of
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.controller.control import OVERRAN, TRUSTED, Control
@@ -45,12 +46,10 @@ def consult(
 
 @dissolved_kernel
 def _show(q: Floats, v: Floats, model: Model, state: ControlState) -> None:
-    for i in range(q.shape[0]):
-        state.q[i] = q[i]
-    for i in range(v.shape[0]):
-        state.v[i] = v[i]
+    copy_words(q, state.q)
+    copy_words(v, state.v)
     for i in range(model.actuator_joint.shape[0]):
-        joint = model.actuator_joint[i]
+        joint = row_of(i, model.actuator_joint)
         state.joint_position[i] = q[joint]
         state.joint_velocity[i] = v[joint]
 

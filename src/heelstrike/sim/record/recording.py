@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.words import bits_of, stay_below, word_at
 from heelstrike.contact.ground import GroundModel, ground_height
 from heelstrike.contact.sets import INTERVAL
 from heelstrike.dynamics.workspace import Workspace
@@ -38,6 +39,7 @@ SLIP_SPEED = 1e-6
 FARTHEST, FASTEST = 1e9, 1e6
 """Coordinate (m, rad) and velocity (m/s, rad/s) of a robot that has diverged: no digit of a
 millimetre is left of the one, and no step is as short as the other asks for."""
+FARTHEST_BITS, FASTEST_BITS = bits_of(FARTHEST), bits_of(FASTEST)
 
 
 @dissolved_kernel
@@ -98,11 +100,15 @@ def note_events(
         note_events_of_contact(
             model, time, end, step, steps, contact, tree, contacts, reaction.slip, told, reported
         )
-    for joint in range(model.parent.shape[0]):
+    held = 0
+    for joint in range(model.parent.shape[0]):  # all at once, since none is as a rule
+        held |= word_at(reaction.stop_torque, joint) | reported.stopped[joint]
+    for joint in range(model.parent.shape[0] if held != 0 else 0):
         torque = reaction.stop_torque[joint]
         if torque != 0.0 or reported.stopped[joint] != 0:
             note_stop(model, end, step, steps, joint, torque, q, v, told, reported.stopped)
-    note_constraints(time, end, step, steps, constraint_force, rows, told, reported.closed)
+    if constraint_force.shape[0] > 0:
+        note_constraints(time, end, step, steps, constraint_force, rows, told, reported.closed)
     note_dry_joints(end, v, next_v, breakaway, rows, told, reported.resting)
 
 
@@ -259,7 +265,4 @@ def center_height(model: Model, ground: GroundModel, tree: Workspace) -> float:
 @dissolved_kernel
 def sound(q: Floats, v: Floats) -> bool:
     """Whether the state is finite and not absurd."""
-    good = 0
-    for i in range(v.shape[0]):
-        good += (abs(q[i]) < FARTHEST) & (abs(v[i]) < FASTEST)
-    return good == v.shape[0]
+    return stay_below(FARTHEST_BITS, q) and stay_below(FASTEST_BITS, v)

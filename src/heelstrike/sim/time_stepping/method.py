@@ -28,7 +28,7 @@ the work K (q + Δq/2) Δq. The linearly implicit scheme has θ = 1.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -36,10 +36,11 @@ from heelstrike.arguments import check_fields
 from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
+from heelstrike.compiler.words import bits_of, copy_words, stay_below
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.sets import INTERVAL, ImpulseSet
+from heelstrike.contact.sets import EVERY_ROW, INTERVAL, ImpulseSet, row_of
 from heelstrike.contact.workspace import ContactProblem, ContactWorkspace
 from heelstrike.dynamics.kernels import integrate, passive_force
 from heelstrike.dynamics.workspace import Workspace
@@ -70,7 +71,7 @@ from heelstrike.sim.contacts.geometry import (
     contact_velocity,
     curvature_acceleration,
     evaluate_equations,
-    locate_contacts,
+    locate_in_straight_line,
     row_product,
     solve_mass_matrix,
     weigh,
@@ -93,7 +94,7 @@ from heelstrike.sim.contacts.rows import (
     Rows,
     lay_out_rows,
 )
-from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
+from heelstrike.sim.contacts.straight_line import DELASSUS, FREE, LOCATE, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.contacts.writers import Writers, rate_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
@@ -166,6 +167,7 @@ CLOSING_SPEED = 5.0
 FAR_STEPS = 20.0
 # The same for joint stops (rad/s or m/s).
 CLOSING_RATE = 20.0
+CLOSING_RATE_BITS = bits_of(CLOSING_RATE)
 # Contact points deeper in the ground (m) than this, and than the run began, put it in doubt.
 SUNK = 1e-2
 # The same of joints beyond their stops (rad, m): 20 rad/s for a millisecond.
@@ -372,7 +374,8 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
     elif work.scheme == MOREAU_JEAN:
         add_springs(model, 0.5 * work.step, model.stiffness, model.damping, equations.added)
     evaluate_equations(model, memory.q, memory.v, equations)
-    locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
+    program = equations.programs[LOCATE]
+    locate_in_straight_line(model, ground, program, equations.tree, memory.contacts, memory.surface)
     if memory.loops.unknown.shape[0] > 0:
         find_loops_of_step(model, memory.q, memory.v, equations.tree, memory.loops)
     if memory.rows.outside.kernel.shape[0] > 0:
@@ -395,6 +398,31 @@ def free_velocity(
     they were armature; `stiffness` is that of the joints and of the controller.
     """
     force, rate = equations.force, equations.rate
+    if equations.programs[FREE] != 0 and scheme not in (LINEARLY_IMPLICIT, MOREAU_JEAN):
+        play(
+            equations.programs[FREE],
+            (model, q, v, torque, equations.bias, equations.factor, force, rate),
+        )
+        for i in range(model.nv):
+            next_v[i] = v[i] + step * rate[i]
+    else:
+        implicit_velocity(model, step, scheme, q, v, torque, stiffness, equations, next_v)
+    if share_over_step(time, step, pushes):
+        for i in range(model.nv):
+            rate[i] = 0.0
+        add_pushes(model, equations.tree, pushes, rate)
+        solve_mass_matrix(model, equations, rate)
+        for i in range(model.nv):
+            next_v[i] += step * rate[i]
+
+
+@kernel
+def implicit_velocity(
+    model: Model, step: float, scheme: int, q: Floats, v: Floats, torque: Floats,
+    stiffness: Floats, equations: Equations, next_v: Floats,
+) -> None:  # fmt: skip
+    """Velocity at the end of the step without ground or pushes, whatever the scheme and robot."""
+    force, rate = equations.force, equations.rate
     passive_force(model, q, v, force)
     for i in range(model.nu):
         force[model.actuator_joint[i]] += torque[i]
@@ -413,13 +441,6 @@ def free_velocity(
     solve_mass_matrix(model, equations, rate)
     for i in range(model.nv):
         next_v[i] = v[i] + rate[i]
-    if share_over_step(time, step, pushes):
-        for i in range(model.nv):
-            rate[i] = 0.0
-        add_pushes(model, equations.tree, pushes, rate)
-        solve_mass_matrix(model, equations, rate)
-        for i in range(model.nv):
-            next_v[i] += step * rate[i]
 
 
 @dissolved_kernel
@@ -462,7 +483,7 @@ def select_candidates(
     near = 0
     for contact in range(model.nc):
         if contacts.gap[contact] <= farthest:
-            candidate[near] = contact
+            candidate[near & EVERY_ROW] = contact
             near += 1
     if near == 0:
         return 0
@@ -471,7 +492,7 @@ def select_candidates(
     velocity = usual.point_velocity
     count = 0
     for place in range(near):
-        contact = candidate[place]
+        contact = row_of(place, candidate)
         gap = contacts.gap[contact]
         normal = velocity[contact, 0]
         if curved and linearised:
@@ -499,11 +520,12 @@ def select_candidates(
 @dissolved_kernel
 def stops_are_near(model: Model, step: float, q: Floats, v: Floats) -> bool:
     """Whether any joint stop could act in a step that bounds the gap at its end."""
-    near = 0
-    for joint in range(model.nv):
+    near: Any = 0
+    for joint in range(model.nv):  # by signs, so that several are found at once
         reach = step * max(CLOSING_RATE, 2.0 * abs(v[joint]))
-        near += (q[joint] - model.lower[joint] < reach) | (model.upper[joint] - q[joint] < reach)
-    return near > 0
+        near |= np.float64(q[joint] - model.lower[joint] - reach).view(np.int64)
+        near |= np.float64(model.upper[joint] - q[joint] - reach).view(np.int64)
+    return near < 0
 
 
 @dissolved_kernel
@@ -691,8 +713,9 @@ def push_candidates(
         for k in range(2):
             point_impulse[contact, k] = 0.0
     for place in range(near):
+        contact = row_of(place, candidate)
         for k in range(2):
-            point_impulse[candidate[place], k] = impulse[2 * place + k]
+            point_impulse[contact, k] = impulse[2 * place + k]
     if near > 0:
         play(
             equations.programs[PUSH],
@@ -847,10 +870,7 @@ def may_go_through(
     """
     if count == 0:
         return False
-    thrown = 0
-    for joint in range(model.nv):
-        thrown += abs(v[joint]) > CLOSING_RATE
-    if thrown > 0 or outside:
+    if not stay_below(CLOSING_RATE_BITS, v) or outside:
         return True
     known = near == count and not strikes
     for contact in range(model.nc):
@@ -1060,8 +1080,7 @@ def move(
         integrate(model, q, v, work.step, q)
     else:
         integrate(model, q, next_v, work.step, q)
-    for i in range(model.nv):
-        v[i] = next_v[i]
+    copy_words(next_v, v)
     has_loops = rows_of(memory.loops) > 0
     if has_loops and not close_loops(model, memory.equations, memory.loops, q):
         return DIVERGED
