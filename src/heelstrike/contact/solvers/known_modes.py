@@ -171,17 +171,21 @@ def leave_out_idle(size: int, rows: StickingRows) -> None:
     counts 1/m.
     """
     matrix, x, basis, sharers = rows.lower_half, rows.x, rows.square, rows.sharers
-    found = 0
+    found, diagonal = 0, 0
     for row in range(size):
-        if matrix[row * (row + 1) // 2 + row] != 0.0:
+        diagonal = (diagonal + row) & EVERY_ROW
+        if matrix[diagonal + row] != 0.0:
             continue
         direction = basis[found]
         for i in range(size):
             direction[i] = 0.0
         direction[row] = 1.0
+        begin = diagonal
         for i in range(row, 0, -1):
+            part = direction[i]
             for j in range(i):
-                direction[j] -= matrix[i * (i + 1) // 2 + j] * direction[i]
+                direction[j] -= matrix[begin + j] * part
+            begin = (begin - i) & EVERY_ROW
         for earlier in range(found):
             remove_part(size, basis[earlier], sharers, direction)
         remove_part(size, direction, sharers, x)
@@ -194,11 +198,12 @@ def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -
     part = 0.0
     length = 0.0
     for i in range(size):
-        weighted = direction[i] / sharers[i]
+        weighted = direction[i] if sharers[i] == 1.0 else direction[i] / sharers[i]
         part += weighted * vector[i]
         length += weighted * direction[i]
+    ratio = part / length
     for i in range(size):
-        vector[i] -= part / length * direction[i]
+        vector[i] -= ratio * direction[i]
 
 
 @dissolved_kernel
@@ -375,24 +380,26 @@ def share_within_cones(
     other cone to its edge.
     """
     impulse, first, total = answer.impulse, problem.first, abs(rows.x[place])
+    edge, tangent, count, end = rows.spare, rows.order, 0, 0
+    for contact in range(problem.count):
+        row, end = end, row_of(contact + 1, first)
+        if end > row + 1 and rows.equation[row + 1] == place:
+            _, edge[count] = projected(problem, contact, impulse[row], total)
+            tangent[count] = row + 1
+            count = (count + 1) & EVERY_ROW
     level, higher = 0.0, total / rows.sharers[place]
     while higher > level:
         level = higher
         rest, sharers = total, 0.0
-        for contact in range(problem.count):
-            row = row_of(contact, first)
-            if row_of(contact + 1, first) > row + 1 and rows.equation[row + 1] == place:
-                _, edge = projected(problem, contact, impulse[row], level)
-                rest -= edge if edge < level else 0.0
-                sharers += edge >= level
+        for member in range(count):
+            rest -= edge[member] if edge[member] < level else 0.0
+            sharers += edge[member] >= level
         if sharers == 0.0:
             return False
         higher = rest / sharers
-    for contact in range(problem.count):
-        row = row_of(contact, first)
-        if row_of(contact + 1, first) > row + 1 and rows.equation[row + 1] == place:
-            _, share = projected(problem, contact, impulse[row], level)
-            impulse[row + 1] = share if rows.x[place] > 0.0 else -share
+    for member in range(count):
+        share = min(edge[member], level)
+        impulse[row_of(member, tangent)] = share if rows.x[place] > 0.0 else -share
     return True
 
 
