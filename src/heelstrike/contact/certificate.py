@@ -195,19 +195,21 @@ def sign(value: float) -> float:
 @kernel
 def weigh(problem: ContactProblem, settings: Settings, impulse: Floats, scaling: Scaling) -> None:
     """Write the weights of the rows, the size of the data, beta, and the effort."""
-    delassus, root = problem.delassus, scaling.root
-    unit = settings.floor
+    delassus, free, root = problem.delassus, problem.free, scaling.root
     skewed = settings.skewed != 0
-    effort = 0.0
-    rows = problem.first[problem.count]
+    # The largest ratio is found without division, as the fraction largest / whole.
+    largest, whole, effort = settings.floor, 1.0, 0.0
+    rows = row_of(problem.count, problem.first)
     for i in range(rows):
         weight = delassus[i, i]
         if skewed:
             weight = general_weight(rows, i, delassus)
-        root[i] = math.sqrt(weight) if weight > 0.0 else 0.0
-        if weight > 0.0:
-            unit = max(unit, abs(problem.free[i]) / root[i])
-        effort += root[i] * abs(impulse[i])
+        size = math.sqrt(weight) if weight > 0.0 else 0.0
+        root[i] = size
+        if weight > 0.0 and abs(free[i]) * whole > largest * size:
+            largest, whole = abs(free[i]), size
+        effort += size * abs(impulse[i])
+    unit = largest / whole
     if effort > 0.0:
         effort = effort / unit if unit > 0.0 else math.inf
     scaling.effort = effort
@@ -240,16 +242,24 @@ def relative_speed(velocity: float, root: float, inverse: float) -> float:
 @kernel
 def sum_velocities(problem: ContactProblem, impulse: Floats, velocity: Floats) -> None:
     """Write ``velocity = G impulse + free``."""
-    delassus, free, rows = problem.delassus, problem.free, problem.first[problem.count]
-    for i in range(rows):
-        # Two sums run side by side: where all contacts have a tangent, friction and the rest.
-        even, odd = free[i], 0.0
+    delassus, free, rows = problem.delassus, problem.free, row_of(problem.count, problem.first)
+    last = rows - 1
+    for i in range(0, rows, 2):
+        # Four sums run side by side: those of two rows, and where all contacts have a tangent, of
+        # friction and the rest. The last of an odd number of rows is its own neighbour.
+        beside = min(i + 1, last)
+        even, odd, even_beside, odd_beside = free[i], 0.0, free[beside], 0.0
         for pair in range(rows // 2):
-            even += delassus[i, 2 * pair] * impulse[2 * pair]
-            odd += delassus[i, 2 * pair + 1] * impulse[2 * pair + 1]
+            first, second = impulse[2 * pair], impulse[2 * pair + 1]
+            even += delassus[i, 2 * pair] * first
+            odd += delassus[i, 2 * pair + 1] * second
+            even_beside += delassus[beside, 2 * pair] * first
+            odd_beside += delassus[beside, 2 * pair + 1] * second
         if rows % 2 == 1:
-            even += delassus[i, rows - 1] * impulse[rows - 1]
+            even += delassus[i, last] * impulse[last]
+            even_beside += delassus[beside, last] * impulse[last]
         velocity[i] = even + odd
+        velocity[beside] = even_beside + odd_beside
 
 
 @kernel

@@ -96,7 +96,7 @@ def eliminate(
                         break
                 continue
             for j in range(size):
-                if pivot_row[j] < 0 and abs(tableau[i, j + 1]) > largest:
+                if abs(tableau[i, j + 1]) > largest and pivot_row[j] < 0:
                     largest = abs(tableau[i, j + 1])
                     row = i
                     column = j

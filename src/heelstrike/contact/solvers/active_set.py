@@ -21,7 +21,7 @@ from heelstrike.contact.modes import (
     STICK,
     UNCERTIFIED,
 )
-from heelstrike.contact.sets import LINE, projected
+from heelstrike.contact.sets import LINE, projected, row_of
 from heelstrike.contact.solvers.least_norm import split
 from heelstrike.contact.workspace import (
     ContactAnswer,
@@ -87,15 +87,17 @@ def assemble(
             weight[size] *= math.sqrt(1.0 + ratio[size] * ratio[size])
         size += 1
     for i in range(size):
-        row = source[equation[i]]
-        row_scale = scale[equation[i]]
-        tableau[i, 0] = reduced.offset[equation[i]]
-        for j in range(size):
-            column = source[equation[j]]
+        tableau[i, 0] = reduced.offset[row_of(i, equation)]
+    for j in range(size):
+        unknown = row_of(j, equation)
+        column, column_scale, along = row_of(unknown, source), scale[unknown], ratio[j]
+        for i in range(size):
+            of_row = row_of(i, equation)
+            row = row_of(of_row, source)
             entry = delassus[row, column]
-            if ratio[j] != 0.0:
-                entry += ratio[j] * delassus[row, column + 1]
-            tableau[i, j + 1] = row_scale * entry * scale[equation[j]]
+            if along != 0.0:
+                entry += along * delassus[row, column + 1]
+            tableau[i, j + 1] = scale[of_row] * entry * column_scale
     equations.size = size
 
 

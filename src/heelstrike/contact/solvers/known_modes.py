@@ -14,7 +14,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.certificate import REST_TOLERANCE, certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
-from heelstrike.contact.sets import LINE, projected, row_of
+from heelstrike.contact.sets import EVERY_ROW, INTERVAL, LINE, projected, row_of
 from heelstrike.contact.solvers.elimination import POOR_PIVOT
 from heelstrike.contact.workspace import (
     ContactAnswer,
@@ -56,40 +56,48 @@ FAILS, HOLDS, MAY_DRIFT = range(3)
 
 
 @dissolved_kernel
-def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) -> int:
-    """List the rows that shall have no velocity; return how many differ, or -1 to give up."""
-    delassus, first = problem.delassus, problem.first
+def list_equations(
+    first_try: bool, problem: ContactProblem, mode: Integers, rows: StickingRows
+) -> int:
+    """List the rows that shall have no velocity; return how many differ, or -1 to give up.
+
+    In the first try nothing has been found to pull.
+    """
+    delassus, first, friction = problem.delassus, problem.first, problem.friction
     source, equation, sharers = rows.row, rows.equation, rows.sharers
-    for row in range(first[problem.count]):
-        equation[row] = -1
-    size = 0
+    size, end = 0, 0
     for contact in range(problem.count):
-        row = row_of(contact, first)
+        row, end = end, row_of(contact + 1, first)
         tangent = row + 1
+        equation[row] = equation[end - 1] = -1
+        if first_try:
+            rows.pulled[contact] = 0
         if mode[contact] == OPEN and problem.set[contact] != LINE:
             continue
-        has_friction = problem.friction[contact] > 0.0
+        has_friction = friction[contact] > 0.0
         if mode[contact] >= SLIDING_FORWARD or (has_friction and mode[contact] != STICK):
             return -1
         equation[row] = size
         source[size] = row
         sharers[size] = 1.0
-        size += 1
+        size = (size + 1) & EVERY_ROW
         if not has_friction:
             continue
-        for earlier in range(contact):
+        diagonal = delassus[tangent, tangent]
+        for earlier in range(contact - 1, -1, -1):  # neighbours of a sole are next to each other
             other = row_of(earlier, first) + 1
-            if problem.friction[earlier] > 0.0 and equation[other] >= 0:
-                both = delassus[tangent, tangent] + delassus[other, other]
+            if friction[earlier] > 0.0 and equation[other] >= 0:
+                both = diagonal + delassus[other, other]
                 if abs(both - 2.0 * delassus[tangent, other]) <= SHARED_ROW * both:
-                    equation[tangent] = equation[other]
-                    sharers[equation[other]] += 1.0
+                    shared = row_of(other, equation)
+                    equation[tangent] = shared
+                    sharers[shared] += 1.0
                     break
         if equation[tangent] < 0:
             equation[tangent] = size
             source[size] = tangent
             sharers[size] = 1.0
-            size += 1
+            size = (size + 1) & EVERY_ROW
     return size
 
 
@@ -104,24 +112,27 @@ def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> tup
     """
     if size >= rows.programs.shape[0] or rows.programs[size] == 0:
         return FAILS, 0
-    delassus, source, matrix = problem.delassus, rows.row, rows.lower_half
-    x, pivot = rows.x, rows.pivot
+    delassus, free, source, matrix = problem.delassus, problem.free, rows.row, rows.lower_half
+    x, pivot, diagonals = rows.x, rows.pivot, rows.spare
     outcome, rank = FAILS, 0
     for attempt in range(2):
         place = 0
         for i in range(size):
             row = row_of(i, source)
-            x[i] = -problem.free[row]
+            x[i] = -free[row]
+            diagonals[i] = delassus[row, row]
             for j in range(i + 1):
-                matrix[place] = delassus[row, row_of(j, source)]
-                place += 1
+                matrix[place + j] = delassus[row, row_of(j, source)]
+            place = (place + i + 1) & EVERY_ROW
         play(rows.programs[size], (matrix, x, pivot))
         outcome, late, rank = HOLDS, -1, 0
         for i in range(size):
-            row = row_of(i, source)
-            diagonal = delassus[row, row]
+            diagonal = diagonals[i]
+            if pivot[i] > EARLY_PIVOT * diagonal:
+                rank += 1
+                continue
             rank += pivot[i] > POOR_PIVOT * diagonal
-            if pivot[i] > EARLY_PIVOT * diagonal or abs(pivot[i]) <= NO_PIVOT * diagonal:
+            if abs(pivot[i]) <= NO_PIVOT * diagonal:
                 continue
             if late < 0 and pivot[i] <= COSTLY_PIVOT * diagonal:
                 late = i
@@ -160,17 +171,21 @@ def leave_out_idle(size: int, rows: StickingRows) -> None:
     counts 1/m.
     """
     matrix, x, basis, sharers = rows.lower_half, rows.x, rows.square, rows.sharers
-    found = 0
+    found, diagonal = 0, 0
     for row in range(size):
-        if matrix[row * (row + 1) // 2 + row] != 0.0:
+        diagonal = (diagonal + row) & EVERY_ROW
+        if matrix[diagonal + row] != 0.0:
             continue
         direction = basis[found]
         for i in range(size):
             direction[i] = 0.0
         direction[row] = 1.0
+        begin = diagonal
         for i in range(row, 0, -1):
+            part = direction[i]
             for j in range(i):
-                direction[j] -= matrix[i * (i + 1) // 2 + j] * direction[i]
+                direction[j] -= matrix[begin + j] * part
+            begin = (begin - i) & EVERY_ROW
         for earlier in range(found):
             remove_part(size, basis[earlier], sharers, direction)
         remove_part(size, direction, sharers, x)
@@ -183,11 +198,12 @@ def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -
     part = 0.0
     length = 0.0
     for i in range(size):
-        weighted = direction[i] / sharers[i]
+        weighted = direction[i] if sharers[i] == 1.0 else direction[i] / sharers[i]
         part += weighted * vector[i]
         length += weighted * direction[i]
+    ratio = part / length
     for i in range(size):
-        vector[i] -= part / length * direction[i]
+        vector[i] -= ratio * direction[i]
 
 
 @dissolved_kernel
@@ -296,6 +312,17 @@ def shorten(rank: int, size: int, rows: StickingRows) -> None:
 
 
 @dissolved_kernel
+def share_of(row: int, rows: StickingRows) -> float:
+    """What a row has of the solution if all that share its equation have equal parts."""
+    place = rows.equation[row]
+    if place < 0:
+        return 0.0
+    place = place & EVERY_ROW
+    sharers = rows.sharers[place]
+    return float(rows.x[place] if sharers == 1.0 else rows.x[place] / sharers)
+
+
+@dissolved_kernel
 def share_impulses(
     problem: ContactProblem, alone: bool, rows: StickingRows, answer: ContactAnswer
 ) -> int:
@@ -306,12 +333,21 @@ def share_impulses(
     `alone` tells that no other solution has the same effect. -1 is returned where friction is not
     held.
     """
-    impulse, first = answer.impulse, problem.first
-    largest = 0.0
-    for row in range(first[problem.count]):
-        place = rows.equation[row]
-        impulse[row] = rows.x[place] / rows.sharers[place] if place >= 0 else 0.0
-        largest = max(largest, abs(impulse[row]))
+    impulse, first, friction = answer.impulse, problem.first, problem.friction
+    largest, end, inside = 0.0, 0, True
+    for contact in range(problem.count):
+        row, end = end, row_of(contact + 1, first)
+        normal = tangent = share_of(row, rows)
+        if end > row + 1:
+            tangent = share_of(row + 1, rows)
+            inside = inside and abs(tangent) <= friction[contact] * normal
+            impulse[row + 1] = tangent
+        impulse[row] = normal
+        kind = problem.set[contact]
+        inside = inside and kind != INTERVAL and (normal >= 0.0 or kind == LINE)
+        largest = max(largest, max(abs(normal), abs(tangent)))
+    if inside:
+        return 0
     pulling = 0
     for contact in range(problem.count):
         if impulse[row_of(contact, first)] < -CLEAN * largest and problem.set[contact] != LINE:
@@ -344,24 +380,26 @@ def share_within_cones(
     other cone to its edge.
     """
     impulse, first, total = answer.impulse, problem.first, abs(rows.x[place])
+    edge, tangent, count, end = rows.spare, rows.order, 0, 0
+    for contact in range(problem.count):
+        row, end = end, row_of(contact + 1, first)
+        if end > row + 1 and rows.equation[row + 1] == place:
+            _, edge[count] = projected(problem, contact, impulse[row], total)
+            tangent[count] = row + 1
+            count = (count + 1) & EVERY_ROW
     level, higher = 0.0, total / rows.sharers[place]
     while higher > level:
         level = higher
         rest, sharers = total, 0.0
-        for contact in range(problem.count):
-            row = row_of(contact, first)
-            if row_of(contact + 1, first) > row + 1 and rows.equation[row + 1] == place:
-                _, edge = projected(problem, contact, impulse[row], level)
-                rest -= edge if edge < level else 0.0
-                sharers += edge >= level
+        for member in range(count):
+            rest -= edge[member] if edge[member] < level else 0.0
+            sharers += edge[member] >= level
         if sharers == 0.0:
             return False
         higher = rest / sharers
-    for contact in range(problem.count):
-        row = row_of(contact, first)
-        if row_of(contact + 1, first) > row + 1 and rows.equation[row + 1] == place:
-            _, share = projected(problem, contact, impulse[row], level)
-            impulse[row + 1] = share if rows.x[place] > 0.0 else -share
+    for member in range(count):
+        share = min(edge[member], level)
+        impulse[row_of(member, tangent)] = share if rows.x[place] > 0.0 else -share
     return True
 
 
@@ -410,11 +448,9 @@ def repeat(
     After a success the answer is the one of least norm, certified as :data:`AS_GOOD`. Of contacts
     that pull or press although they should not, the modes are changed.
     """
-    for contact in range(problem.count):
-        rows.pulled[contact] = 0
     drifts = False
-    for _ in range(TRIES):
-        size = list_equations(problem, answer.mode, rows)
+    for attempt in range(TRIES):
+        size = list_equations(attempt == 0, problem, answer.mode, rows)
         if size < 0:
             return False
         solved, rank = (FAILS, 0) if drifts else solve_at_once(size, problem, rows)

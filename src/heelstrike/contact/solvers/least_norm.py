@@ -6,7 +6,7 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
-from heelstrike.contact.sets import LINE, contains
+from heelstrike.contact.sets import LINE, contains, row_of
 from heelstrike.contact.solvers.pivoting import pivot_to_solution
 from heelstrike.contact.workspace import (
     ContactProblem,
@@ -61,7 +61,8 @@ def keep_velocity(
     Where contacts slip the equations leave their slip speed open, so a free direction may change
     it. Elimination on the velocities that the directions cause leaves the combinations without.
     """
-    rows, size, delassus = problem.first[problem.count], equations.size, problem.delassus
+    rows, size = row_of(problem.count, problem.first), equations.size
+    delassus = problem.delassus
     equation, ratio, weight = equations.unknown, equations.friction_ratio, equations.weight
     basis, image, kind = equations.basis, equations.image, equations.moves
     for k in range(found):
@@ -69,16 +70,20 @@ def keep_velocity(
         for i in range(rows):
             image[k, i] = 0.0
         for j in range(size):
-            column = reduced.source[equation[j]]
+            column = row_of(row_of(j, equation), reduced.source)
             scaled = basis[k, j] / weight[j]
             largest = max(largest, abs(scaled))
-            along = scaled * reduced.scale[equation[j]]
+            along = scaled * reduced.scale[row_of(j, equation)]
+            across = along * ratio[j]
             for i in range(rows):
-                diagonal = delassus[i, i]
-                entry = along * delassus[i, column]
-                if ratio[j] != 0.0:
-                    entry += along * ratio[j] * delassus[i, column + 1]
-                image[k, i] += entry / math.sqrt(diagonal) if diagonal > 0.0 else entry
+                image[k, i] += along * delassus[i, column]
+            if across != 0.0:
+                for i in range(rows):
+                    image[k, i] += across * delassus[i, column + 1]
+        for i in range(rows):
+            diagonal = delassus[i, i]
+            if diagonal > 0.0:
+                image[k, i] /= math.sqrt(diagonal)
         for other in range(k):
             if kind[other] == 1:
                 along = 0.0

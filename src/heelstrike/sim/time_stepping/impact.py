@@ -328,11 +328,8 @@ def speed_before(
 
 
 @kernel
-def pose_impact(
-    step: float, members: int, candidate: Integers, gap: Floats, mode: Integers,
-    problem: ContactProblem, impact: Impact,
-) -> None:  # fmt: skip
-    """Write the problem of the impact: what takes part, without the gaps, with its bounces."""
+def leave_others_out(members: int, problem: ContactProblem, impact: Impact) -> None:
+    """Write what the problem of the positions is of the members alone."""
     its = impact.problem
     for place in range(members):
         source = impact.member[place]
@@ -346,17 +343,27 @@ def pose_impact(
                     entry = problem.delassus[row + i, column + j]
                     its.delassus[own + i, its.first[other] + j] = entry
                     its.delassus[its.first[other] + j, own + i] = entry
-        normal, now = problem.free[row], gap[candidate[source]]
-        if now < np.inf:
-            normal -= (max(now, 0.0) if impact.relaxed == 1 else now) / step
-        its.free[own] = normal + impact.bounce[place]
-        if size == 2:
-            its.free[own + 1] = problem.free[row + 1]
+        for i in range(size):
+            its.free[own + i] = problem.free[row + i]
         its.friction[place] = problem.friction[source]
         its.set[place] = problem.set[source]
         its.bound[place] = problem.bound[source]
-        impact.answer.mode[place] = mode[source]
     its.count = members
+
+
+@dissolved_kernel
+def pose_impact(
+    step: float, candidate: Integers, gap: Floats, mode: Integers, impact: Impact,
+    problem: ContactProblem,
+) -> None:  # fmt: skip
+    """Turn the problem of the members' positions into that of the impact: bounces, not gaps."""
+    for place in range(problem.count):
+        source, row = impact.member[place], row_of(place, problem.first)
+        now = gap[candidate[source]]
+        if now < np.inf:
+            problem.free[row] -= (max(now, 0.0) if impact.relaxed == 1 else now) / step
+        problem.free[row] += impact.bounce[place]
+        impact.answer.mode[place] = mode[source]
 
 
 @kernel
@@ -463,11 +470,15 @@ def pose_way_out(
 
 @kernel
 def solve_impact(
-    order: Integers, members: int, problem: ContactProblem, solver: ContactWorkspace,
+    order: Integers, problem: ContactProblem, posed: ContactProblem, solver: ContactWorkspace,
     impact: Impact, assembly: Assembly,
 ) -> bool:  # fmt: skip
-    """Put the answer of the impact in the place of that of the positions; return success."""
-    status = solve_restitution(order, impact.problem, solver, impact, impact.answer)
+    """Put the answer of the impact in the place of that of the positions; return success.
+
+    ``posed`` is the impact of its members. If these are all, it is the problem of the positions,
+    turned into that.
+    """
+    status = solve_restitution(order, posed, solver, impact, impact.answer)
     answer, its, first = assembly.answer, impact.answer, problem.first
     for place in range(problem.count):
         impact.arriving_mode[place] = answer.mode[place]
@@ -475,17 +486,33 @@ def solve_impact(
     for row in range(first[problem.count]):
         impact.arriving_impulse[row] = answer.impulse[row]
         answer.impulse[row] = 0.0
-    for place in range(members):
-        source, own = impact.member[place], impact.problem.first[place]
+    for place in range(posed.count):
+        source, own = impact.member[place], row_of(place, posed.first)
+        row, end = row_of(source, first), row_of(source + 1, first)
         answer.mode[source] = its.mode[place]
-        for row in range(first[source], first[source + 1]):
-            answer.impulse[row] = its.impulse[own + row - first[source]]
+        answer.impulse[row] = its.impulse[own]
+        if end > row + 1:
+            answer.impulse[row + 1] = its.impulse[own + 1]
+            answer.velocity[row + 1] = its.velocity[own + 1]
+    if posed.count < problem.count:
+        find_slips(posed.count, problem, impact.member, answer)
+    for i in range(3):
+        answer.residual[i] = max(answer.residual[i], its.residual[i])
+    return status == SOLVED
+
+
+@kernel
+def find_slips(
+    members: int, problem: ContactProblem, member: Integers, answer: ContactAnswer
+) -> None:
+    """Write the tangential velocities, after an impact, of those that have no part in it."""
+    first, known = problem.first, 0
     for place in range(problem.count):
+        if known < members and member[known] == place:
+            known += 1
+            continue
         for row in range(first[place] + 1, first[place + 1]):
             slip = problem.free[row]
             for column in range(first[problem.count]):
                 slip += problem.delassus[row, column] * answer.impulse[column]
             answer.velocity[row] = slip
-    for i in range(3):
-        answer.residual[i] = max(answer.residual[i], its.residual[i])
-    return status == SOLVED

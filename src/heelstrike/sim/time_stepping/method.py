@@ -139,6 +139,7 @@ from heelstrike.sim.time_stepping.impact import (
     falls_into,
     find_members,
     hardest_point,
+    leave_others_out,
     left_alone,
     modes_change,
     note_touching,
@@ -822,8 +823,12 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
                 impact.bounce[place] = restitution * speed_before(
                     model, entry, memory.v, rows, tree, contacts, second_faces
                 )
-        pose_impact(step, members, candidate, gap, answer.mode, problem, impact)
-        solved = solve_impact(work.order, members, problem, memory.solver, impact, assembly)
+        posed = problem
+        if members < count:
+            leave_others_out(members, problem, impact)
+            posed = impact.problem
+        pose_impact(step, candidate, gap, answer.mode, impact, posed)
+        solved = solve_impact(work.order, problem, posed, memory.solver, impact, assembly)
     push_all(
         model, near, count, straight, contacts, points, candidate, first, answer.impulse,
         directions, equations, usual.point_impulse, next_v,
