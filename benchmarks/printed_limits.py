@@ -1,21 +1,28 @@
-"""Which of the limits of printed runs ours break: an audit in the equations of their author.
+"""Which of the limits of printed gaits ours break, and which his own: an audit in his equations.
 
 Run, from the top folder::
 
-    python benchmarks/printed_limits.py
+    python benchmarks/printed_limits.py [FOLDER]
 
-M. P. Kelly's TwoPhaseOptimalGait (2016) asks more of a run than `printed_optima.py` does
-(`GAIT_Run/Trajectory_Run.m`, `Continuous_Run.m` and `Endpoint_Run.m`): no force or torque goes from
-zero to its largest value in less than 0.8 s; they jump only where phases join. Legs turn by at most
-2π rad/s, within ±π/2, and grow by at most all that they can in 0.3 s. The foot in the air keeps
-above ½h (1 + cos(π x / step)) in stance, h being 2 cm and x how far it is ahead of the one that
-stands, and above the ground in flight, at no more than 4 m/s either way. A foot that leaves the
-ground is no longer pressed on it.
+A motion of `printed_optima.py` is put into the equations of the three point masses of M. P. Kelly's
+TwoPhaseOptimalGait (2016). What his legs would have to exert follows from its coordinates alone.
+Then come the cost of transport and, at `INSTANTS` instants of each phase, the largest share of each
+limit that is used, and by how much all else is missed: shares above 1 are breaches. Further limits
+are that legs stay within ±π/2, and that the feet of a run are not below the ground in flight and
+move at no more than 4 m/s either way.
 
-A motion is put into the equations of his three point masses. What his legs would have to exert
-follows from its coordinates alone. Then come the cost of transport and, at `INSTANTS` instants of
-each phase, the largest share of each limit that is used, and by how much all else is missed. One
-row for each limit; shares above 1 are breaches.
+FOLDER is his program (github.com/MatthewPeterKelly), fetched by who wants it, of which three files
+are read: ``GAIT_Run/DATA_Run.mat``, ``GAIT_Run/oldSoln_Run_CoT.mat`` and
+``GAIT_Walk/oldSoln_Walk_CoT.mat``. Nothing is fetched here. They hold his solutions at five times
+as many instants as those at which his equations and limits hold: so what he prints, the sum over
+the latter, can be compared with the motion between them. It is audited like ours, but for rates,
+which are those of the forces that he stored. These forces, straight between those instants, are also integrated from his first instant in the
+equations of the three masses: what they cost, and by how much the end misses the state in which the
+gait goes on.
+
+At the ankle of ours the audit finds what his would have to exert between the instants at which our
+equations of motion hold. In runs, where ours have none, only its largest torque says something; its
+rate is that of this error.
 """
 
 from __future__ import annotations
@@ -27,7 +34,15 @@ from typing import Any
 
 import numpy as np
 from printed_optima import (
-    FRICTION, GRAVITY, GROWS, PRINTED, SLOWEST, TURNS, WEIGHT, Biped, found,
+    FRICTION,
+    GRAVITY,
+    GROWS,
+    PRINTED,
+    SLOWEST,
+    TURNS,
+    WEIGHT,
+    Biped,
+    found,
 )  # fmt: skip
 from rich.console import Console
 from scipy.integrate import solve_ivp
@@ -333,6 +348,20 @@ def stored_phase(
     )
 
 
+def rates_stored(biped: Biped, motion: Stored) -> dict[str, float]:
+    """Rates of his forces between the instants that he stored, as shares of the limits."""
+    moment = WEIGHT * biped.longest
+    sizes = [biped.push * WEIGHT] * 2 + [biped.ankle * moment, biped.turn * moment]
+    shares = np.zeros(4)
+    for phase in motion.phases:
+        rates = np.diff(phase.forces, axis=0) / np.diff(phase.times)[:, None]
+        shares = np.maximum(shares, np.abs(rates).max(axis=0) * SLOWEST / sizes)
+    return {
+        "rate of leg": float(shares[:2].max()), "rate of ankle": float(shares[2]),
+        "rate of hip": float(shares[3]),
+    }  # fmt: skip
+
+
 def integrated(biped: Biped, motion: Stored) -> tuple[float, float]:
     """Integrate his forces in the equations of the three masses, from his first instant.
 
@@ -398,23 +427,23 @@ def main() -> None:
     """Print a table for each gait."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
     for name, printed in PRINTED.items():
-        biped = printed.biped
-        columns = [audit(biped, found(name))]
-        heads, facts = ["ours"], [["", f"{printed.cost:.6f}"]]
+        told = {"ours": audit(printed.biped, found(name))}
+        body = [["printed", "", f"{printed.cost:.6f}"]]
         if folder is not None:
-            his = stored(folder / FILES[name], biped)
-            columns.append(audit(biped, his))
-            heads.append("his")
-            missed, spent = integrated(biped, his)
-            facts += [["", f"{spent:.6f}"], ["", f"{missed:.1e}"]]
-        told = ["printed", "his forces, integrated", "these miss (m, m/s)"]
-        body = [[what, *cells] for what, cells in zip(told, facts, strict=False)]
-        body.append(["cost of transport", *(f"{each.cost:.6f}" for each in columns)])
-        for what in columns[0].used:
-            body.append([what, *(f"{each.used.get(what, 0.0):.4f}" for each in columns)])
-        for what in columns[0].missing:
-            body.append([what, *(f"{each.missing.get(what, 0.0):.1e}" for each in columns)])
-        Console(width=100).print(Table(name, ["what", *heads], body))
+            his = stored(folder / FILES[name], printed.biped)
+            told["his"] = audit(printed.biped, his)
+            told["his"].used.update(rates_stored(printed.biped, his))
+            missed, spent = integrated(printed.biped, his)
+            body.append(["his forces, integrated", "", f"{spent:.6f}"])
+            body.append(["these miss (m, m/s)", "", f"{missed:.1e}"])
+        body.append(["cost of transport", *(f"{each.cost:.6f}" for each in told.values())])
+        for part, form in (("used", ".4f"), ("missing", ".1e")):
+            for what in getattr(told["ours"], part):
+                values = (getattr(each, part)[what] for each in told.values())
+                body.append([what, *(f"{value:{form}}" for value in values)])
+        head = ["what", "ours", "his"]
+        rows = [[*row, ""][: len(head)] for row in body]
+        Console(width=100).print(Table(name, head, rows))
 
 
 if __name__ == "__main__":

@@ -29,7 +29,8 @@ without mass, 0.36 m long, of which the ground must not pull an end. The trunk b
 an inertia of 0.01 kg m², which his has not. What must be zero may be as large as `Biped.room`
 (weights; weights times leg), since bounds without room between them stop the optimiser: the force
 on the foot that leaves, the sum of the torques at the two hips, all torques on both feet of the
-walk. |P| is rounded off to √(P² + ε²) − ε, with ε = `Biped.eased`.
+walk. Our design counts the powers of both hips, which are his where one leg turns forwards and the
+other backwards, and more where both turn the same way.
 
 The table has the costs of transport that his files tell, and those of our motions by inverse
 dynamics on 400 instants of each phase, in his sense; times are of the processor. Limits hold at the
@@ -94,8 +95,6 @@ class Biped:
     """Of the trunk (kg m²)."""
     room: float = 1e-3
     """How large may be what must be zero, in units of weight, or of weight times leg."""
-    eased: float = 0.3
-    """Power (W) below which its corner is rounded off."""
 
     def robot(self) -> hs.Robot:
         """Return the robot."""
@@ -137,11 +136,6 @@ class Biped:
         others = [k for k in range(2 * left) if k % left]
         return [between, *(torque[k] * velocity[k] for k in others)]
 
-    def spent(self, now: hs.gait.Instant) -> Any:
-        """Power that is spent."""
-        found = self.powers(now.torque, now.motor_velocity)
-        return sum(casadi.sqrt(power**2 + self.eased**2) - self.eased for power in found)
-
     def kept(self, now: hs.gait.Instant, step: float) -> Any:
         """What his limits keep from being negative, in a gait of such steps (m)."""
         left, points = self.sizes.size // 2, 2 if self.soles else 1
@@ -178,7 +172,7 @@ FAR = 10.0
 RUNNER = Biped(7.2, 0.4, 0.6, 1.0, lifted=0.02, ankle=0.05)
 OTHER = replace(RUNNER, ankle=0.2, push=5.0, turn=1.0)
 WALKER = Biped(
-    6.8, 0.6, 0.7, 0.9, lifted=0.01, ankle=0.2, soles=True, room=1e-4, eased=0.02
+    6.8, 0.6, 0.7, 0.9, lifted=0.01, ankle=0.2, soles=True, room=3e-4
 )  # fmt: skip
 
 
@@ -243,7 +237,7 @@ def found(name: str) -> hs.Motion:
     biped = printed.biped
     return hs.optimize_motion(
         biped.robot(), printed.phases, **printed.asked, friction=FRICTION, clearance=0.0,
-        cost=biped.spent, constraint=lambda now: biped.kept(now, printed.step), starts=1,
+        cost="mechanical_energy", constraint=lambda now: biped.kept(now, printed.step), starts=1,
         refine=False,
     )  # fmt: skip
 

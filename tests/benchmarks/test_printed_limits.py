@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from closing import mechanics_of
-from pathlib import Path
-
-from printed_limits import Exerted, Stored, audit, integrated, stored, stored_phase
+from printed_limits import (
+    Exerted,
+    Stored,
+    audit,
+    integrated,
+    rates_stored,
+    stored,
+    stored_phase,
+)
 from printed_optima import GRAVITY, RUNNER, WALKER, WEIGHT
 from scipy.io import savemat
 
@@ -81,12 +88,12 @@ def test_two_feet_share_the_hip() -> None:
     q = draw.standard_normal((STATES, 7)) * 0.1 - [0.0, 0.0, 0.0, 0.5, 0.1, -0.5, 0.1]
     v, a = draw.standard_normal((2, STATES, 7))
     told = Exerted.by(WALKER, [q, v, a], [True, True])
-    masses = (WALKER.hip, WALKER.foot, WALKER.foot)
+    masses, gravity = (WALKER.hip, WALKER.foot, WALKER.foot), np.array([0.0, GRAVITY])
     moved = (a[:, :2], *(leg.acceleration for leg in told.legs))
-    momentum = sum(m * (each + [0.0, GRAVITY]) for m, each in zip(masses, moved, strict=True))
+    momentum = sum(m * (each + gravity) for m, each in zip(masses, moved, strict=True))
     assert told.ground.sum(axis=0) == pytest.approx(momentum)
     pushed = sum(f[:, None] * leg.along for f, leg in zip(told.axial, told.legs, strict=True))
-    assert pushed == pytest.approx(-WALKER.hip * (a[:, :2] + [0.0, GRAVITY]))
+    assert pushed == pytest.approx(-WALKER.hip * (a[:, :2] + gravity))
     assert told.moment == pytest.approx(0.0, abs=1e-9)
 
 
@@ -95,7 +102,7 @@ TIMES = np.linspace(0.0, LASTS, 21)
 
 
 def pushed_up() -> tuple[dict[str, np.ndarray], list[np.ndarray]]:
-    """A hip that is pushed up from rest on an upright leg; the other one hangs, and its foot falls."""
+    """A hip is pushed up from rest on an upright leg; the other one hangs, and its foot falls."""
     rise, nothing = PUSH / RUNNER.hip - GRAVITY, 0.0 * TIMES
     values = {
         "th1": nothing, "th2": nothing, "dth1": nothing, "dth2": nothing,
@@ -115,6 +122,16 @@ def test_forces_are_integrated_in_his_equations() -> None:
     assert missed == pytest.approx(max(GRAVITY * LASTS, rise * LASTS), rel=1e-6)
 
 
+def test_rates_of_stored_forces_are_told() -> None:
+    """One leg gains two weights in 0.8 s, of four that it may gain; the hip four times its most."""
+    values, forces = pushed_up()
+    forces[0] = 2.0 * WEIGHT * TIMES / 0.8
+    forces[3] = -4.0 * 0.5 * WEIGHT * TIMES / 0.8
+    phase = stored_phase("S", TIMES, values, forces, RUNNER)
+    told = rates_stored(RUNNER, Stored([phase], 0.5))
+    assert told == pytest.approx({"rate of leg": 0.5, "rate of ankle": 0.0, "rate of hip": 4.0})
+
+
 def test_stored_solutions_are_read(tmp_path: Path) -> None:
     """Both kinds of file tell the same."""
     values, forces = pushed_up()
@@ -123,7 +140,8 @@ def test_stored_solutions_are_read(tmp_path: Path) -> None:
     by_points = {"phase": "S", "time": TIMES, "state": values, "step": {"distance": 0.5}}
     by_points["control"] = dict(zip(("F1", "F2", "T1", "Thip"), forces, strict=True))
     of_result = {
-        "solution": {"parameter": 0.5}, "setup": {"auxdata": {"phase": np.array(["S", "S"], object)}},
+        "solution": {"parameter": 0.5},
+        "setup": {"auxdata": {"phase": np.array(["S", "S"], object)}},
         "interpsolution": {"phase": np.array([{"time": TIMES, "state": states}] * 2, object)},
     }  # fmt: skip
     savemat(tmp_path / "a.mat", {"plotInfo": {"data": np.array([by_points] * 2, object)}})

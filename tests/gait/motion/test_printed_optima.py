@@ -59,7 +59,8 @@ def instant(
     return Instant(
         position=casadi.DM(still), velocity=casadi.DM.zeros(7), torque=casadi.DM(torque),
         motor_velocity=casadi.DM.zeros(4), force=casadi.DM.zeros(2),
-        points=casadi.DM([[0.0, 0.0], [0.0, 0.1]]), point_force=casadi.DM([[load, 0.0], [0.0, 0.0]]),
+        points=casadi.DM([[0.0, 0.0], [0.0, 0.1]]),
+        point_force=casadi.DM([[load, 0.0], [0.0, 0.0]]),
         stands=casadi.DM([1.0, 0.0]), share=casadi.DM(share), torque_rate=casadi.DM(rate),
     )  # fmt: skip
 
