@@ -16,9 +16,9 @@ are read: ``GAIT_Run/DATA_Run.mat``, ``GAIT_Run/oldSoln_Run_CoT.mat`` and
 ``GAIT_Walk/oldSoln_Walk_CoT.mat``. Nothing is fetched here. They hold his solutions at five times
 as many instants as those at which his equations and limits hold: so what he prints, the sum over
 the latter, can be compared with the motion between them. It is audited like ours, but for rates,
-which are those of the forces that he stored. These forces, straight between those instants, are also integrated from his first instant in the
-equations of the three masses: what they cost, and by how much the end misses the state in which the
-gait goes on.
+which are those of the forces that he stored. These forces, straight between those instants, are
+also integrated in the equations of the three masses from his first instant: what they cost, and by
+how much the end misses the state in which the gait goes on.
 
 At the ankle of ours the audit finds what his would have to exert between the instants at which our
 equations of motion hold. In runs, where ours have none, only its largest torque says something; its
