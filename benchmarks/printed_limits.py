@@ -161,14 +161,14 @@ class Exerted:
         return cls(legs, axial, moment, ground, lacking)
 
 
-def audit(biped: Biped, motion: hs.Motion) -> Audit:
-    """Put a run of points on the ground, one at a time, into the equations of his three masses.
+def audit(biped: Biped, motion: hs.Motion | Stored) -> Audit:
+    """Put a gait on points or flat feet into the equations of his three masses.
 
     Parameters
     ----------
     biped : Biped
         His, with its limits; that of the motion may have others, and a trunk.
-    motion : Motion
+    motion : Motion or Stored
         A motion that repeats mirrored, of which only the polynomials are taken.
 
     Returns
@@ -176,7 +176,7 @@ def audit(biped: Biped, motion: hs.Motion) -> Audit:
     Audit
         Its cost and limits.
     """
-    spent = 0.0
+    spent, phases = 0.0, list[Any](motion.phases)
     used, missing = dict[str, float](), dict[str, float]()
 
     def most(found: dict[str, float], name: str, values: Any) -> None:
@@ -186,12 +186,12 @@ def audit(biped: Biped, motion: hs.Motion) -> Audit:
     sizes = {"leg": biped.push, "hip": biped.turn * longest, "ankle": biped.ankle * longest}
     standing = [
         [any(side in name for name in phase.contacts) for side in ("right", "left")]
-        for phase in motion.phases
+        for phase in phases
     ]
     standing.append(standing[0][::-1])  # as it goes on, mirrored
     first: list[np.ndarray] = []
     last: list[np.ndarray] = []
-    for phase, stands, after in zip(motion.phases, standing, standing[1:], strict=False):
+    for phase, stands, after in zip(phases, standing, standing[1:], strict=False):
         times = np.linspace(0.0, phase.duration, INSTANTS + 1)
         moved = [phase.coordinates(times, order=order) for order in range(3)]
         now = Exerted.by(biped, moved, stands)

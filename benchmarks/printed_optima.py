@@ -245,18 +245,21 @@ def cost_of_transport(biped: Biped, motion: hs.Motion) -> float:
     return total / (robot.weight * motion.distance)
 
 
+def designed(printed: Printed, biped: Biped, begun: hs.Motion | None = None) -> hs.Motion:
+    """Design the gait of a biped that stands beside a printed one, perhaps from another."""
+    return hs.optimize_motion(
+        biped.robot(), printed.phases, **printed.asked, friction=FRICTION, clearance=0.0,
+        cost=biped.spent if biped.soles else "mechanical_energy", warm_start=begun,
+        constraint=lambda now: biped.kept(now, printed.step), starts=1, refine=False,
+    )  # fmt: skip
+
+
 def found(name: str) -> hs.Motion:
     """Find the gait that stands beside a printed one; a walk first with more room."""
     printed, motion = PRINTED[name], None
-    rooms = (*SKETCHED, printed.biped.room) if printed.biped.soles else (printed.biped.room,)
-    for room in rooms:
-        biped = replace(printed.biped, room=room)
-        motion = hs.optimize_motion(
-            biped.robot(), printed.phases, **printed.asked, friction=FRICTION, clearance=0.0,
-            cost=biped.spent if biped.soles else "mechanical_energy", warm_start=motion,
-            constraint=lambda now, own=biped: own.kept(now, printed.step), starts=1, refine=False,
-        )  # fmt: skip
-    return motion
+    for room in SKETCHED if printed.biped.soles else ():
+        motion = designed(printed, replace(printed.biped, room=room), motion)
+    return designed(printed, printed.biped, motion)
 
 
 def main() -> None:
