@@ -1,50 +1,63 @@
-"""Which of the limits of printed runs ours break: an audit in the equations of their author.
+"""Which of the limits of printed gaits ours break, and which his own: an audit in his equations.
 
 Run, from the top folder::
 
-    python benchmarks/printed_limits.py
+    python benchmarks/printed_limits.py [FOLDER]
 
-M. P. Kelly's TwoPhaseOptimalGait (2016) asks more of a run than `printed_optima.py` does
-(`GAIT_Run/Trajectory_Run.m`, `Continuous_Run.m` and `Endpoint_Run.m`): no force or torque goes from
-zero to its largest value in less than 0.8 s; they jump only where phases join. Legs turn by at most
-2π rad/s, within ±π/2, and grow by at most all that they can in 0.3 s. The foot in the air keeps
-above ½h (1 + cos(π x / step)) in stance, h being 2 cm and x how far it is ahead of the one that
-stands, and above the ground in flight, at no more than 4 m/s either way. A foot that leaves the
-ground is no longer pressed on it.
+A motion of `printed_optima.py` is put into the equations of the three point masses of M. P. Kelly's
+TwoPhaseOptimalGait (2016). What his legs would have to exert follows from its coordinates alone.
+Then come the cost of transport and, at `INSTANTS` instants of each phase, the largest share of each
+limit that is used, and by how much all else is missed: shares above 1 are breaches. Further limits
+are that legs stay within ±π/2, and that the feet of a run are not below the ground in flight and
+move at no more than 4 m/s either way.
 
-A motion is put into the equations of his three point masses. What his legs would have to exert
-follows from its coordinates alone. Then come the cost of transport and, at `INSTANTS` instants of
-each phase, the largest share of each limit that is used, and by how much all else is missed. One
-row for each limit; shares above 1 are breaches.
+FOLDER is his program (github.com/MatthewPeterKelly), fetched by who wants it, of which three files
+are read: ``GAIT_Run/DATA_Run.mat``, ``GAIT_Run/oldSoln_Run_CoT.mat`` and
+``GAIT_Walk/oldSoln_Walk_CoT.mat``. Nothing is fetched here. They hold his solutions at five times
+as many instants as those at which his equations and limits hold: so what he prints, the sum over
+the latter, can be compared with the motion between them. It is audited like ours, but for rates,
+which are those of the forces that he stored. These forces, straight between those instants, are
+also integrated in the equations of the three masses from his first instant: what they cost, and by
+how much the end misses the state in which the gait goes on.
+
+At the ankle of ours the audit finds what his would have to exert between the instants at which our
+equations of motion hold. In runs, where ours have none, only its largest torque says something; its
+rate is that of this error.
 """
 
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from printed_optima import GRAVITY, PRINTED, RUNNER, WEIGHT, Biped, found
+from printed_optima import (
+    FRICTION,
+    GRAVITY,
+    GROWS,
+    PRINTED,
+    SLOWEST,
+    TURNS,
+    WEIGHT,
+    Biped,
+    found,
+)  # fmt: skip
 from rich.console import Console
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicHermiteSpline, CubicSpline, interp1d
+from scipy.io import loadmat
 from table import Table
 
 import heelstrike as hs
 
-FRICTION = 0.8
+DOWN = np.array([0.0, -GRAVITY])
 INSTANTS = 1000
-SLOWEST = 0.8
-"""Time (s) in which forces and torques may go from zero to their largest."""
-GROWS = 0.3
-"""Time (s) in which a leg may grow from its shortest to its longest."""
-TURNS = 2.0 * np.pi
-"""Largest rate of the angle of a leg (rad/s)."""
 SWINGS = 0.5 * np.pi
 """Largest angle of a leg (rad)."""
 FASTEST = 4.0
 """Largest speed of a foot in flight, along each axis (m/s)."""
-LIFTED = 0.02
-"""Greatest height asked of the foot in the air (m)."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +115,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class Exerted:
-    """What the legs of his biped exert at instants of a phase, one of two feet on the ground."""
+    """What the legs of his biped exert at instants of a phase."""
 
     legs: tuple[Leg, Leg]
     """legs: Right and left."""
@@ -111,22 +124,31 @@ class Exerted:
     moment: np.ndarray
     """(2, N) Moments of what acts on the feet about the hip, positive as the angles (N m)."""
     ground: np.ndarray
-    """(N, 2) Force on the foot that stands (N); zero in flight."""
+    """(2, N, 2) Forces on the feet that stand (N); zero on others."""
     lacking: np.ndarray
-    """(N, 2) Force that the hip lacks in flight (N); zero in stance."""
+    """(N, 2) Force that the hip lacks in flight (N); zero otherwise."""
 
     @classmethod
     def by(cls, biped: Biped, moved: list[np.ndarray], stands: list[bool]) -> Exerted:
-        """Return it of coordinates and their rates, (N, nv) each, and which feet stand."""
+        """Return it of coordinates and their rates, (N, nv) each, and which feet stand.
+
+        On both feet, legs have no moments: the hip and the ankles exert none.
+        """
         legs = (Leg.of(biped, moved, 0), Leg.of(biped, moved, 1))
         gravity = np.array([0.0, GRAVITY])
         wanted = -biped.hip * (moved[2][:, :2] + gravity)  # what the legs exert on the feet
         needed = [biped.foot * (leg.acceleration + gravity) for leg in legs]
-        force, ground, lacking = list(needed), 0.0 * wanted, wanted - sum(needed)
-        if any(stands):
+        force, lacking = list(needed), 0.0 * wanted
+        if all(stands):
+            ways = np.stack([leg.along for leg in legs], axis=2)
+            shares = np.linalg.solve(ways, wanted[:, :, None])
+            force = [shares[:, k] * leg.along for k, leg in enumerate(legs)]
+        elif any(stands):
             one = stands.index(True)
             force[one] = wanted - needed[1 - one]
-            ground, lacking = needed[one] - force[one], 0.0 * wanted
+        else:
+            lacking = wanted - sum(needed)
+        ground = np.array([each - f for each, f in zip(needed, force, strict=True)])
         axial = np.array(
             [np.sum(f * leg.along, axis=1) for f, leg in zip(force, legs, strict=True)]
         )
@@ -139,14 +161,14 @@ class Exerted:
         return cls(legs, axial, moment, ground, lacking)
 
 
-def audit(biped: Biped, motion: hs.Motion) -> Audit:
-    """Put a run of points on the ground, one at a time, into the equations of his three masses.
+def audit(biped: Biped, motion: hs.Motion | Stored) -> Audit:
+    """Put a gait on points or flat feet into the equations of his three masses.
 
     Parameters
     ----------
     biped : Biped
         His, with its limits; that of the motion may have others, and a trunk.
-    motion : Motion
+    motion : Motion or Stored
         A motion that repeats mirrored, of which only the polynomials are taken.
 
     Returns
@@ -154,7 +176,7 @@ def audit(biped: Biped, motion: hs.Motion) -> Audit:
     Audit
         Its cost and limits.
     """
-    spent = 0.0
+    spent, phases = 0.0, list[Any](motion.phases)
     used, missing = dict[str, float](), dict[str, float]()
 
     def most(found: dict[str, float], name: str, values: Any) -> None:
@@ -164,12 +186,12 @@ def audit(biped: Biped, motion: hs.Motion) -> Audit:
     sizes = {"leg": biped.push, "hip": biped.turn * longest, "ankle": biped.ankle * longest}
     standing = [
         [any(side in name for name in phase.contacts) for side in ("right", "left")]
-        for phase in motion.phases
+        for phase in phases
     ]
     standing.append(standing[0][::-1])  # as it goes on, mirrored
     first: list[np.ndarray] = []
     last: list[np.ndarray] = []
-    for phase, stands, after in zip(motion.phases, standing, standing[1:], strict=False):
+    for phase, stands, after in zip(phases, standing, standing[1:], strict=False):
         times = np.linspace(0.0, phase.duration, INSTANTS + 1)
         moved = [phase.coordinates(times, order=order) for order in range(3)]
         now = Exerted.by(biped, moved, stands)
@@ -203,12 +225,12 @@ def audit(biped: Biped, motion: hs.Motion) -> Audit:
             if not any(stands):
                 most(used, "speed of feet", np.abs(leg.velocity) / FASTEST)
                 most(missing, "clearance", -leg.place[:, 1])
-            elif k != one:
+            elif not stands[k]:
                 ahead = (leg.place - legs[one].place)[:, 0] / motion.distance
-                rise = 0.5 * LIFTED * (1.0 + np.cos(np.pi * ahead))
+                rise = 0.5 * biped.lifted * (1.0 + np.cos(np.pi * ahead))
                 most(missing, "clearance", rise - leg.place[:, 1])
             else:
-                along, away = now.ground.T / WEIGHT
+                along, away = now.ground[k].T / WEIGHT
                 most(missing, "foot at rest", np.abs(leg.velocity))
                 most(missing, "pulled", -away)
                 most(missing, "friction", np.abs(along) - FRICTION * away)
@@ -223,23 +245,205 @@ def audit(biped: Biped, motion: hs.Motion) -> Audit:
     return Audit(spent / (WEIGHT * motion.distance), used, missing)
 
 
-HIS = {
-    "run": replace(RUNNER, ankle=0.05),
-    "run, the other": replace(RUNNER, ankle=0.2, push=5.0, turn=1.0),
+FILES = {
+    "run": "GAIT_Run/DATA_Run.mat",
+    "run, the other": "GAIT_Run/oldSoln_Run_CoT.mat",
+    "walk": "GAIT_Walk/oldSoln_Walk_CoT.mat",
 }
-"""His biped: the second run is stored with other limits than the program of his that prints the
-first."""
+STAND = {"F": (), "S": ("right_foot",), "D": ("right_foot", "left_foot")}
+"""What stands in his phases. His first foot is our right one."""
+EXACT = 1e-9
+"""Tolerance of the integration."""
+
+
+@dataclass(frozen=True)
+class StoredPhase:
+    """A phase of a solution of his, at instants between those of his collocation, too."""
+
+    contacts: tuple[str, ...]
+    times: np.ndarray
+    """times: (N,) Instants (s)."""
+    moved: tuple[np.ndarray, np.ndarray]
+    """moved: (N, nv) Coordinates of our robot without ankles, and their rates."""
+    forces: np.ndarray
+    """(N, 4) Along the right leg and the left one, at the ankle and at the hip, as he has them."""
+
+    @property
+    def duration(self) -> float:
+        """Duration (s)."""
+        return float(self.times[-1])
+
+    def coordinates(self, times: np.ndarray, order: int = 0) -> np.ndarray:
+        """Coordinates or their derivatives, by splines through velocities, (N, nv)."""
+        if order == 0:
+            return np.asarray(CubicHermiteSpline(self.times, *self.moved)(times))
+        return np.asarray(CubicSpline(self.times, self.moved[1])(times, order - 1))
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A solution of his."""
+
+    phases: list[StoredPhase]
+    distance: float
+    """distance: Length of the step (m)."""
+
+
+def stored(file: Path, biped: Biped) -> Stored:
+    """Read a solution of his."""
+    told = loadmat(file, squeeze_me=True, struct_as_record=False)
+    if "plotInfo" in told:
+        data = told["plotInfo"].data
+        step = float(data[0].step.distance)
+        phases = []
+        for each in data:
+            values = {name: getattr(each.state, name) for name in each.state._fieldnames}
+            forces = [getattr(each.control, name) for name in ("F1", "F2", "T1", "Thip")]
+            phases.append(stored_phase(each.phase, each.time - each.time[0], values, forces, biped))
+        return Stored(phases, step)
+    result = told["outputPrev"].result
+    step = float(result.solution.parameter)
+    phases = []
+    for name, each in zip(result.setup.auxdata.phase, result.interpsolution.phase, strict=True):
+        columns, values, nothing = each.state.T, dict[str, np.ndarray](), 0.0 * each.time
+        polar = ("th1", "th2", "L1", "L2", "dth1", "dth2", "dL1", "dL2")
+        if name == "D":
+            x, y, dx, dy, *forces = columns
+            forces += [nothing, nothing]
+            for k, foot in (("1", 0.0), ("2", -step)):
+                length = np.hypot(foot - x, y)
+                values[f"th{k}"], values[f"L{k}"] = np.arctan2(foot - x, y), length
+                values[f"dth{k}"] = ((x - foot) * dy - y * dx) / length**2
+                values[f"dL{k}"] = ((x - foot) * dx + y * dy) / length
+        elif name == "S":
+            values.update(zip(polar, columns, strict=False))
+            forces = list(columns[8:])
+        else:
+            names = ("x1", "y1", *polar[:4], "dx1", "dy1", *polar[4:])
+            values.update(zip(names, columns, strict=False))
+            forces = [*columns[12:14], nothing, columns[14]]
+        phases.append(stored_phase(name, each.time, values, forces, biped))
+    return Stored(phases, step)
+
+
+def stored_phase(
+    name: str, times: np.ndarray, values: dict[str, np.ndarray], forces: list[np.ndarray],
+    biped: Biped,
+) -> StoredPhase:  # fmt: skip
+    """Return a phase of his: the hip is where his first leg has it."""
+    turn, length, turning, growth = (values[each] for each in ("th1", "L1", "dth1", "dL1"))
+    sine, cosine, nothing = np.sin(turn), np.cos(turn), 0.0 * times
+    place = [values.get(each, nothing) for each in ("x1", "y1", "dx1", "dy1")]
+    q = [place[0] - length * sine, place[1] + length * cosine, nothing]
+    v = [
+        place[2] - growth * sine - length * turning * cosine,
+        place[3] + growth * cosine - length * turning * sine,
+        nothing,
+    ]
+    for k in ("1", "2"):
+        q += [-values[f"th{k}"], values[f"L{k}"] - biped.longest]
+        v += [-values[f"dth{k}"], values[f"dL{k}"]]
+    return StoredPhase(
+        STAND[name], times, (np.stack(q, axis=1), np.stack(v, axis=1)), np.stack(forces, axis=1)
+    )
+
+
+def rates_stored(biped: Biped, motion: Stored) -> dict[str, float]:
+    """Rates of his forces between the instants that he stored, as shares of the limits."""
+    moment = WEIGHT * biped.longest
+    sizes = [biped.push * WEIGHT] * 2 + [biped.ankle * moment, biped.turn * moment]
+    shares = np.zeros(4)
+    for phase in motion.phases:
+        rates = np.diff(phase.forces, axis=0) / np.diff(phase.times)[:, None]
+        shares = np.maximum(shares, np.abs(rates).max(axis=0) * SLOWEST / sizes)
+    return {
+        "rate of leg": float(shares[:2].max()), "rate of ankle": float(shares[2]),
+        "rate of hip": float(shares[3]),
+    }  # fmt: skip
+
+
+def integrated(biped: Biped, motion: Stored) -> tuple[float, float]:
+    """Integrate his forces in the equations of the three masses, from his first instant.
+
+    Returns
+    -------
+    tuple of float
+        By how much (m, m/s) the end misses the state in which the gait goes on, and the cost of
+        transport on the way.
+    """
+    begin = motion.phases[0]
+    legs = [
+        Leg.of(biped, [*(each[:1] for each in begin.moved), begin.moved[1][:1]], k) for k in (0, 1)
+    ]
+    state = np.concatenate(
+        [
+            begin.moved[0][0, :2], *(leg.place[0] for leg in legs),
+            begin.moved[1][0, :2], *(leg.velocity[0] for leg in legs), [0.0],
+        ]
+    )  # fmt: skip
+    first = state.copy()
+    for phase in motion.phases:
+        stands = [any(side in name for name in phase.contacts) for side in ("right", "left")]
+        exerted = interp1d(phase.times, phase.forces, axis=0)
+
+        def rates(t: float, y: np.ndarray, exerted: Any = exerted, stands: Any = stands) -> Any:
+            hip, *feet = y[:6].reshape(3, 2)
+            speed, *speeds = y[6:12].reshape(3, 2)
+            *axial, ankle, turn = exerted(t)
+            pushed, spent, bends, turnings = np.zeros(2), 0.0, [], []
+            for k, moment in enumerate((ankle - turn, turn)):
+                away = feet[k] - hip
+                length = np.hypot(*away)
+                along = away / length
+                across = np.array([-along[1], along[0]])
+                force = axial[k] * along + moment / length * across
+                pushed += force
+                spent += abs(axial[k] * (along @ (speeds[k] - speed)))
+                turnings.append(across @ (speeds[k] - speed) / length)
+                bends.append(np.zeros(2) if stands[k] else force / biped.foot + DOWN)
+            spent += abs(ankle * turnings[0]) + abs(turn * (turnings[1] - turnings[0]))
+            return np.concatenate([y[6:12], DOWN - pushed / biped.hip, *bends, [spent]])
+
+        for k in (0, 1):
+            if stands[k]:
+                state[8 + 2 * k : 10 + 2 * k] = 0.0
+        ran = solve_ivp(
+            rates,
+            (0.0, phase.duration),
+            state,
+            rtol=EXACT,
+            atol=EXACT,
+            max_step=phase.duration / 50,
+        )
+        state = ran.y[:, -1]
+    begun = first[:12].reshape(2, 3, 2)[:, [0, 2, 1]]
+    begun[0, :, 0] += motion.distance
+    ended = state[:12].reshape(2, 3, 2)
+    own = [0, 1, 2] if not motion.phases[0].contacts else [0, 1]
+    return float(np.abs(ended - begun)[:, own].max()), float(state[12]) / (WEIGHT * motion.distance)
 
 
 def main() -> None:
-    """Print a table for each run."""
-    for name in sys.argv[1:] or HIS:
-        motion = found(name)
-        told = audit(HIS[name], motion)
-        body = [["cost of transport", f"{told.cost:.6f}", f"{PRINTED[name].cost} printed"]]
-        body += [[what, f"{share:.4f}", "of the limit"] for what, share in told.used.items()]
-        body += [[what, f"{away:.1e}", "missing"] for what, away in told.missing.items()]
-        Console(width=100).print(Table(name, ["what", "how much", ""], body))
+    """Print a table for each gait."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+    for name, printed in PRINTED.items():
+        told = {"ours": audit(printed.biped, found(name))}
+        body = [["printed", "", f"{printed.cost:.6f}"]]
+        if folder is not None:
+            his = stored(folder / FILES[name], printed.biped)
+            told["his"] = audit(printed.biped, his)
+            told["his"].used.update(rates_stored(printed.biped, his))
+            missed, spent = integrated(printed.biped, his)
+            body.append(["his forces, integrated", "", f"{spent:.6f}"])
+            body.append(["these miss (m, m/s)", "", f"{missed:.1e}"])
+        body.append(["cost of transport", *(f"{each.cost:.6f}" for each in told.values())])
+        for part, form in (("used", ".4f"), ("missing", ".1e")):
+            for what in getattr(told["ours"], part):
+                values = (getattr(each, part)[what] for each in told.values())
+                body.append([what, *(f"{value:{form}}" for value in values)])
+        head = ["what", "ours", "his"]
+        rows = [[*row, ""][: len(head)] for row in body]
+        Console(width=100).print(Table(name, head, rows))
 
 
 if __name__ == "__main__":
