@@ -98,6 +98,15 @@ def test_a_maximum_along_a_constraint_is_none() -> None:
     assert found is None or found[0][0] == pytest.approx(-1.0)
 
 
+def test_a_price_of_the_wrong_sign_is_no_optimum() -> None:
+    """At (1, 7) the slopes balance, and y is at its best; but cost falls as x leaves its bound."""
+    found = solved(
+        lambda x: (x[0] ** 2 + 6.0 * x[0] * x[1] + x[1] ** 2 - 20.0 * (x[0] + x[1]), x[0]),
+        [0.0, 0.0], [-np.inf], [1.0],
+    )  # fmt: skip
+    assert found is None
+
+
 @pytest.mark.parametrize(
     ("rows", "lower", "upper"),
     [
