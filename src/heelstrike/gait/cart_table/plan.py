@@ -42,7 +42,7 @@ ROUGH = 1e3
 SHORTEST_PART = 0.02
 """Duration (s) of double and of single support from which on the plan, which has a sample every
 5 ms, knows of them."""
-SMALLER = (0.75, 0.5, 0.25, 0.1)
+SMALLER = (0.75, 0.5, 0.25)
 """Shares of clearance and length at which steps are tried where legs do not reach."""
 SHORTEST, LONGEST = 0.1, 10.0
 """Durations (s) of steps that are planned."""
@@ -185,7 +185,9 @@ def _planned(step: Step, planner: Planner, height: float | None, corrections: in
     if height is not None:
         try:
             planned = _corrected(step, planner, height, corrections)
-            planned.coordinates(step.samples)
+            beyond = _beyond(planned)
+            if beyond:
+                raise InfeasibleGaitError(beyond)
         except (InfeasibleGaitError, np.linalg.LinAlgError) as error:
             raise InfeasibleGaitError(_at_another(step, planner, height, standing, error)) from None
         return planned
@@ -193,14 +195,15 @@ def _planned(step: Step, planner: Planner, height: float | None, corrections: in
     if found is not None:
         return _corrected(step, planner, found.height, corrections)
     short = (
-        f"the legs of robot {robot.name!r} are too short for steps of {step.length:.3g} m with a "
-        f"clearance of {step.clearance:.3g} m at any height of the centre of mass from "
-        f"{HEIGHTS[-1] * standing:.3g} m on."
+        f"the legs of robot {robot.name!r}, within the ranges of their joints, are too short for "
+        f"steps of {step.length:.3g} m with a clearance of {step.clearance:.3g} m at any height of "
+        f"the centre of mass from {HEIGHTS[-1] * standing:.3g} m on."
     )
     for name, told in (("clearance", "clearance"), ("length", "step_length")):
         for share in SMALLER:
             value = share * getattr(step, name)
-            if _highest(replace(step, **{name: value}), planner, standing) is not None:
+            other = replace(step, **{name: value})
+            if _highest(other, Planner.CAPTURE_POINT, standing) is not None:  # the quicker one
                 raise InfeasibleGaitError(f"{short} They reach with {told} = {value:.3g} m.")
     raise InfeasibleGaitError(f"{short} Ask for shorter steps and less clearance.")
 
@@ -226,11 +229,26 @@ def _highest(step: Step, planner: Planner, standing: float) -> Planned | None:
     for share in HEIGHTS:
         try:
             planned = _corrected(step, planner, share * standing, 0)
-            if _stretched(planned) <= STRETCHED:
+            if _stretched(planned) <= STRETCHED and not _beyond(planned):
                 return planned
         except (InfeasibleGaitError, np.linalg.LinAlgError):
             continue
     return None
+
+
+def _beyond(planned: Planned) -> str:
+    """Say which joint leaves its range in the step; nothing if none does."""
+    model, names = planned.step.robot.model, planned.step.robot.joint_names
+    q, _, _ = planned.coordinates(planned.step.samples)
+    for j in model.actuator_joint.tolist():
+        least, most = float(q[:, j].min()), float(q[:, j].max())
+        if least < model.lower[j] or most > model.upper[j]:
+            return (
+                f"with the centre of mass at {planned.height:.3g} m {names[j]} would go from "
+                f"{least:.3g} to {most:.3g}, beyond its range from {model.lower[j]:.3g} to "
+                f"{model.upper[j]:.3g}."
+            )
+    return ""
 
 
 def _stretched(planned: Planned) -> float:
