@@ -84,7 +84,11 @@ def test_both_planners_at_a_given_height(bravo7: hs.Robot) -> None:
             r"do not reach with the centre of mass at 0\.01 m.* height = \d[.\d]* m",
         ),
         ({"height": np.array([0.8])}, "height must be a positive number"),
-        ({"clearance": 1.0}, r"clearance of 1 m.* They reach with clearance = 0\.\d+ m"),
+        pytest.param(
+            {"clearance": 1.0},
+            r"clearance of 1 m.* They reach with clearance = 0\.\d+ m",
+            marks=pytest.mark.slow,
+        ),
         ({"height": 0.5}, "beyond its range from|do not reach with"),
     ],
 )

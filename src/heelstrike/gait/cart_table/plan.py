@@ -42,7 +42,7 @@ ROUGH = 1e3
 SHORTEST_PART = 0.02
 """Duration (s) of double and of single support from which on the plan, which has a sample every
 5 ms, knows of them."""
-SMALLER = (0.75, 0.5, 0.25)
+SMALLER = (0.5, 0.25, 0.1)
 """Shares of clearance and length at which steps are tried where legs do not reach."""
 COARSER = 4
 """Each of so many heights is tried then, by the quicker planner: what is told is one that goes."""
