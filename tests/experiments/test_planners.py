@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -39,3 +40,20 @@ def test_the_command(tmp_path: Path) -> None:
     assert (tmp_path / "planners.png").read_bytes().startswith(b"\x89PNG")
     refused = CliRunner().invoke(app, ["planners", "--speeds", "fast", "--out", str(tmp_path)])
     assert refused.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"speeds": "0.4"}, "speeds must be positive numbers"),
+        ({"speeds": 4}, "speeds must be positive numbers"),
+        ({"speeds": [None]}, "speeds must be positive numbers"),
+        ({"speeds": [[0.3]]}, "speeds must be positive numbers"),
+        ({"speeds": {"slow": 0.3}}, "speeds must be positive numbers"),
+        ({"speeds": []}, "speeds must be positive numbers"),
+        ({"steps": 0}, "steps must be 1 or more"),
+    ],
+)
+def test_comparisons_that_make_no_sense(bravo7: hs.Robot, asked: Any, said: str) -> None:
+    with pytest.raises(hs.GaitError, match=said):
+        hs.compare_planners(bravo7, **asked)

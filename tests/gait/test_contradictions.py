@@ -171,6 +171,10 @@ def test_the_ground_does_not_carry_more_than_the_weight(bravo7: hs.Robot) -> Non
         (ONE, {"distance": -0.3, "speed": 0.4}, "a speed is forwards, and a distance .* backwards"),
         (ONE, {"distance": 0.3, "slope": 0.5, "friction": 0.3}, "friction of at least 0.5463"),
         (ONE, {"distance": 0.3, "friction": np.inf}, "negative or infinite"),
+        (ONE, {"distance": 0.3, "duration": np.array([9.0])}, "duration must be positive"),
+        (ONE, {"distance": 0.3, "speed": np.array([0.4])}, "speed must be positive"),
+        (ONE, {"distance": 0.3, "guess": lambda t: "here"}, "guess must return 9 finite positions"),
+        (ONE, {"distance": 0.3, "guess": lambda t: 1 / 0}, "guess function failed at 0 s: ZeroDi"),
     ],
 )
 def test_motions_that_contradict_themselves(
@@ -181,6 +185,38 @@ def test_motions_that_contradict_themselves(
     assert not isinstance(caught.value, hs.GaitNotFoundError)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [(np.nan, "start must have finite positions"), (10.0, "right_knee is at 10, beyond its range")],
+)
+def test_states_in_which_no_robot_can_be(bravo7: hs.Robot, wrong: float, said: str) -> None:
+    state = bravo7.standing(hs.Ground())
+    q = state.q.copy()
+    q[bravo7.joint_names.index("right_knee")] = wrong
+    with pytest.raises(hs.GaitError, match=said):
+        hs.optimize_motion(bravo7, BOTH, repeat="never", start=hs.State(q, state.v), starts=1)
+
+
+def test_a_constraint_of_ones_own_that_cannot_be_met_is_named(bravo7: hs.Robot) -> None:
+    with pytest.raises(hs.GaitNotFoundError, match=r"own \(number 1\) in phase 1: 1\. Ask less of"):
+        hs.optimize_motion(
+            bravo7, ONE, distance=0.3, starts=1, refine=False, constraint=lambda now: -1.0
+        )
+
+
+def test_a_foot_at_rest_does_not_stay_above_a_parabola(bravo7: hs.Robot) -> None:
+    with pytest.raises(hs.InfeasibleGaitError, match="Ask for 'smooth'"):
+        request_of(bravo7, **STEP, impact=False, clearance_profile="parabola")
+    request_of(bravo7, **STEP, impact=False, clearance_profile="parabola", clearance=0.0)
+
+
+@pytest.mark.parametrize("time", ["a", None, {}])
+def test_times_are_numbers(gait: hs.Gait, time: Any) -> None:
+    for at in (gait.position, gait.velocity, gait.acceleration):
+        with pytest.raises(hs.GaitError, match="t must be numbers"):
+            at(time)
+
+
 def test_force_margins_of_motions_that_the_weight_does_not_bear(bravo7: hs.Robot) -> None:
     """One sole at least stands at all times, with two ends."""
     with pytest.raises(hs.InfeasibleGaitError, match="each of 2 ends of soles") as caught:
@@ -189,6 +225,7 @@ def test_force_margins_of_motions_that_the_weight_does_not_bear(bravo7: hs.Robot
     assert most == pytest.approx(0.5 * bravo7.weight, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_slippery_soles_count_in_motions(bravo7: hs.Robot) -> None:
     """Half the scale on twice the friction is the same motion; a plan has the same cone."""
     asked: dict[str, Any] = {"distance": 0.3, "starts": 1, "refine": False, "duration": 0.7}

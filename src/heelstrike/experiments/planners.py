@@ -146,6 +146,8 @@ def compare_planners(
     if not given or not all(is_number(x) and np.isfinite(x) and x > 0.0 for x in given):
         raise GaitError(f"speeds must be positive numbers (m/s), got {given}")
     several = [float(speed) for speed in given]
+    if steps < 1:
+        raise GaitError(f"steps must be 1 or more, got {steps}")
     tell, walks = progress or (lambda _: None), []
     for speed in several:
         step: dict[str, Any] = {

@@ -152,6 +152,27 @@ def test_forces_go_with_markers_only(tmp_path: Path) -> None:
         mimic(joints(tmp_path / "walk.csv"), forces=forces)
 
 
+@pytest.mark.parametrize("given", [{"markers": {"right_hip": "X"}}, {"up": "z"}, {"forward": "x"}])
+def test_what_is_of_markers_is_refused_for_joints(given: dict[str, Any], tmp_path: Path) -> None:
+    with pytest.raises(GaitError, match=rf"table of joints; {next(iter(given))} go with markers"):
+        mimic(joints(tmp_path / "walk.csv"), **given)
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"speed": 0.0}, "speed must be a positive number"),
+        ({"speed": np.nan}, "speed must be a positive number"),
+        ({"friction": -1.0}, "friction must not be negative"),
+        ({"steps": 0}, "steps must be 1 or more"),
+    ],
+)
+def test_numbers_that_make_no_sense(asked: dict[str, Any], said: str) -> None:
+    """Before the file is looked for."""
+    with pytest.raises(GaitError, match=said):
+        mimic("nowhere.trc", **asked)
+
+
 @pytest.mark.parametrize("forward", [None, "-y"])
 def test_forces_are_in_the_axes_of_the_markers(
     forward: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -166,6 +166,7 @@ def mimic(
     GaitNotFoundError
         If no motion was found; the message names what is in conflict.
     """
+    _check_asked(speed, friction, steps)
     tell = progress or (lambda _, __: None)
     tell("reading", 0.0)
     if str(path) == WINTER:
@@ -200,6 +201,16 @@ def mimic(
     return Mimicry(person, wanted, nearest, walk, moments)
 
 
+def _check_asked(speed: float | None, friction: float, steps: int) -> None:
+    """Refuse numbers that make no sense before anything is read."""
+    if speed is not None and not (np.isfinite(speed) and speed > 0.0):
+        raise GaitError(f"speed must be a positive number (m/s), got {speed}")
+    if not (np.isfinite(friction) and friction >= 0.0):
+        raise GaitError(f"friction must not be negative or infinite, got {friction}")
+    if steps < 1:
+        raise GaitError(f"steps must be 1 or more, got {steps}")
+
+
 def _person(
     path: str | PathLike[str], *, mass: float | None, height: float | None, rate: float | None,
     unit: str, markers: Mapping[str, str] | None, up: str | None, forward: str | None,
@@ -209,6 +220,12 @@ def _person(
     if Path(path).suffix.lower() not in MARKERS:
         table = joints_of_opensim(read_table(path, gaps=True), unit)
         if any(table.column(f"{side}_hip") >= 0 for side in ("right", "left")):
+            given = {"markers": markers, "up": up, "forward": forward}
+            if of_markers := [name for name, value in given.items() if value]:
+                raise GaitError(
+                    f"{path}: this is a table of joints; {', '.join(of_markers)} go with markers "
+                    "only: leave them out"
+                )
             height = USUAL_HEIGHT if height is None else height
             robot = human(BODY_MASS_INDEX * height**2 if mass is None else mass, height)
             motion = motion_of(table, robot, rate=rate, unit=unit)

@@ -42,8 +42,12 @@ ROUGH = 1e3
 SHORTEST_PART = 0.02
 """Duration (s) of double and of single support from which on the plan, which has a sample every
 5 ms, knows of them."""
-SMALLER = (0.75, 0.5, 0.25, 0.1)
+SMALLER = (0.5, 0.25, 0.1)
 """Shares of clearance and length at which steps are tried where legs do not reach."""
+COARSER = 4
+"""Each of so many heights is tried then, by the quicker planner: what is told is one that goes."""
+LOOKED_AT = 10
+"""Each of so many samples of a step is looked at for whether legs reach."""
 SHORTEST, LONGEST = 0.1, 10.0
 """Durations (s) of steps that are planned."""
 CORRECTIONS = 2
@@ -185,7 +189,9 @@ def _planned(step: Step, planner: Planner, height: float | None, corrections: in
     if height is not None:
         try:
             planned = _corrected(step, planner, height, corrections)
-            planned.coordinates(step.samples)
+            q, _, _ = planned.coordinates(step.samples[::LOOKED_AT])
+            if beyond := _beyond(planned, q):
+                raise InfeasibleGaitError(beyond)
         except (InfeasibleGaitError, np.linalg.LinAlgError) as error:
             raise InfeasibleGaitError(_at_another(step, planner, height, standing, error)) from None
         return planned
@@ -193,14 +199,15 @@ def _planned(step: Step, planner: Planner, height: float | None, corrections: in
     if found is not None:
         return _corrected(step, planner, found.height, corrections)
     short = (
-        f"the legs of robot {robot.name!r} are too short for steps of {step.length:.3g} m with a "
-        f"clearance of {step.clearance:.3g} m at any height of the centre of mass from "
-        f"{HEIGHTS[-1] * standing:.3g} m on."
+        f"the legs of robot {robot.name!r}, within the ranges of their joints, are too short for "
+        f"steps of {step.length:.3g} m with a clearance of {step.clearance:.3g} m at any height of "
+        f"the centre of mass from {HEIGHTS[-1] * standing:.3g} m on."
     )
     for name, told in (("clearance", "clearance"), ("length", "step_length")):
         for share in SMALLER:
             value = share * getattr(step, name)
-            if _highest(replace(step, **{name: value}), planner, standing) is not None:
+            other = replace(step, **{name: value})
+            if _highest(other, Planner.CAPTURE_POINT, standing, HEIGHTS[::COARSER]) is not None:
                 raise InfeasibleGaitError(f"{short} They reach with {told} = {value:.3g} m.")
     raise InfeasibleGaitError(f"{short} Ask for shorter steps and less clearance.")
 
@@ -221,22 +228,38 @@ def _at_another(
     return f"{wrong} They reach with height = {found.height:.3g} m."
 
 
-def _highest(step: Step, planner: Planner, standing: float) -> Planned | None:
+def _highest(
+    step: Step, planner: Planner, standing: float, heights: Floats = HEIGHTS
+) -> Planned | None:
     """Plan at the greatest height at which no leg is stretched, if there is one."""
-    for share in HEIGHTS:
+    for share in heights:
         try:
             planned = _corrected(step, planner, share * standing, 0)
-            if _stretched(planned) <= STRETCHED:
+            q, _, _ = planned.coordinates(step.samples[::LOOKED_AT])
+            if _stretched(step.robot, q) <= STRETCHED and not _beyond(planned, q):
                 return planned
         except (InfeasibleGaitError, np.linalg.LinAlgError):
             continue
     return None
 
 
-def _stretched(planned: Planned) -> float:
-    """Greatest length of a leg in the step, from hip to ankle, as a share of the straight one."""
-    robot, most = planned.step.robot, 0.0
-    q, _, _ = planned.coordinates(planned.step.samples[::10])
+def _beyond(planned: Planned, q: Floats) -> str:
+    """Say which joint leaves its range in postures of the step; nothing if none does."""
+    model, names = planned.step.robot.model, planned.step.robot.joint_names
+    for j in model.actuator_joint.tolist():
+        least, most = float(q[:, j].min()), float(q[:, j].max())
+        if least < model.lower[j] or most > model.upper[j]:
+            return (
+                f"with the centre of mass at {planned.height:.3g} m {names[j]} would go from "
+                f"{least:.3g} to {most:.3g}, beyond its range from {model.lower[j]:.3g} to "
+                f"{model.upper[j]:.3g}."
+            )
+    return ""
+
+
+def _stretched(robot: Robot, q: Floats) -> float:
+    """Greatest length of a leg in postures, from hip to ankle, as a share of the straight one."""
+    most = 0.0
     for row in q:
         origins = link_poses(robot, row).origin
         for hip, knee, ankle in leg_joints(robot):
