@@ -129,7 +129,8 @@ def limit_torques(
     `driven` has the place in `v` of what each actuator drives, in the plane or in space.
     """
     if are_obeyed(model, voltage, commands):
-        copy_words(commands, torques)
+        for i in range(torques.shape[0]):
+            torques[i] = commands[i]
         return True
     for i in range(driven.shape[0]):
         wanted = commands[i]
