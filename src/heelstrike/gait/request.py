@@ -43,9 +43,6 @@ NUMBERS = {
 STEEPEST = 1.0
 """Slope (rad) from which on no gait is looked for."""
 
-ROUNDING = 1e-12
-"""Difference of angles (rad) that counts as rounding."""
-
 SHORTEST_STEP, LONGEST_STEP = 0.2, 40.0
 """Step durations that are considered, in units of the pendulum time sqrt(height / gravity)."""
 SHORTEST_FREE, LONGEST_FREE = 0.5, 8.0
@@ -308,7 +305,7 @@ def check_slope(robot: Robot, slope: float, friction: float, scale: float) -> No
         If friction is too small.
     """
     steepest = float(np.arctan(friction * scale))
-    if abs(slope) > steepest + ROUNDING:
+    if abs(slope) > steepest:
         least = np.tan(abs(slope)) / scale if scale > 0.0 else np.inf
         raise InfeasibleGaitError(
             f"robot {robot.name!r} cannot stay on a slope of {slope:g} rad with friction = "
