@@ -17,7 +17,7 @@ import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.arguments import _is_any, _kinds, check_fields, takes
+from heelstrike.arguments import _is_any, _kinds, at_least, at_most, check_fields, takes
 
 ONE, FLAT = np.eye(2), np.ones(2)
 
@@ -237,3 +237,11 @@ def test_numbers_are_numbers_of_numpy_too() -> None:
         hs.Ground(friction=friction)
     check_fields(hs.EventDriven(rtol=np.float64(1e-6)), hs.SimulationError)
     assert hs.TimeStepping(step=np.float64(1e-3)) == hs.TimeStepping(step=1e-3)
+
+
+@pytest.mark.parametrize("value", [0.546302489843790, 0.0333333333333, 0.25, 12345.6, 1.0])
+@pytest.mark.parametrize("digits", [3, 4])
+def test_what_is_told_can_be_asked_for(value: float, digits: int) -> None:
+    least, most = float(at_least(value, digits)), float(at_most(value, digits))
+    assert most <= value <= least
+    assert least - most <= 10.0 ** (1 - digits) * value

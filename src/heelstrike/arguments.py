@@ -14,6 +14,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from numbers import Integral, Real
 from typing import Any, ParamSpec, TypeVar
 
@@ -221,3 +222,17 @@ def shown(value: object) -> str:
     text = " ".join(repr(value).split())
     short = text if len(text) <= 60 else f"{text[:57]}..."
     return f"{short} ({type(value).__name__})"
+
+
+def at_least(value: float, digits: int = 4) -> str:
+    """Write a positive number rounded up: whoever asks for what is written asks for enough."""
+    return _rounded(value, digits, ROUND_CEILING)
+
+
+def at_most(value: float, digits: int = 4) -> str:
+    """Write a positive number rounded down: whoever asks for what is written asks for no more."""
+    return _rounded(value, digits, ROUND_FLOOR)
+
+
+def _rounded(value: float, digits: int, way: str) -> str:
+    return f"{float(Context(prec=digits, rounding=way).create_decimal_from_float(value)):g}"

@@ -18,6 +18,7 @@ from heelstrike.arguments import is_number, refusal, takes
 from heelstrike.errors import GaitError, InfeasibleGaitError, WriteError
 from heelstrike.field_texts import dataclass
 from heelstrike.gait.branches import Pair, Place, on_the_cheaper_branch, spending
+from heelstrike.gait.cost import costs_of
 from heelstrike.gait.file import LARGEST_NUMBER, check_robot, entries_of, gait_of
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.optimize import optimize_gait, request_of
@@ -248,6 +249,8 @@ def gait_family(
         raise GaitError(
             "leave out warm_start: each gait of a family is started from its nearest neighbour"
         )
+    if "cost" in asked:
+        costs_of(asked["cost"])
     if not axes:
         raise GaitError(f"give a sequence of values of at least one of {', '.join(AXES)}")
     if file is not None and callable(asked.get("cost")):

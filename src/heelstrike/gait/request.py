@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from heelstrike.arguments import at_least, at_most
 from heelstrike.dynamics.queries.following import Drive, drive_of
 from heelstrike.errors import GaitError, InfeasibleGaitError, RobotError
 from heelstrike.gait.clearance import ClearanceProfile
@@ -42,9 +43,6 @@ NUMBERS = {
 
 STEEPEST = 1.0
 """Slope (rad) from which on no gait is looked for."""
-
-SAME_ANGLE = 1e-12
-"""Difference of angles (rad) that counts as rounding."""
 
 SHORTEST_STEP, LONGEST_STEP = 0.2, 40.0
 """Step durations that are considered, in units of the pendulum time sqrt(height / gravity)."""
@@ -146,13 +144,6 @@ class Request:
                 f"zmp_margin = {self.zmp_margin:g} m is too large: the sole reaches only "
                 f"{self.stance.half_length:g} m to each side of its middle. Ask for "
                 "less."
-            )
-        falls = self.profiles == (ClearanceProfile.PARABOLA,) and self.clearance > 0.0
-        if falls and not self.impact:
-            raise InfeasibleGaitError(
-                "the clearance_profile 'parabola' comes down at an angle, and without impact the "
-                "foot comes to rest as it lands: it cannot stay above. Ask for 'smooth', or leave "
-                "the profile out."
             )
         self._check_weight()
 
@@ -300,7 +291,7 @@ def check_slope(robot: Robot, slope: float, friction: float, scale: float) -> No
     friction : float
         Coefficient of friction of the ground.
     scale : float
-        What that is multiplied by under the feet, at most.
+        What that is multiplied by under the feet.
 
     Raises
     ------
@@ -308,12 +299,17 @@ def check_slope(robot: Robot, slope: float, friction: float, scale: float) -> No
         If friction is too small.
     """
     steepest = float(np.arctan(friction * scale))
-    if abs(slope) > steepest + SAME_ANGLE:
-        least = np.tan(abs(slope)) / scale if scale > 0.0 else np.inf
+    if abs(slope) > steepest:
+        asked = "no friction is enough where it is multiplied by 0 under the feet."
+        if scale > 0.0:
+            least = float(np.tan(abs(slope))) / scale
+            asked = (
+                f"the ground needs friction of at least {at_least(least)}. Ask for that, or for "
+                f"slopes up to {at_most(steepest)} rad."
+            )
         raise InfeasibleGaitError(
             f"robot {robot.name!r} cannot stay on a slope of {slope:g} rad with friction = "
-            f"{friction:g}: to carry its weight there, the ground needs friction of at least "
-            f"{least:.4g}. Ask for that, or for slopes up to {steepest:.4g} rad."
+            f"{friction:g}: to carry its weight there, {asked}"
         )
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import at_least, at_most, takes
 from heelstrike.dynamics import center_of_mass, leg_joints, link_poses
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.cart_table.center_of_mass import Planner, followed
@@ -161,8 +161,9 @@ def _check_numbers(
     least = SHORTEST_PART / step_duration
     if np.ndim(double_support) or not least <= double_support <= 1.0 - least:
         raise GaitError(
-            f"double_support is a part of the step, between {least:.3g} and {1.0 - least:.3g} of "
-            f"one of {step_duration:g} s, so that the plan sees both parts; got {double_support}"
+            f"double_support is a part of the step, between {at_least(least, 3)} and "
+            f"{at_most(1.0 - least, 3)} of one of {step_duration:g} s, so that the plan sees both "
+            f"parts; got {double_support}"
         )
     if not (isinstance(corrections, int | np.integer) and 0 <= corrections <= 10):
         raise GaitError(f"corrections must be a whole number from 0 to 10, got {corrections!r}")
@@ -193,11 +194,12 @@ def _planned(step: Step, planner: Planner, height: float | None, corrections: in
             if beyond := _beyond(planned, q):
                 raise InfeasibleGaitError(beyond)
         except (InfeasibleGaitError, np.linalg.LinAlgError) as error:
-            raise InfeasibleGaitError(_at_another(step, planner, height, standing, error)) from None
+            said = _at_another(step, planner, height, standing, corrections, error)
+            raise InfeasibleGaitError(said) from None
         return planned
-    found = _highest(step, planner, standing)
+    found = _highest(step, planner, standing, corrections)
     if found is not None:
-        return _corrected(step, planner, found.height, corrections)
+        return found
     short = (
         f"the legs of robot {robot.name!r}, within the ranges of their joints, are too short for "
         f"steps of {step.length:.3g} m with a clearance of {step.clearance:.3g} m at any height of "
@@ -207,14 +209,16 @@ def _planned(step: Step, planner: Planner, height: float | None, corrections: in
         for share in SMALLER:
             value = share * getattr(step, name)
             other = replace(step, **{name: value})
-            if _highest(other, Planner.CAPTURE_POINT, standing, HEIGHTS[::COARSER]) is not None:
-                raise InfeasibleGaitError(f"{short} They reach with {told} = {value:.3g} m.")
+            if _highest(other, Planner.CAPTURE_POINT, standing, 0, HEIGHTS[::COARSER]) is not None:
+                reach = f"They reach with {told} = {at_most(value, 3)} m."
+                raise InfeasibleGaitError(f"{short} {reach}")
     raise InfeasibleGaitError(f"{short} Ask for shorter steps and less clearance.")
 
 
 def _at_another(
-    step: Step, planner: Planner, height: float, standing: float, error: Exception
-) -> str:
+    step: Step, planner: Planner, height: float, standing: float, corrections: int,
+    error: Exception,
+) -> str:  # fmt: skip
     """Say what is wrong at a height, and at which legs reach."""
     wrong = str(error)
     if not isinstance(error, InfeasibleGaitError):  # a matrix without an inverse
@@ -222,14 +226,14 @@ def _at_another(
             f"with the centre of mass at {height:.3g} m a leg of robot {step.robot.name!r} is "
             "straight or folded up, so that its joints do not follow from the feet."
         )
-    found = _highest(step, planner, standing)
+    found = _highest(step, planner, standing, corrections)
     if found is None:
         return f"{wrong} Leave the height out, and you are told which steps the legs reach."
     return f"{wrong} They reach with height = {found.height:.3g} m."
 
 
 def _highest(
-    step: Step, planner: Planner, standing: float, heights: Floats = HEIGHTS
+    step: Step, planner: Planner, standing: float, corrections: int, heights: Floats = HEIGHTS
 ) -> Planned | None:
     """Plan at the greatest height at which no leg is stretched, if there is one."""
     for share in heights:
@@ -237,6 +241,8 @@ def _highest(
             planned = _corrected(step, planner, share * standing, 0)
             q, _, _ = planned.coordinates(step.samples[::LOOKED_AT])
             if _stretched(step.robot, q) <= STRETCHED and not _beyond(planned, q):
+                if corrections:
+                    planned = _corrected(step, planner, share * standing, corrections)
                 return planned
         except (InfeasibleGaitError, np.linalg.LinAlgError):
             continue

@@ -28,7 +28,6 @@ from __future__ import annotations
 from typing import Any
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
-from heelstrike.compiler.words import copy_words
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.memory import Tally
 
