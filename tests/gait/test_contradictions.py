@@ -169,7 +169,7 @@ def test_the_ground_does_not_carry_more_than_the_weight(bravo7: hs.Robot) -> Non
         (ONE, {"distance": (0.1, 0.3), "repeat": "same"}, r"no distance, and 0\.1 to 0\.3 m are"),
         (ONE, {"distance": True}, "distance must be a number"),
         (ONE, {"distance": -0.3, "speed": 0.4}, "a speed is forwards, and a distance .* backwards"),
-        (ONE, {"distance": 0.3, "slope": 0.5, "friction": 0.3}, "friction of at least 0.5463"),
+        (ONE, {"distance": 0.3, "slope": 0.5, "friction": 0.3}, "friction of at least 0.5464"),
         (ONE, {"distance": 0.3, "friction": np.inf}, "negative or infinite"),
         (ONE, {"distance": 0.3, "duration": np.array([9.0])}, "duration must be positive"),
         (ONE, {"distance": 0.3, "speed": np.array([0.4])}, "speed must be positive"),
