@@ -46,15 +46,15 @@ def joint_feedback(
     while piece + 1 < begins.shape[0] and begins[piece + 1] <= t + EARLY:
         piece += 1
     time = t - begins[piece]
-    highest = coefficients.shape[2] - 1
     for i in range(robot.nu):
-        torque[i] = coefficients[piece, i, highest]
-    for power in range(highest - 1, -1, -1):
-        for i in range(robot.nu):
-            torque[i] = torque[i] * time + coefficients[piece, i, power]
-    for i in range(robot.nu):
-        torque[i] -= parameters.kp[i] * state.joint_position[i]
-        torque[i] -= parameters.kd[i] * state.joint_velocity[i]
+        command = 0.0
+        for power in range(coefficients.shape[2] - 1, -1, -1):
+            command = command * time + coefficients[piece, i, power]
+        torque[i] = (
+            command
+            - parameters.kp[i] * state.joint_position[i]
+            - parameters.kd[i] * state.joint_velocity[i]
+        )
 
 
 class JointFeedback(Law):
