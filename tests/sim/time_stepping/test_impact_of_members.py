@@ -67,9 +67,7 @@ def test_an_impact_is_that_of_its_members_without_gaps_and_with_bounces(
     wanted[rows] = solve_contact(delassus[np.ix_(rows, rows)], asked, FRICTION).impulse.ravel()
     assert wanted.any()
     np.testing.assert_allclose(answer.impulse, wanted, atol=1e-9)
-    np.testing.assert_allclose(
-        answer.velocity[1::2], (delassus @ wanted + speed)[1::2], atol=1e-9
-    )
+    np.testing.assert_allclose(answer.velocity[1::2], (delassus @ wanted + speed)[1::2], atol=1e-9)
     assert all(answer.mode[each] == OPEN for each in range(3) if each not in members)
     np.testing.assert_array_equal(impact.arriving_impulse, before)
     assert np.all(impact.arriving_mode == STICK)
