@@ -1,10 +1,10 @@
 """What holds, or is open, as in the step before: found in the velocities of the robot.
 
-Contacts and dry friction that stick make the equations (A + ε I) x = −b of
-:mod:`heelstrike.contact.spatial.sticking`. With the scaled and whitened rows Y, A = Y Yᵀ, and
-(Woodbury 1950)::
+Contacts and dry friction that stick make the equations (A + ε S⁻¹) x = −b of
+:mod:`heelstrike.contact.spatial.sticking`, with the share of each row on the diagonal of S. With the
+scaled and whitened rows Y, A = Y Yᵀ, and (Woodbury 1950)::
 
-    x = −(b − Y (Yᵀ Y + ε I)⁻¹ Yᵀ b) / ε
+    x = −S (b − Y (Yᵀ S Y + ε I)⁻¹ Yᵀ S b) / ε
 
 The matrix in brackets has a row for each velocity, however many contacts and joints hold, and
 nothing where the mass matrix has nothing: it is factored along the tree, and no Delassus matrix is
@@ -20,24 +20,25 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF
 from heelstrike.contact.sets import INTERVAL
 from heelstrike.contact.spatial.certificate import judge_blocks, weigh_blocks
-from heelstrike.contact.spatial.certified_solve import begin_from
-from heelstrike.contact.spatial.modes import LAST_MODES, STICK
+from heelstrike.contact.spatial.certified_solve import begin_from, count_solve
+from heelstrike.contact.spatial.modes import STICK
 from heelstrike.contact.spatial.scaling import give_impulses, scale_data
 from heelstrike.contact.spatial.sticking import (
     FIRM,
+    NEARLY,
     REFINED,
     REFINEMENTS,
     ROUNDS_OF_OPENING,
     STAGNANT,
     STUCK,
-    begin_at_bounds,
+    begin_round,
     correct_modes,
     list_sticking_rows,
+    share_of,
 )
 from heelstrike.contact.spatial.workspace import (
     BlockAnswer,
     BlockProblem,
-    BlockTally,
     BlockWorkspace,
     ScaledBlocks,
 )
@@ -58,7 +59,7 @@ WORTHWHILE = 2
 takes less time: steps of robots of 18 and 35 velocities that stand were timed with each
 (``python benchmarks/spatial_speed.py``)."""
 
-WELL_ROUNDED = STUCK
+WELL_ROUNDED = 1e-11
 """Rounding of velocities, of data of size one, above which the solvers, which can sum up without
 any, take over."""
 
@@ -83,7 +84,7 @@ def gather_held(
     model: SpatialModel, problem: BlockProblem, scaled: ScaledBlocks, mode: Integers,
     last: Integers, rows: Floats, matrix: Floats,
 ) -> None:  # fmt: skip
-    """Write Yᵀ Y + ε I of the blocks that stick, each row along the chain of its velocity."""
+    """Write Yᵀ S Y + ε I of the blocks that stick, each row along the chain of its velocity."""
     for k in range(model.nv):
         for a in range(model.depth[k]):
             matrix[k, a] = 0.0
@@ -92,7 +93,7 @@ def gather_held(
         if mode[block] != STICK:
             continue
         end, r = last[block], problem.first[block]
-        square = scaled.scale[block] * scaled.scale[block]
+        square = share_of(problem.set[block]) * scaled.scale[block] * scaled.scale[block]
         if problem.first[block + 1] - r == 3:
             for a in range(model.depth[end] + 1):
                 k = model.chain[end, a]
@@ -184,24 +185,26 @@ def hold_along(
         give_along(model, factor, problem, last, rows, along, False, holding.change, u)
         left = 0.0
         for block in range(problem.count):
+            share = share_of(problem.set[block])
             for row in range(problem.first[block], problem.first[block + 1]):
                 weighted[row] = 0.0
                 if mode[block] == STICK and weight[row] > 0.0:  # else nothing moves it
                     u[row] = scaled.offset[row] + weight[row] * u[row]
                     left = max(left, abs(u[row]))
-                    weighted[row] = weight[row] * u[row]
+                    weighted[row] = share * weight[row] * u[row]
         if left <= REFINED or left > STAGNANT * before:
             return
-        is_last = before < math.inf and left * left <= STUCK * before  # as much less again
+        is_last = before < math.inf and left * left <= NEARLY * before  # as much less again
         before = left
         take_along(model, factor, problem, last, rows, weighted, False, along)
         solve_factorized(model, holding.tree, along)
         give_along(model, factor, problem, last, rows, along, False, holding.change, weighted)
         for block in range(problem.count):
             if mode[block] == STICK:
+                firm = FIRM / share_of(problem.set[block])
                 for row in range(problem.first[block], problem.first[block + 1]):
                     if weight[row] > 0.0:
-                        x[row] -= (u[row] - weight[row] * weighted[row]) / FIRM
+                        x[row] -= (u[row] - weight[row] * weighted[row]) / firm
         if is_last:
             return
 
@@ -236,16 +239,6 @@ def certify_along(
 
 
 @kernel
-def note_shortcut(tally: BlockTally) -> None:
-    """Count a solve whose answer is that of the last modes."""
-    tally.solves += 1
-    tally.shortcuts += 1
-    tally.iterations = 1
-    tally.last_fallbacks = 0
-    tally.solver = LAST_MODES
-
-
-@kernel
 def goes_on_holding(
     model: SpatialModel, factor: TreeFactor, assembly: SpatialAssembly, holding: SpatialHolding,
     solver: BlockWorkspace,
@@ -268,16 +261,17 @@ def goes_on_holding(
     scale_data(problem, scaled)
     begin_from(problem, scaled, answer, iterate)
     for _ in range(ROUNDS_OF_OPENING):
-        if list_sticking_rows(problem, scaled, iterate.mode, newton) < 0:
+        if begin_round(problem, scaled, iterate, newton) < 0:
             return False
-        begin_at_bounds(problem, scaled, iterate)
         hold_along(
             model, factor, problem, scaled, iterate.mode, last, rows, holding, iterate.u, iterate.x
         )  # fmt: skip
         give_impulses(problem, scaled, iterate.x, answer)
         residual = certify_along(model, factor, problem, last, rows, scaled, holding, answer)
         if answer.residual <= STUCK and residual <= solver.settings.tolerance:
-            note_shortcut(solver.tally)
+            count_solve(solver.tally)
+            solver.tally.iterations += 1
+            solver.tally.shortcuts += 1
             return True
         for row in range(problem.first[problem.count]):
             iterate.u[row] = answer.velocity[row] * scaled.weight[row] / scaled.unit
