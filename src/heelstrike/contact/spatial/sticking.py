@@ -27,14 +27,14 @@ from heelstrike.contact.spatial.workspace import (
     ScaledBlocks,
 )
 
-FIRM = 1e-8
-"""What is added to the unit diagonal. Rounding, 1e-16, leaves 1e-8 of an impulse along what moves
+FIRM = 1e-9
+"""What is added to the unit diagonal. Rounding, 1e-16, leaves 1e-7 of an impulse along what moves
 nothing; each refinement leaves this over the least eigenvalue that moves anything."""
 
 SHARE_OF_FRICTION = 1e-3
-"""Share of a load that dry friction takes where contacts or stops could hold the joint as well, beside
+"""Share of a load that dry friction takes where contacts or stops hold the joint as well, beside
 theirs. It bears far less than they do: with a like share it would be beyond its bound and seem to
-slide, and what slides and what sticks would take turns for ever."""
+slide, and what slides and what sticks would take turns."""
 
 REFINEMENTS = 6
 """How often the answer is refined."""
@@ -45,16 +45,18 @@ REFINED = 1e-14
 STAGNANT = 0.25
 """Part of them that a refinement leaves where rounding is all there is."""
 
-ROUNDS_OF_OPENING = 4
+ROUNDS_OF_OPENING = 6
 """How often contacts that pull are opened, and open ones that sink closed."""
 
 STUCK = 1e-10
-"""Residual up to which an answer of sticking contacts is taken. Points of one foot, and dry friction
-of what they hold, contradict each other by the rounding of their gaps: some 1e-16 m, over a step of
-1e-3 s and the 1e-2 m/s that gravity gives in it. To look for what is better is in vain."""
+"""Residual up to which an answer of sticking contacts is taken. Points of one foot, and dry
+friction of what they hold, contradict each other by the rounding of their gaps: some 1e-16 m, over
+a step of 1e-3 s and the 1e-2 m/s that gravity gives in it. To look for what is better is in
+vain."""
 
-NEARLY = 1e-11
-"""Residual that one more refinement is expected to leave where it is the last."""
+NEARLY, NEAR = 1e-11, 1e-8
+"""Residual that one more refinement is expected to leave where it is the last, and what there may
+be before it: what is held by dry friction alone comes nearer more slowly than all of it did."""
 
 PROJECTIONS, CORRECTIONS = 100, 2
 """How often impulses that hold are brought into their cones, and held again each time."""

@@ -1,8 +1,8 @@
 """What holds, or is open, as in the step before: found in the velocities of the robot.
 
 Contacts and dry friction that stick make the equations (A + ε S⁻¹) x = −b of
-:mod:`heelstrike.contact.spatial.sticking`, with the share of each row on the diagonal of S. With the
-scaled and whitened rows Y, A = Y Yᵀ, and (Woodbury 1950)::
+:mod:`heelstrike.contact.spatial.sticking`, with the share of each row on the diagonal of S. With
+the scaled and whitened rows Y, A = Y Yᵀ, and (Woodbury 1950)::
 
     x = −S (b − Y (Yᵀ S Y + ε I)⁻¹ Yᵀ S b) / ε
 
@@ -18,13 +18,13 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF
-from heelstrike.contact.sets import INTERVAL
 from heelstrike.contact.spatial.certificate import judge_blocks, weigh_blocks
 from heelstrike.contact.spatial.certified_solve import begin_from, count_solve
-from heelstrike.contact.spatial.modes import STICK
+from heelstrike.contact.spatial.modes import SLIP, STICK
 from heelstrike.contact.spatial.scaling import give_impulses, scale_data
 from heelstrike.contact.spatial.sticking import (
     FIRM,
+    NEAR,
     NEARLY,
     REFINED,
     REFINEMENTS,
@@ -46,7 +46,6 @@ from heelstrike.dynamics.spatial.equations import (
     factorize,
     solve_factorized,
     solve_lower,
-    solve_upper,
 )
 from heelstrike.dynamics.spatial.rows import add_row_forces, along_rows, write_diagonal
 from heelstrike.dynamics.spatial.workspace import TreeFactor
@@ -58,6 +57,9 @@ WORTHWHILE = 2
 """How many times more entries the matrix of the rows that stick has where that of the velocities
 takes less time: steps of robots of 18 and 35 velocities that stand were timed with each
 (``python benchmarks/spatial_speed.py``)."""
+
+EVERY = -1
+"""Stands for every mode."""
 
 WELL_ROUNDED = 1e-11
 """Rounding of velocities, of data of size one, above which the solvers, which can sum up without
@@ -71,12 +73,6 @@ def is_worthwhile(model: SpatialModel, size: int) -> bool:
     for k in range(model.nv):
         entries += model.depth[k]
     return size * size >= WORTHWHILE * entries
-
-
-@kernel
-def rubs(problem: BlockProblem) -> bool:
-    """Whether dry friction takes part; it comes last."""
-    return problem.count > 0 and problem.set[problem.count - 1] == INTERVAL
 
 
 @kernel
@@ -110,101 +106,87 @@ def gather_held(
 
 
 @kernel
-def take_along(
-    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
-    impulse: Floats, by_rows: bool, along: Floats,
+def add_along(
+    model: SpatialModel, problem: BlockProblem, mode: Integers, wanted: int, last: Integers,
+    rows: Floats, impulse: Floats, along: Floats,
 ) -> None:  # fmt: skip
-    """Write Yᵀ λ of whitened rows.
-
-    That of dry friction, unless it is asked for `by_rows`, is D^(-1/2) L⁻ᵀ λ, all at once.
-    """
-    for k in range(model.nv):
-        along[k] = 0.0
-    at_once = rubs(problem) and not by_rows
-    if at_once:
-        for block in range(problem.count):
-            if problem.set[block] == INTERVAL:
-                along[last[block]] = impulse[problem.first[block]]
-        solve_upper(model, factor, along)
-        for k in range(model.nv):
-            along[k] *= factor.root[k]
+    """Add Yᵀ λ of the blocks of one mode, or of `EVERY` one."""
     for block in range(problem.count):
-        if problem.set[block] != INTERVAL or not at_once:
+        if wanted in (mode[block], EVERY):
             r = problem.first[block]
             size = problem.first[block + 1] - r
-            some = 0.0
-            for row in range(r, r + size):
-                some = max(some, abs(impulse[row]))
-            if some > 0.0:
-                add_row_forces(model, last[block], r, size, rows, impulse, along)
-
-
-@kernel
-def change_along(model: SpatialModel, factor: TreeFactor, along: Floats, change: Floats) -> None:
-    """Write the change of the velocities L⁻¹ D^(-1/2) z."""
-    for k in range(model.nv):
-        change[k] = factor.root[k] * along[k]
-    solve_lower(model, factor, change)
+            add_row_forces(model, last[block], r, size, rows, impulse, along)
 
 
 @kernel
 def give_along(
-    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
-    along: Floats, by_rows: bool, change: Floats, velocity: Floats,
+    model: SpatialModel, problem: BlockProblem, mode: Integers, wanted: int, last: Integers,
+    rows: Floats, along: Floats, velocity: Floats,
 ) -> None:  # fmt: skip
-    """Write Y z of whitened rows.
-
-    That of dry friction, unless it is asked for `by_rows`, is a change of velocity, kept, too.
-    """
-    at_once = rubs(problem) and not by_rows
-    if at_once:
-        change_along(model, factor, along, change)
+    """Write Y z of the blocks of one mode, or of `EVERY` one."""
     for block in range(problem.count):
-        r = problem.first[block]
-        if problem.set[block] == INTERVAL and at_once:
-            velocity[r] = change[last[block]]
-        else:
+        if wanted in (mode[block], EVERY):
+            r = problem.first[block]
             size = problem.first[block + 1] - r
             along_rows(model, last[block], r, size, rows, along, velocity)
 
 
 @kernel
-def hold_along(
-    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, scaled: ScaledBlocks,
-    mode: Integers, last: Integers, rows: Floats, holding: SpatialHolding, u: Floats, x: Floats,
+def begin_along(
+    model: SpatialModel, problem: BlockProblem, scaled: ScaledBlocks, mode: Integers,
+    last: Integers, rows: Floats, x: Floats, holding: SpatialHolding,
 ) -> None:  # fmt: skip
-    """Find the impulses of least norm that hold what sticks; u is scratch."""
+    """Write what dry friction that slides does along the velocities, whatever else holds."""
+    for k in range(model.nv):
+        holding.steady[k] = 0.0
+    for row in range(problem.first[problem.count]):
+        holding.weighted[row] = scaled.weight[row] * x[row]
+    add_along(model, problem, mode, SLIP, last, rows, holding.weighted, holding.steady)
+
+
+@kernel
+def hold_along(
+    model: SpatialModel, problem: BlockProblem, scaled: ScaledBlocks, mode: Integers,
+    last: Integers, rows: Floats, holding: SpatialHolding, u: Floats, x: Floats,
+) -> None:  # fmt: skip
+    """Find the impulses of least norm that hold what sticks; u is scratch.
+
+    Those of what sticks are zero at first.
+    """
     gather_held(model, problem, scaled, mode, last, rows, holding.tree.matrix)
     factorize(model, holding.tree)
+    begin_along(model, problem, scaled, mode, last, rows, x, holding)
     along, weighted, weight = holding.along, holding.weighted, scaled.weight
     before = math.inf
-    for _ in range(REFINEMENTS):
-        for row in range(problem.first[problem.count]):
-            weighted[row] = weight[row] * x[row]
-        take_along(model, factor, problem, last, rows, weighted, False, along)
-        give_along(model, factor, problem, last, rows, along, False, holding.change, u)
+    for turn in range(REFINEMENTS):
+        for k in range(model.nv):
+            along[k] = holding.steady[k]
+        if turn > 0:
+            add_along(model, problem, mode, STICK, last, rows, weighted, along)
+        give_along(model, problem, mode, STICK, last, rows, along, u)
         left = 0.0
         for block in range(problem.count):
             share = share_of(problem.set[block])
             for row in range(problem.first[block], problem.first[block + 1]):
-                weighted[row] = 0.0
-                if mode[block] == STICK and weight[row] > 0.0:  # else nothing moves it
+                if mode[block] == STICK:
                     u[row] = scaled.offset[row] + weight[row] * u[row]
-                    left = max(left, abs(u[row]))
+                    left = max(left, abs(u[row]) if weight[row] > 0.0 else 0.0)
                     weighted[row] = share * weight[row] * u[row]
         if left <= REFINED or left > STAGNANT * before:
             return
-        is_last = before < math.inf and left * left <= NEARLY * before  # as much less again
+        is_last = turn > 0 and left <= NEAR and left * left <= NEARLY * before  # as much less again
         before = left
-        take_along(model, factor, problem, last, rows, weighted, False, along)
+        for k in range(model.nv):
+            along[k] = 0.0
+        add_along(model, problem, mode, STICK, last, rows, weighted, along)
         solve_factorized(model, holding.tree, along)
-        give_along(model, factor, problem, last, rows, along, False, holding.change, weighted)
+        give_along(model, problem, mode, STICK, last, rows, along, weighted)
         for block in range(problem.count):
-            if mode[block] == STICK:
-                firm = FIRM / share_of(problem.set[block])
-                for row in range(problem.first[block], problem.first[block + 1]):
-                    if weight[row] > 0.0:
-                        x[row] -= (u[row] - weight[row] * weighted[row]) / firm
+            firm = FIRM / share_of(problem.set[block])
+            for row in range(problem.first[block], problem.first[block + 1]):
+                if mode[block] == STICK and weight[row] > 0.0:  # else nothing moves it
+                    x[row] -= (u[row] - weight[row] * weighted[row]) / firm
+                    weighted[row] = weight[row] * x[row]
         if is_last:
             return
 
@@ -222,11 +204,17 @@ def certify_along(
     velocities of the robot is kept.
     """
     count = problem.first[problem.count]
-    take_along(model, factor, problem, last, rows, answer.impulse, True, holding.along)
-    give_along(
-        model, factor, problem, last, rows, holding.along, True, holding.change, answer.velocity
+    for k in range(model.nv):
+        holding.along[k] = 0.0
+    add_along(
+        model, problem, answer.mode, EVERY, last, rows, answer.impulse, holding.along
     )  # fmt: skip
-    change_along(model, factor, holding.along, holding.change)
+    give_along(
+        model, problem, answer.mode, EVERY, last, rows, holding.along, answer.velocity
+    )  # fmt: skip
+    for k in range(model.nv):
+        holding.change[k] = factor.root[k] * holding.along[k]
+    solve_lower(model, factor, holding.change)
     size = 1.0
     for row in range(count):
         answer.velocity[row] += problem.free[row]
@@ -264,7 +252,7 @@ def goes_on_holding(
         if begin_round(problem, scaled, iterate, newton) < 0:
             return False
         hold_along(
-            model, factor, problem, scaled, iterate.mode, last, rows, holding, iterate.u, iterate.x
+            model, problem, scaled, iterate.mode, last, rows, holding, iterate.u, iterate.x
         )  # fmt: skip
         give_impulses(problem, scaled, iterate.x, answer)
         residual = certify_along(model, factor, problem, last, rows, scaled, holding, answer)
