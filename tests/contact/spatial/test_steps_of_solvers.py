@@ -32,12 +32,15 @@ from heelstrike.contact.spatial.proximal import remember, tie
 from heelstrike.contact.spatial.restarts import draw
 from heelstrike.contact.spatial.scaling import give_impulses, scale_blocks, take_impulses
 from heelstrike.contact.spatial.sticking import (
+    FIRM,
+    SHARE_OF_FRICTION,
     bring_inside,
     correct_modes,
     factorize,
     hold,
     list_sticking_rows,
     solve_factored,
+    try_sticking,
 )
 from heelstrike.contact.spatial.workspace import (
     BlockProblem,
@@ -438,7 +441,7 @@ def test_what_is_held_is_held_by_the_shortest_impulses() -> None:
     _, work = posed(8, freedoms=4)
     newton, scaled = work.newton, work.scaled
     row = np.array([0, 1, 2, 5, 6])
-    newton.row[:5] = row
+    newton.row[:5], newton.extra[:5] = row, FIRM
     half = np.random.default_rng(9).normal(size=(ROWS, 3))
     scaled.matrix[:] = half @ half.T
     scaled.matrix[:] /= np.diag(scaled.matrix).max()
@@ -451,6 +454,27 @@ def test_what_is_held_is_held_by_the_shortest_impulses() -> None:
     np.testing.assert_allclose(x[row], wanted, atol=1e-6)
     np.testing.assert_allclose((scaled.matrix @ x + scaled.offset)[row], 0.0, atol=1e-12)
     assert not np.any(x[[3, 4, 7, 8]])
+
+
+def test_friction_leaves_a_load_to_what_can_bear_it() -> None:
+    """A stop and dry friction hold the same joint; then the friction holds it alone."""
+    problem = block_problem(
+        2, 2, count=2, first=np.array([0, 1, 2]), set=np.array([HALF_LINE, INTERVAL]),
+        bound=np.array([0.0, 1e-3]), delassus=np.ones((2, 2)), free=np.full(2, -0.1),
+    )  # fmt: skip
+    work = block_workspace(2, 2, ready=False)
+    uncompiled(scale_blocks)(problem, work.settings, work.scaled)
+    iterate = work.iterate
+    iterate.mode[:2] = STICK
+    assert uncompiled(try_sticking)(problem, work.scaled, iterate, work.newton)
+    assert iterate.mode[:2].tolist() == [STICK, STICK]
+    assert iterate.x[1] == pytest.approx(SHARE_OF_FRICTION * iterate.x[0], rel=1e-6)
+    assert iterate.x[1] < work.scaled.bound[1] < 0.5
+    problem.bound[1] = 1.0
+    uncompiled(scale_blocks)(problem, work.settings, work.scaled)
+    iterate.mode[:2] = [OPEN, STICK]
+    assert uncompiled(try_sticking)(problem, work.scaled, iterate, work.newton)
+    np.testing.assert_allclose(iterate.x[:2], [0.0, 1.0], atol=1e-9)
 
 
 def test_modes_are_corrected_one_by_one() -> None:
@@ -466,6 +490,8 @@ def test_modes_are_corrected_one_by_one() -> None:
     assert correct(problem, work.scaled, iterate) == 4
     assert iterate.mode.tolist() == [OPEN, STICK, OPEN, STICK, SLIP]
     iterate.u[8] = 1.0  # it slides against its friction, as it is to
+    assert correct(problem, work.scaled, iterate) == 0
+    iterate.u[8] = -1e-12  # along it by rounding
     assert correct(problem, work.scaled, iterate) == 0
     iterate.u[8] = -1.0  # along it
     assert correct(problem, work.scaled, iterate) == 1

@@ -34,6 +34,7 @@ from heelstrike.contact.spatial.sticking import stick_within_cones, try_sticking
 from heelstrike.contact.spatial.workspace import (
     BlockAnswer,
     BlockProblem,
+    BlockTally,
     BlockWorkspace,
     Iterate,
     ScaledBlocks,
@@ -63,6 +64,15 @@ def _signature() -> Any:
     return types.int64(
         BlockProblem.compiled_type(), BlockWorkspace.compiled_type(), BlockAnswer.compiled_type()
     )
+
+
+@kernel
+def count_solve(tally: BlockTally) -> None:
+    """Count a solve, of which nothing has been tried yet."""
+    tally.solves += 1
+    tally.iterations = 0
+    tally.last_fallbacks = 0
+    tally.solver = LAST_MODES
 
 
 @kernel
@@ -151,10 +161,7 @@ def try_way(way: int, problem: BlockProblem, answer: BlockAnswer, work: BlockWor
 def try_ways(problem: BlockProblem, work: BlockWorkspace, answer: BlockAnswer) -> int:
     """Solve a problem; see :func:`solve_block_problem`, whose arguments these are."""
     scaled, settings, tally, iterate = work.scaled, work.settings, work.tally, work.iterate
-    tally.solves += 1
-    tally.iterations = 0
-    tally.last_fallbacks = 0
-    tally.solver = LAST_MODES
+    count_solve(tally)
     scale_blocks(problem, settings, scaled)
     begin_from(problem, scaled, answer, iterate)
     iterate.least = math.inf

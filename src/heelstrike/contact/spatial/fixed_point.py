@@ -110,8 +110,8 @@ def guess_slips(
     """Guess slip speeds until the problem is solved or the effort is spent; keep the best.
 
     The first guess is that nothing slips: the best impulses so far may be where there is almost a
-    solution, but none. ``anchor.diagonal`` has the guess of each block, ``anchor.offset`` the
-    offset of the problem, ``anchor.path`` the impulses.
+    solution, but none. ``anchor.slip`` has the guess of each block, ``anchor.offset`` the offset of
+    the problem, ``anchor.path`` the impulses.
     """
     rows, first = problem.first[problem.count], problem.first
     rate = largest_row(rows, scaled.matrix)
@@ -119,14 +119,16 @@ def guess_slips(
     least = keep_aside(rows, NOTHING_YET, iterate, anchor)
     for row in range(rows):
         anchor.offset[row] = scaled.offset[row]
-        anchor.path[row] = anchor.diagonal[row] = 0.0
+        anchor.path[row] = 0.0
+    for block in range(problem.count):
+        anchor.slip[block] = 0.0
     for _ in range(GUESSES):
         if tally.iterations >= settings.effort or least <= settings.tolerance:
             break
         tally.iterations += GRADIENT_STEPS
         for block in range(problem.count):
             if problem.set[block] == CONE:
-                scaled.offset[first[block]] += problem.friction[block] * anchor.diagonal[block]
+                scaled.offset[first[block]] += problem.friction[block] * anchor.slip[block]
         descend(problem, scaled, rate, anchor.path, iterate)
         for row in range(rows):
             scaled.offset[row] = anchor.offset[row]
@@ -134,8 +136,8 @@ def guess_slips(
         iterate.least = NOTHING_YET
         look(problem, scaled, iterate)
         for block in range(problem.count):
-            lacks = slip_speed(problem, block, iterate.u) - anchor.diagonal[block]
-            anchor.diagonal[block] += SHARE_OF_THE_WAY * lacks
+            lacks = slip_speed(problem, block, iterate.u) - anchor.slip[block]
+            anchor.slip[block] += SHARE_OF_THE_WAY * lacks
         iterate_newton(
             problem, scaled, settings, OUTER_STEPS, RIDGE, False, tally, iterate, newton
         )  # fmt: skip

@@ -3,7 +3,8 @@
 Dry friction may slide meanwhile, with the impulse of its bound. Sticking contacts make one
 symmetric system, often singular: the points of one rigid foot have more rows than it has freedoms.
 A little is added to the diagonal, and the answer refined from zero, so that it is the one of least
-norm. From the impulses of the step before it would wander to the edge of the cones.
+norm, with more weight on dry friction. From the impulses of the step before it would wander to the
+edge of the cones.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from heelstrike.contact.spatial.cones import project
 from heelstrike.contact.spatial.iterates import find_velocities, look, return_to_best
 from heelstrike.contact.spatial.modes import OPEN, SLIP, STICK
 from heelstrike.contact.spatial.newton import apply_matrix
+from heelstrike.contact.spatial.scaling import sign
 from heelstrike.contact.spatial.workspace import (
     BlockProblem,
     Floats,
@@ -25,9 +27,14 @@ from heelstrike.contact.spatial.workspace import (
     ScaledBlocks,
 )
 
-FIRM = 1e-8
-"""What is added to the unit diagonal. Rounding, 1e-16, leaves 1e-8 of an impulse along what moves
+FIRM = 1e-9
+"""What is added to the unit diagonal. Rounding, 1e-16, leaves 1e-7 of an impulse along what moves
 nothing; each refinement leaves this over the least eigenvalue that moves anything."""
+
+SHARE_OF_FRICTION = 1e-3
+"""Share of a load that dry friction takes where contacts or stops hold the joint as well, beside
+theirs. It bears far less than they do: with a like share it would be beyond its bound and seem to
+slide, and what slides and what sticks would take turns."""
 
 REFINEMENTS = 6
 """How often the answer is refined."""
@@ -38,12 +45,18 @@ REFINED = 1e-14
 STAGNANT = 0.25
 """Part of them that a refinement leaves where rounding is all there is."""
 
-ROUNDS_OF_OPENING = 4
+ROUNDS_OF_OPENING = 6
 """How often contacts that pull are opened, and open ones that sink closed."""
 
-STUCK = 1e-11
-"""Residual up to which an answer of sticking contacts is taken. Points of one foot contradict each
-other by the rounding of their gaps, 1e-16 m in a step: to look for what is better is in vain."""
+STUCK = 1e-10
+"""Residual up to which an answer of sticking contacts is taken. Points of one foot, and dry
+friction of what they hold, contradict each other by the rounding of their gaps: some 1e-16 m, over
+a step of 1e-3 s and the 1e-2 m/s that gravity gives in it. To look for what is better is in
+vain."""
+
+NEARLY, NEAR = 1e-11, 1e-8
+"""Residual that one more refinement is expected to leave where it is the last, and what there may
+be before it: what is held by dry friction alone comes nearer more slowly than all of it did."""
 
 PROJECTIONS, CORRECTIONS = 100, 2
 """How often impulses that hold are brought into their cones, and held again each time."""
@@ -96,6 +109,22 @@ def solve_factored(size: int, factor: Floats, right: Floats) -> None:
 
 
 @kernel
+def share_of(kind: int) -> float:
+    """Share of a load that a block of a kind takes where others could take it, beside a contact."""
+    return SHARE_OF_FRICTION if kind == INTERVAL else 1.0
+
+
+@kernel
+def list_rows_of(problem: BlockProblem, block: int, size: int, newton: NewtonSystem) -> int:
+    """Add the rows of a block to a list of so many; return how many it has then."""
+    for row in range(problem.first[block], problem.first[block + 1]):
+        newton.row[size] = row
+        newton.extra[size] = FIRM / share_of(problem.set[block])
+        size += 1
+    return size
+
+
+@kernel
 def list_sticking_rows(
     problem: BlockProblem, scaled: ScaledBlocks, mode: Integers, newton: NewtonSystem
 ) -> int:
@@ -110,9 +139,7 @@ def list_sticking_rows(
             continue
         if problem.set[block] == CONE and problem.friction[block] == 0.0:
             return -1
-        for row in range(problem.first[block], problem.first[block + 1]):
-            newton.row[size] = row
-            size += 1
+        size = list_rows_of(problem, block, size, newton)
     return size
 
 
@@ -130,6 +157,20 @@ def begin_at_bounds(problem: BlockProblem, scaled: ScaledBlocks, iterate: Iterat
 
 
 @kernel
+def begin_round(
+    problem: BlockProblem, scaled: ScaledBlocks, iterate: Iterate, newton: NewtonSystem
+) -> int:
+    """List the rows that stick, and begin with no impulses of theirs.
+
+    Returns how many there are, or -1 if a contact slips.
+    """
+    size = list_sticking_rows(problem, scaled, iterate.mode, newton)
+    if size >= 0:
+        begin_at_bounds(problem, scaled, iterate)
+    return size
+
+
+@kernel
 def factorize_held(size: int, scaled: ScaledBlocks, newton: NewtonSystem) -> bool:
     """Factor the matrix of the listed rows, made a little firmer; return success."""
     row, system, matrix = newton.row, newton.system, scaled.matrix
@@ -137,7 +178,7 @@ def factorize_held(size: int, scaled: ScaledBlocks, newton: NewtonSystem) -> boo
         at = row[i]
         for j in range(i + 1):
             system[i, j] = matrix[at, row[j]]
-        system[i, i] += FIRM
+        system[i, i] += newton.extra[i]
     return factorize(size, system)
 
 
@@ -179,7 +220,7 @@ def correct_modes(problem: BlockProblem, scaled: ScaledBlocks, iterate: Iterate)
         if kind == INTERVAL:
             x, bound = iterate.x[row], scaled.bound[block]
             slides = iterate.mode[block] == SLIP
-            if slides and iterate.u[row] * x > 0.0:
+            if slides and sign(x) * iterate.u[row] > STUCK:
                 iterate.mode[block] = STICK
                 changed += 1
             elif not slides and abs(x) > bound:
@@ -204,10 +245,9 @@ def try_sticking(
 ) -> bool:
     """Solve the problem if its blocks stick or are open, as their modes say; return success."""
     for _ in range(ROUNDS_OF_OPENING):
-        size = list_sticking_rows(problem, scaled, iterate.mode, newton)
+        size = begin_round(problem, scaled, iterate, newton)
         if size < 0:
             return False
-        begin_at_bounds(problem, scaled, iterate)
         apply_matrix(problem.first[problem.count], scaled, iterate.x, newton.moved)
         if not hold(problem.first[problem.count], size, scaled, newton, iterate.x):
             return False
@@ -235,10 +275,9 @@ def list_held_rows(
         free = kind == INTERVAL and abs(pressed) >= AT_ITS_BOUND * scaled.bound[block]
         if kind in (CONE, HALF_LINE):
             free = pressed <= 0.0 and iterate.u[begin] > tolerance
+        if not free and scaled.scale[block] != 0.0:
+            size = list_rows_of(problem, block, size, newton)
         for row in range(begin, problem.first[block + 1]):
-            if not free and scaled.scale[block] != 0.0:
-                newton.row[size] = row
-                size += 1
             if kind != INTERVAL or not free:
                 iterate.x[row] = 0.0
     return size

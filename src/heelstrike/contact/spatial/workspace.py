@@ -147,7 +147,7 @@ class NewtonSystem(Bundle):
 
 
 class Anchor(Bundle):
-    """What a problem with a larger diagonal is tied to."""
+    """What a problem with a larger diagonal, or with guessed slip speeds, is tied to."""
 
     center: Floats = array("rows")
     """The best impulses so far."""
@@ -156,6 +156,8 @@ class Anchor(Bundle):
     diagonal: Floats = array("rows")
     offset: Floats = array("rows")
     """diagonal, offset: Of the problem itself."""
+    slip: Floats = array("blocks")
+    """Slip speed of each block that is guessed."""
 
 
 class BlockWorkspace(Bundle):

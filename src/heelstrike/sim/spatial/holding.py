@@ -1,10 +1,10 @@
 """What holds, or is open, as in the step before: found in the velocities of the robot.
 
-Contacts and dry friction that stick make the equations (A + ε I) x = −b of
-:mod:`heelstrike.contact.spatial.sticking`. With the scaled and whitened rows Y, A = Y Yᵀ, and
-(Woodbury 1950)::
+Contacts and dry friction that stick make the equations (A + ε S⁻¹) x = −b of
+:mod:`heelstrike.contact.spatial.sticking`, with the share of each row on the diagonal of S. With
+the scaled and whitened rows Y, A = Y Yᵀ, and (Woodbury 1950)::
 
-    x = −(b − Y (Yᵀ Y + ε I)⁻¹ Yᵀ b) / ε
+    x = −S (b − Y (Yᵀ S Y + ε I)⁻¹ Yᵀ S b) / ε
 
 The matrix in brackets has a row for each velocity, however many contacts and joints hold, and
 nothing where the mass matrix has nothing: it is factored along the tree, and no Delassus matrix is
@@ -18,26 +18,27 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF
-from heelstrike.contact.sets import INTERVAL
 from heelstrike.contact.spatial.certificate import judge_blocks, weigh_blocks
-from heelstrike.contact.spatial.certified_solve import begin_from
-from heelstrike.contact.spatial.modes import LAST_MODES, STICK
+from heelstrike.contact.spatial.certified_solve import begin_from, count_solve
+from heelstrike.contact.spatial.modes import SLIP, STICK
 from heelstrike.contact.spatial.scaling import give_impulses, scale_data
 from heelstrike.contact.spatial.sticking import (
     FIRM,
+    NEAR,
+    NEARLY,
     REFINED,
     REFINEMENTS,
     ROUNDS_OF_OPENING,
     STAGNANT,
     STUCK,
-    begin_at_bounds,
+    begin_round,
     correct_modes,
     list_sticking_rows,
+    share_of,
 )
 from heelstrike.contact.spatial.workspace import (
     BlockAnswer,
     BlockProblem,
-    BlockTally,
     BlockWorkspace,
     ScaledBlocks,
 )
@@ -45,7 +46,6 @@ from heelstrike.dynamics.spatial.equations import (
     factorize,
     solve_factorized,
     solve_lower,
-    solve_upper,
 )
 from heelstrike.dynamics.spatial.rows import add_row_forces, along_rows, write_diagonal
 from heelstrike.dynamics.spatial.workspace import TreeFactor
@@ -58,7 +58,10 @@ WORTHWHILE = 2
 takes less time: steps of robots of 18 and 35 velocities that stand were timed with each
 (``python benchmarks/spatial_speed.py``)."""
 
-WELL_ROUNDED = STUCK
+EVERY = -1
+"""Stands for every mode."""
+
+WELL_ROUNDED = 1e-11
 """Rounding of velocities, of data of size one, above which the solvers, which can sum up without
 any, take over."""
 
@@ -73,17 +76,11 @@ def is_worthwhile(model: SpatialModel, size: int) -> bool:
 
 
 @kernel
-def rubs(problem: BlockProblem) -> bool:
-    """Whether dry friction takes part; it comes last."""
-    return problem.count > 0 and problem.set[problem.count - 1] == INTERVAL
-
-
-@kernel
 def gather_held(
     model: SpatialModel, problem: BlockProblem, scaled: ScaledBlocks, mode: Integers,
     last: Integers, rows: Floats, matrix: Floats,
 ) -> None:  # fmt: skip
-    """Write Yᵀ Y + ε I of the blocks that stick, each row along the chain of its velocity."""
+    """Write Yᵀ S Y + ε I of the blocks that stick, each row along the chain of its velocity."""
     for k in range(model.nv):
         for a in range(model.depth[k]):
             matrix[k, a] = 0.0
@@ -92,7 +89,7 @@ def gather_held(
         if mode[block] != STICK:
             continue
         end, r = last[block], problem.first[block]
-        square = scaled.scale[block] * scaled.scale[block]
+        square = share_of(problem.set[block]) * scaled.scale[block] * scaled.scale[block]
         if problem.first[block + 1] - r == 3:
             for a in range(model.depth[end] + 1):
                 k = model.chain[end, a]
@@ -109,99 +106,87 @@ def gather_held(
 
 
 @kernel
-def take_along(
-    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
-    impulse: Floats, by_rows: bool, along: Floats,
+def add_along(
+    model: SpatialModel, problem: BlockProblem, mode: Integers, wanted: int, last: Integers,
+    rows: Floats, impulse: Floats, along: Floats,
 ) -> None:  # fmt: skip
-    """Write Yᵀ λ of whitened rows.
-
-    That of dry friction, unless it is asked for `by_rows`, is D^(-1/2) L⁻ᵀ λ, all at once.
-    """
-    for k in range(model.nv):
-        along[k] = 0.0
-    at_once = rubs(problem) and not by_rows
-    if at_once:
-        for block in range(problem.count):
-            if problem.set[block] == INTERVAL:
-                along[last[block]] = impulse[problem.first[block]]
-        solve_upper(model, factor, along)
-        for k in range(model.nv):
-            along[k] *= factor.root[k]
+    """Add Yᵀ λ of the blocks of one mode, or of `EVERY` one."""
     for block in range(problem.count):
-        if problem.set[block] != INTERVAL or not at_once:
+        if wanted in (mode[block], EVERY):
             r = problem.first[block]
             size = problem.first[block + 1] - r
-            some = 0.0
-            for row in range(r, r + size):
-                some = max(some, abs(impulse[row]))
-            if some > 0.0:
-                add_row_forces(model, last[block], r, size, rows, impulse, along)
-
-
-@kernel
-def change_along(model: SpatialModel, factor: TreeFactor, along: Floats, change: Floats) -> None:
-    """Write the change of the velocities L⁻¹ D^(-1/2) z."""
-    for k in range(model.nv):
-        change[k] = factor.root[k] * along[k]
-    solve_lower(model, factor, change)
+            add_row_forces(model, last[block], r, size, rows, impulse, along)
 
 
 @kernel
 def give_along(
-    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, last: Integers, rows: Floats,
-    along: Floats, by_rows: bool, change: Floats, velocity: Floats,
+    model: SpatialModel, problem: BlockProblem, mode: Integers, wanted: int, last: Integers,
+    rows: Floats, along: Floats, velocity: Floats,
 ) -> None:  # fmt: skip
-    """Write Y z of whitened rows.
-
-    That of dry friction, unless it is asked for `by_rows`, is a change of velocity, kept, too.
-    """
-    at_once = rubs(problem) and not by_rows
-    if at_once:
-        change_along(model, factor, along, change)
+    """Write Y z of the blocks of one mode, or of `EVERY` one."""
     for block in range(problem.count):
-        r = problem.first[block]
-        if problem.set[block] == INTERVAL and at_once:
-            velocity[r] = change[last[block]]
-        else:
+        if wanted in (mode[block], EVERY):
+            r = problem.first[block]
             size = problem.first[block + 1] - r
             along_rows(model, last[block], r, size, rows, along, velocity)
 
 
 @kernel
-def hold_along(
-    model: SpatialModel, factor: TreeFactor, problem: BlockProblem, scaled: ScaledBlocks,
-    mode: Integers, last: Integers, rows: Floats, holding: SpatialHolding, u: Floats, x: Floats,
+def begin_along(
+    model: SpatialModel, problem: BlockProblem, scaled: ScaledBlocks, mode: Integers,
+    last: Integers, rows: Floats, x: Floats, holding: SpatialHolding,
 ) -> None:  # fmt: skip
-    """Find the impulses of least norm that hold what sticks; u is scratch."""
+    """Write what dry friction that slides does along the velocities, whatever else holds."""
+    for k in range(model.nv):
+        holding.steady[k] = 0.0
+    for row in range(problem.first[problem.count]):
+        holding.weighted[row] = scaled.weight[row] * x[row]
+    add_along(model, problem, mode, SLIP, last, rows, holding.weighted, holding.steady)
+
+
+@kernel
+def hold_along(
+    model: SpatialModel, problem: BlockProblem, scaled: ScaledBlocks, mode: Integers,
+    last: Integers, rows: Floats, holding: SpatialHolding, u: Floats, x: Floats,
+) -> None:  # fmt: skip
+    """Find the impulses of least norm that hold what sticks; u is scratch.
+
+    Those of what sticks are zero at first.
+    """
     gather_held(model, problem, scaled, mode, last, rows, holding.tree.matrix)
     factorize(model, holding.tree)
+    begin_along(model, problem, scaled, mode, last, rows, x, holding)
     along, weighted, weight = holding.along, holding.weighted, scaled.weight
     before = math.inf
-    for _ in range(REFINEMENTS):
-        for row in range(problem.first[problem.count]):
-            weighted[row] = weight[row] * x[row]
-        take_along(model, factor, problem, last, rows, weighted, False, along)
-        give_along(model, factor, problem, last, rows, along, False, holding.change, u)
+    for turn in range(REFINEMENTS):
+        for k in range(model.nv):
+            along[k] = holding.steady[k]
+        if turn > 0:
+            add_along(model, problem, mode, STICK, last, rows, weighted, along)
+        give_along(model, problem, mode, STICK, last, rows, along, u)
         left = 0.0
         for block in range(problem.count):
+            share = share_of(problem.set[block])
             for row in range(problem.first[block], problem.first[block + 1]):
-                weighted[row] = 0.0
-                if mode[block] == STICK and weight[row] > 0.0:  # else nothing moves it
+                if mode[block] == STICK:
                     u[row] = scaled.offset[row] + weight[row] * u[row]
-                    left = max(left, abs(u[row]))
-                    weighted[row] = weight[row] * u[row]
+                    left = max(left, abs(u[row]) if weight[row] > 0.0 else 0.0)
+                    weighted[row] = share * weight[row] * u[row]
         if left <= REFINED or left > STAGNANT * before:
             return
-        is_last = before < math.inf and left * left <= STUCK * before  # as much less again
+        is_last = turn > 0 and left <= NEAR and left * left <= NEARLY * before  # as much less again
         before = left
-        take_along(model, factor, problem, last, rows, weighted, False, along)
+        for k in range(model.nv):
+            along[k] = 0.0
+        add_along(model, problem, mode, STICK, last, rows, weighted, along)
         solve_factorized(model, holding.tree, along)
-        give_along(model, factor, problem, last, rows, along, False, holding.change, weighted)
+        give_along(model, problem, mode, STICK, last, rows, along, weighted)
         for block in range(problem.count):
-            if mode[block] == STICK:
-                for row in range(problem.first[block], problem.first[block + 1]):
-                    if weight[row] > 0.0:
-                        x[row] -= (u[row] - weight[row] * weighted[row]) / FIRM
+            firm = FIRM / share_of(problem.set[block])
+            for row in range(problem.first[block], problem.first[block + 1]):
+                if mode[block] == STICK and weight[row] > 0.0:  # else nothing moves it
+                    x[row] -= (u[row] - weight[row] * weighted[row]) / firm
+                    weighted[row] = weight[row] * x[row]
         if is_last:
             return
 
@@ -219,11 +204,17 @@ def certify_along(
     velocities of the robot is kept.
     """
     count = problem.first[problem.count]
-    take_along(model, factor, problem, last, rows, answer.impulse, True, holding.along)
-    give_along(
-        model, factor, problem, last, rows, holding.along, True, holding.change, answer.velocity
+    for k in range(model.nv):
+        holding.along[k] = 0.0
+    add_along(
+        model, problem, answer.mode, EVERY, last, rows, answer.impulse, holding.along
     )  # fmt: skip
-    change_along(model, factor, holding.along, holding.change)
+    give_along(
+        model, problem, answer.mode, EVERY, last, rows, holding.along, answer.velocity
+    )  # fmt: skip
+    for k in range(model.nv):
+        holding.change[k] = factor.root[k] * holding.along[k]
+    solve_lower(model, factor, holding.change)
     size = 1.0
     for row in range(count):
         answer.velocity[row] += problem.free[row]
@@ -233,16 +224,6 @@ def certify_along(
     rounding = terms * UNIT_ROUNDOFF * size
     residual = judge_blocks(problem, rounding, scaled, answer)
     return residual if rounding <= WELL_ROUNDED else math.inf
-
-
-@kernel
-def note_shortcut(tally: BlockTally) -> None:
-    """Count a solve whose answer is that of the last modes."""
-    tally.solves += 1
-    tally.shortcuts += 1
-    tally.iterations = 1
-    tally.last_fallbacks = 0
-    tally.solver = LAST_MODES
 
 
 @kernel
@@ -268,16 +249,17 @@ def goes_on_holding(
     scale_data(problem, scaled)
     begin_from(problem, scaled, answer, iterate)
     for _ in range(ROUNDS_OF_OPENING):
-        if list_sticking_rows(problem, scaled, iterate.mode, newton) < 0:
+        if begin_round(problem, scaled, iterate, newton) < 0:
             return False
-        begin_at_bounds(problem, scaled, iterate)
         hold_along(
-            model, factor, problem, scaled, iterate.mode, last, rows, holding, iterate.u, iterate.x
+            model, problem, scaled, iterate.mode, last, rows, holding, iterate.u, iterate.x
         )  # fmt: skip
         give_impulses(problem, scaled, iterate.x, answer)
         residual = certify_along(model, factor, problem, last, rows, scaled, holding, answer)
         if answer.residual <= STUCK and residual <= solver.settings.tolerance:
-            note_shortcut(solver.tally)
+            count_solve(solver.tally)
+            solver.tally.iterations += 1
+            solver.tally.shortcuts += 1
             return True
         for row in range(problem.first[problem.count]):
             iterate.u[row] = answer.velocity[row] * scaled.weight[row] / scaled.unit

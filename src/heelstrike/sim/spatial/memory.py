@@ -126,8 +126,9 @@ class SpatialHolding(Bundle):
 
     tree: TreeFactor = part(TreeFactor)
     """Their matrix and its factor."""
+    steady: Floats = array("nv")
     along: Floats = array("nv")
-    """Impulses along the velocities."""
+    """steady, along: Impulses along the velocities: of dry friction that slides, and of all."""
     change: Floats = array("nv")
     """Change of the velocities that impulses make."""
     weighted: Floats = array("capacity")
