@@ -27,8 +27,8 @@ from heelstrike.contact.spatial.workspace import (
     ScaledBlocks,
 )
 
-FIRM = 1e-9
-"""What is added to the unit diagonal. Rounding, 1e-16, leaves 1e-7 of an impulse along what moves
+FIRM = 1e-8
+"""What is added to the unit diagonal. Rounding, 1e-16, leaves 1e-8 of an impulse along what moves
 nothing; each refinement leaves this over the least eigenvalue that moves anything."""
 
 SHARE_OF_FRICTION = 1e-3
@@ -51,8 +51,8 @@ ROUNDS_OF_OPENING = 6
 STUCK = 1e-10
 """Residual up to which an answer of sticking contacts is taken. Points of one foot, and dry
 friction of what they hold, contradict each other by the rounding of their gaps: some 1e-16 m, over
-a step of 1e-3 s and the 1e-2 m/s that gravity gives in it. To look for what is better is in
-vain."""
+a step of 1e-3 s and the 1e-2 m/s that gravity gives in it, 1e-11, and a few of them add up. To look
+for what is better is in vain."""
 
 NEARLY, NEAR = 1e-11, 1e-8
 """Residual that one more refinement is expected to leave where it is the last, and what there may
