@@ -27,8 +27,8 @@ from heelstrike.contact.spatial.workspace import (
     ScaledBlocks,
 )
 
-FIRM = 1e-9
-"""What is added to the unit diagonal. Rounding, 1e-16, leaves 1e-7 of an impulse along what moves
+FIRM = 1e-8
+"""What is added to the unit diagonal. Rounding, 1e-16, leaves 1e-8 of an impulse along what moves
 nothing; each refinement leaves this over the least eigenvalue that moves anything."""
 
 SHARE_OF_FRICTION = 1e-3
