@@ -142,9 +142,9 @@ def compare_planners(
     GaitError
         If the robot cannot be planned for, or an argument makes no sense.
     """
-    given = [speeds] if isinstance(speeds, str | int) else list(speeds)
+    given = [] if isinstance(speeds, str | int) else list(speeds)  # one text or index is not meant
     if not given or not all(is_number(x) and np.isfinite(x) and x > 0.0 for x in given):
-        raise GaitError(f"speeds must be positive numbers (m/s), got {given}")
+        raise GaitError(f"speeds must be positive numbers (m/s), got {given or speeds!r}")
     several = [float(speed) for speed in given]
     if steps < 1:
         raise GaitError(f"steps must be 1 or more, got {steps}")

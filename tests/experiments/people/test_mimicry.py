@@ -165,6 +165,7 @@ def test_what_is_of_markers_is_refused_for_joints(given: dict[str, Any], tmp_pat
         ({"speed": np.nan}, "speed must be a positive number"),
         ({"friction": -1.0}, "friction must not be negative"),
         ({"steps": 0}, "steps must be 1 or more"),
+        ({"rate": -1.0}, "rate must be from"),
     ],
 )
 def test_numbers_that_make_no_sense(asked: dict[str, Any], said: str) -> None:

@@ -23,6 +23,7 @@ from heelstrike.gait.recordings.forces import load_forces
 from heelstrike.gait.recordings.markers import RecordedMarkers, load_markers
 from heelstrike.gait.recordings.motion import motion_of
 from heelstrike.gait.recordings.opensim import joints_of_opensim
+from heelstrike.gait.recordings.saving import check_rate
 from heelstrike.gait.recordings.table import read_table
 from heelstrike.gait.recordings.units import check_unit
 from heelstrike.robot.human import human
@@ -167,6 +168,8 @@ def mimic(
         If no motion was found; the message names what is in conflict.
     """
     _check_asked(speed, friction, steps)
+    if rate is not None:
+        check_rate(rate)
     tell = progress or (lambda _, __: None)
     tell("reading", 0.0)
     if str(path) == WINTER:
