@@ -197,8 +197,7 @@ def weigh(problem: ContactProblem, settings: Settings, impulse: Floats, scaling:
     """Write the weights of the rows, the size of the data, beta, and the effort."""
     delassus, free, root = problem.delassus, problem.free, scaling.root
     skewed = settings.skewed != 0
-    # The largest ratio is found without division, as the fraction largest / whole.
-    largest, whole, effort = settings.floor, 1.0, 0.0
+    unit, effort = settings.floor, 0.0
     rows = row_of(problem.count, problem.first)
     for i in range(rows):
         weight = delassus[i, i]
@@ -206,10 +205,9 @@ def weigh(problem: ContactProblem, settings: Settings, impulse: Floats, scaling:
             weight = general_weight(rows, i, delassus)
         size = math.sqrt(weight) if weight > 0.0 else 0.0
         root[i] = size
-        if weight > 0.0 and abs(free[i]) * whole > largest * size:
-            largest, whole = abs(free[i]), size
+        if weight > 0.0 and abs(free[i]) > unit * size:  # a few are divided, not all
+            unit = abs(free[i]) / size
         effort += size * abs(impulse[i])
-    unit = largest / whole
     if effort > 0.0:
         effort = effort / unit if unit > 0.0 else math.inf
     scaling.effort = effort

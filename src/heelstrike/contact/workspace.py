@@ -124,7 +124,7 @@ class StickingRows(Bundle):
     pivot: Floats = array("2 capacity")
     """x, pivot: Solution; pivots, and a right side."""
     order: Integers = array("2 capacity", of=int)
-    """The equation that has each place in the elimination."""
+    """The equation that has each place in the elimination; rows that share friction."""
     span: Integers = array("2 capacity", of=int)
     """How many columns the row of the factor in each place has."""
     factor: Floats = array("2 capacity", "2 capacity")
@@ -132,7 +132,7 @@ class StickingRows(Bundle):
     lower_half: Floats = array("half")
     """Matrix of a small system."""
     spare: Floats = array("2 capacity")
-    """Solution in the order of the elimination."""
+    """Solution in the order of the elimination; diagonals; edges of cones."""
     programs: Integers = array("sizes", of=int, address=True)
     """Addresses of the programs that solve small systems, by size; zero where there is none."""
 

@@ -255,7 +255,7 @@ def solve_factorized(model: Model, factor: Floats, x: Floats) -> None:
 
 
 @kernel
-def free_acceleration(
+def acceleration_without_contact(
     model: Model, q: Floats, v: Floats, torque: Floats, bias: Floats, factor: Floats,
     force: Floats, v_dot: Floats,
 ) -> None:  # fmt: skip

@@ -109,7 +109,7 @@ def solve_factored(size: int, factor: Floats, right: Floats) -> None:
 
 
 @kernel
-def share_of(kind: int) -> float:
+def share_of_load(kind: int) -> float:
     """Share of a load that a block of a kind takes where others could take it, beside a contact."""
     return SHARE_OF_FRICTION if kind == INTERVAL else 1.0
 
@@ -119,7 +119,7 @@ def list_rows_of(problem: BlockProblem, block: int, size: int, newton: NewtonSys
     """Add the rows of a block to a list of so many; return how many it has then."""
     for row in range(problem.first[block], problem.first[block + 1]):
         newton.row[size] = row
-        newton.extra[size] = FIRM / share_of(problem.set[block])
+        newton.extra[size] = FIRM / share_of_load(problem.set[block])
         size += 1
     return size
 

@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 from heelstrike.compiler.recordings.recording import Program
 from heelstrike.compiler.straight_line import straight_line_code
 from heelstrike.contact.ground import Ground
-from heelstrike.dynamics.kernels import free_acceleration, solve_factorized, state_equations
+from heelstrike.dynamics.kernels import (
+    acceleration_without_contact,
+    solve_factorized,
+    state_equations,
+)
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
@@ -40,7 +44,7 @@ KERNELS: tuple[Callable[..., None], ...] = (
     point_delassus,
     point_velocities,
     push_points,
-    free_acceleration,
+    acceleration_without_contact,
     locate_points,
 )
 
@@ -66,7 +70,7 @@ _known: WeakKeyDictionary[Model, dict[bytes, NDArray[np.int64]]] = WeakKeyDictio
 def straight_line_programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the addresses of the straight-line programs of a robot, one for each kernel.
 
-    `points` are the contact points that those of points are for but the last.
+    `points` are the contact points that programs of points are for; the last of these is for all.
     """
     known = _known.setdefault(model, {})
     key = points.tobytes()

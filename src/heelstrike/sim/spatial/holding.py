@@ -34,7 +34,7 @@ from heelstrike.contact.spatial.sticking import (
     begin_round,
     correct_modes,
     list_sticking_rows,
-    share_of,
+    share_of_load,
 )
 from heelstrike.contact.spatial.workspace import (
     BlockAnswer,
@@ -89,7 +89,7 @@ def gather_held(
         if mode[block] != STICK:
             continue
         end, r = last[block], problem.first[block]
-        square = share_of(problem.set[block]) * scaled.scale[block] * scaled.scale[block]
+        square = share_of_load(problem.set[block]) * scaled.scale[block] * scaled.scale[block]
         if problem.first[block + 1] - r == 3:
             for a in range(model.depth[end] + 1):
                 k = model.chain[end, a]
@@ -166,7 +166,7 @@ def hold_along(
         give_along(model, problem, mode, STICK, last, rows, along, u)
         left = 0.0
         for block in range(problem.count):
-            share = share_of(problem.set[block])
+            share = share_of_load(problem.set[block])
             for row in range(problem.first[block], problem.first[block + 1]):
                 if mode[block] == STICK:
                     u[row] = scaled.offset[row] + weight[row] * u[row]
@@ -182,7 +182,7 @@ def hold_along(
         solve_factorized(model, holding.tree, along)
         give_along(model, problem, mode, STICK, last, rows, along, weighted)
         for block in range(problem.count):
-            firm = FIRM / share_of(problem.set[block])
+            firm = FIRM / share_of_load(problem.set[block])
             for row in range(problem.first[block], problem.first[block + 1]):
                 if mode[block] == STICK and weight[row] > 0.0:  # else nothing moves it
                     x[row] -= (u[row] - weight[row] * weighted[row]) / firm

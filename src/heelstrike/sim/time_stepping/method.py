@@ -407,7 +407,7 @@ def free_velocity(
         for i in range(model.nv):
             next_v[i] = v[i] + step * rate[i]
     else:
-        implicit_velocity(model, step, scheme, q, v, torque, stiffness, equations, next_v)
+        velocity_by_loops(model, step, scheme, q, v, torque, stiffness, equations, next_v)
     if share_over_step(time, step, pushes):
         for i in range(model.nv):
             rate[i] = 0.0
@@ -418,7 +418,7 @@ def free_velocity(
 
 
 @kernel
-def implicit_velocity(
+def velocity_by_loops(
     model: Model, step: float, scheme: int, q: Floats, v: Floats, torque: Floats,
     stiffness: Floats, equations: Equations, next_v: Floats,
 ) -> None:  # fmt: skip
