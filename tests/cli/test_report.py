@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -53,11 +54,11 @@ def test_a_run_is_reported_with_the_gait_beside_it(folder: Path, tmp_path: Path)
 def test_a_robot_is_walked_by_several_methods(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     gait = str(folder / "gait.json")
-    walk = ("bravo7", "--gait", gait, "--steps", "1", "--no-tries")
+    walk = ("bravo7", "--gait", gait, "--steps", "3", "--no-tries")
     ways = ("--method", "time-stepping", "--method", "paper-symplectic")
     result = report(*walk, *ways, "--out", str(out))
     assert result.exit_code == 1, result.stderr  # the paper's ordering rattles at 1 ms, and sinks
-    assert "paper-symplectic: bravo7 is falling when its time is up" in result.stdout
+    assert re.search(r"paper-symplectic: bravo7 (is falling|falls|fell)", result.stdout)
     assert [line.partition(":")[0] for line in result.stdout.splitlines()] == [
         "time-stepping", "paper-symplectic"
     ]  # fmt: skip

@@ -36,7 +36,7 @@ from heelstrike.sim.frame import frame
 from heelstrike.sim.time_stepping import TimeStepping
 
 keys = []
-def keep(names, described, made_of, write):
+def keep(names, described, made_of, write, *, vectors=False):
     keys.append(machine_code._key(described, made_of).hex())
     return [0] * len(names)
 straight_line.addresses = keep
@@ -48,8 +48,8 @@ print(json.dumps({
     "loop": made_of(frame(TimeStepping.kernels)),
     "solvers": made_of(try_solvers._function),
     "kinematics": made_of(kernels.forward_kinematics.py_func),
-    "programs": keys[0],
-    "elimination": keys[1],
+    "programs": keys[:-1],
+    "elimination": keys[-1],
 }))
 """
 

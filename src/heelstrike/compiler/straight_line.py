@@ -11,7 +11,7 @@ The function computes what the kernel computes, to rounding.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 from llvmlite import ir
@@ -47,14 +47,19 @@ def straight_line_code(
     """
     known = dict(known or {})
 
+    @cache
+    def recordings() -> list[Recording]:
+        made, seen = [], dict(known)
+        for program in programs:
+            made.append(Recording(program, seen))
+            seen |= made[-1].left()
+        return made
+
     def write(vectors: bool) -> ir.Module:
         module = ir.Module("straight_line")
-        seen = dict(known)
-        for program in programs:
-            recording = Recording(program, seen)
-            if program.side_by_side == vectors:
+        for recording in recordings():
+            if recording.program.side_by_side == vectors:
                 add_function(module, recording)
-            seen |= recording.left()
         return module
 
     described = [repr([(name, array.tolist()) for name, array in known.items()]).encode()]
