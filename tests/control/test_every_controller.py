@@ -72,7 +72,10 @@ LAWS: dict[str, Callable[[], tuple[hs.Robot, hs.State, Law]]] = {
     "ZeroMomentPointRegulation": lambda: on_flat_feet(hs.ZeroMomentPointRegulation),
 }
 
-OWN = {"FlatGaitLQR", "FootstepFeedback on a motion", "MotionLQR", "ZeroMomentPointRegulation"}
+OWN = {
+    "FlatGaitLQR", "FootstepFeedback on a motion", "GaitLQR", "MotionLQR", "SteppingConstraints",
+    "WholeBody on a motion", "ZeroMomentPointRegulation",
+}  # fmt: skip
 """Laws that take long to compile, and have quick tests of their own."""
 
 every = pytest.mark.parametrize(
