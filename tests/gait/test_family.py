@@ -57,6 +57,16 @@ def test_a_gait_between_lands_as_it_says(bravo7: hs.Robot, family: hs.GaitFamily
     np.testing.assert_allclose(landed[:2], 0.70, atol=1e-6)
 
 
+def test_both_feet_stand_at_first_also_where_a_limit_is_broken(bravo7: hs.Robot) -> None:
+    """Steeply downhill: what is between the gaits breaks a limit, and is a step nevertheless."""
+    slopes = np.deg2rad([-8.0, -6.2])
+    family = hs.gait_family(bravo7, speed=[0.30, 0.333], slope=slopes, **ASKED)
+    between = family.at(speed=0.3165, slope=float(slopes.mean()))
+    ground = hs.Ground(friction=0.75, slope=between.slope)
+    gap = hs.Simulation(bravo7, state=between.initial_state, ground=ground).contacts.gap
+    assert np.abs(gap).max() <= 1e-12
+
+
 def test_what_was_interrupted_goes_on(bravo7: hs.Robot, tmp_path: Path) -> None:
     file = tmp_path / "family.json"
     told: list[float] = []

@@ -54,7 +54,8 @@ def between(request: Request, corners: Sequence[tuple[Gait, float]]) -> Gait:
     profile = ClearanceProfile.SMOOTH if len(profiles) > 1 else profiles.pop()
     program = Program(request, transcribed(request), profile, *first_instants(request))
     mean = np.sum([weight * program.resampled(gait) for gait, weight in corners], axis=0)
-    return designed_gait(program, program.polished(program.in_bounds(mean)), optimal=False)
+    unknowns = program.polished(program.in_bounds(mean), within_limits=False)
+    return designed_gait(program, unknowns, optimal=False)
 
 
 def _best_of_starts(program: Program, report: Callable[[float], None]) -> Solution:

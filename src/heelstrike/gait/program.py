@@ -489,10 +489,11 @@ class Program:
         missing = np.maximum(self._lower - values, 0.0) - np.maximum(values - self._upper, 0.0)
         return missing[self._gaps :]
 
-    def polished(self, unknowns: Floats) -> Floats:
+    def polished(self, unknowns: Floats, *, within_limits: bool = True) -> Floats:
         """Satisfy the equations to rounding, by the least change of the unknowns.
 
-        What is given is returned if that would break a limit by more than it breaks anything.
+        Within limits, what is given is returned if that would break one by more than it breaks
+        anything.
         """
         step = np.ptp([self.request.duration_bounds, self.request.length_bounds], axis=1) > 0.0
         free = np.append(np.full(self.size - 2, True), step)
@@ -502,7 +503,9 @@ class Program:
             unknowns, lambda x: np.array(value(x)[1]).ravel(), slopes,
             (self._lower[:count], self._upper[:count]), free,
         )  # fmt: skip
-        return found if is_no_worse(self._missing(found), self._missing(unknowns)) else unknowns
+        if within_limits and not is_no_worse(self._missing(found), self._missing(unknowns)):
+            return unknowns
+        return found
 
     def _missing(self, unknowns: Floats) -> float:
         """Largest violation of a constraint, or of a bound of the step."""
