@@ -17,6 +17,8 @@ from heelstrike.control.stepping_constraints import Memory, follow, shift_at_end
 from heelstrike.gait.phased.surface import Surface
 from heelstrike.sim import Contacts
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 Floats = NDArray[np.float64]
 
 

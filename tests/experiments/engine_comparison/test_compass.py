@@ -35,6 +35,8 @@ from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.robot import State
 from heelstrike.sim import EventDriven, TimeStepping
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 PERIOD, STEP = 0.734346391, 0.535445415
 PAIR, REAL = complex(-0.199726, 0.544476), 0.131573
 

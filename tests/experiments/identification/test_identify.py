@@ -28,6 +28,8 @@ from heelstrike.experiments.identification.sliding import at_least, ground_frict
 from heelstrike.experiments.identification.standing import pieces_of
 from heelstrike.gait.recordings.robot_log import RobotLog, load_robot_log
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 GRAVITY = 9.81
 NOISE = {"encoder_noise": 1e-4, "torque_noise": 0.2, "force_noise": 2.0}
 EXACT = {"encoder_noise": 1e-8, "torque_noise": 1e-5, "force_noise": 1e-4, "knots": 0.02}

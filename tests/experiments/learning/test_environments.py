@@ -25,7 +25,10 @@ from heelstrike.experiments.learning import environments  # noqa: E402
 from heelstrike.experiments.learning.environments import TaskEnv, TaskVectorEnv  # noqa: E402
 
 TASKS = ("Walker2d", "Hopper", "HalfCheetah")
-pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+pytestmark = [
+    pytest.mark.slow,  # left to `make test` by continuous integration
+    pytest.mark.filterwarnings("ignore::UserWarning"),
+]
 
 
 def vector(task: str = "Walker2d", lanes: int = 3, **options: Any) -> Any:
