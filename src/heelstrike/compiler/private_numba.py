@@ -285,7 +285,9 @@ def _finished(codegen: Any, parts: tuple[Any, ...], fixed: Fixed) -> tuple[Any, 
     about.mangled_name = f"{about.mangled_name}_{own}"
     library = codegen.create_library(f"{name}_{own}")
     library._final_module = module
-    with _replaced(config, "SLP_VECTORIZE", 1):  # the same with several numbers at once
+    # Numbers that stand side by side are computed together. Numba leaves that out by default, since
+    # LLVM had made wrong code of some loops (numba issue 8705); what these compute is tested.
+    with _replaced(config, "SLP_VECTORIZE", 1):
         library._optimize_final_module()
     library._final_module.verify()
     code = codegen._tm.emit_object(library._final_module), _names_alone(names)
