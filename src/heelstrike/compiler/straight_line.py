@@ -22,7 +22,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.fingerprint import fingerprint
 from heelstrike.compiler.machine_code import addresses
 from heelstrike.compiler.recordings.recording import CONSTANT, Program, Recording
-from heelstrike.compiler.recordings.tape import Entry, Operation, Result, Symbols, Value
+from heelstrike.compiler.recordings.tape import Entry, Operation, Result, Symbols, Value, needed
 from heelstrike.compiler.recordings.trigonometry import sine_and_cosine
 
 _DOUBLE = ir.DoubleType()
@@ -128,19 +128,11 @@ class _Writer:
 
     def _needed(self) -> list[Result]:
         """Results on which something hangs that is written, in order."""
-        waiting = [value for *_, value in self.recording.written() if isinstance(value, Value)]
-        found = set(waiting)
-        while waiting:
-            value = waiting.pop()
-            operands = value.operands if isinstance(value, Result) else ()
-            new = {each for each in operands if isinstance(each, Value)} - found
-            found |= new
-            waiting += new
+        found = needed(value for *_, value in self.recording.written())
         entries = [value for value in found if isinstance(value, Entry)]
         self._read_arrays = {entry.array for entry in entries}
         self._unread = {entry for entry in entries if "." not in entry.array}
-        kept = (value for value in self.recording.tape.values if value in found)
-        return [value for value in kept if isinstance(value, Result)]
+        return [value for value in found if isinstance(value, Result)]
 
     def _stores(self) -> tuple[dict[Value, list[tuple[str, int]]], list[tuple[str, int, Any]]]:
         """What is stored as soon as it is there, and what when all has been read.

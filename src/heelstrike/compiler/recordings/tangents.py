@@ -19,6 +19,7 @@ from heelstrike.compiler.recordings.tape import (
     Symbols,
     Value,
     cosine,
+    needed,
     sine,
 )
 
@@ -52,26 +53,13 @@ def tangents(values: Symbols, by: Sequence[Any]) -> Symbols:
     """
     seeds = {entry: {k: 1.0} for k, entry in enumerate(by) if isinstance(entry, Entry)}
     known: dict[Value, dict[int, Any]] = {}
-    for value in _needed(values):
+    for value in needed(values):
         known[value] = seeds.get(value, {}) if isinstance(value, Entry) else _carried(value, known)
     found = np.zeros((len(values), len(by)), dtype=object)
     for row, value in enumerate(values):
         for column, slope in known.get(value, {}).items() if isinstance(value, Value) else ():
             found[row, column] = slope
     return found
-
-
-def _needed(values: Symbols) -> list[Any]:
-    """Values on which some hang, and themselves, operands before their results."""
-    waiting = [value for value in values if isinstance(value, Value)]
-    found = set(waiting)
-    while waiting:
-        value = waiting.pop()
-        operands = value.operands if isinstance(value, Result) else ()
-        new = {each for each in operands if isinstance(each, Value)} - found
-        found |= new
-        waiting += new
-    return sorted(found, key=lambda value: value.place)
 
 
 def _carried(result: Result, known: dict[Value, dict[int, Any]]) -> dict[int, Any]:

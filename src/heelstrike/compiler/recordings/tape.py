@@ -7,6 +7,7 @@ ones are folded away as it goes, and an operation that was done before is not do
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -114,6 +115,19 @@ class Tape:
             self._known[key] = kind(self, len(self.values), *content)
             self.values.append(self._known[key])
         return self._known[key]
+
+
+def needed(values: Iterable[Any]) -> list[Any]:
+    """Values on which some hang, and themselves, operands before their results."""
+    waiting = [value for value in values if isinstance(value, Value)]
+    found = set(waiting)
+    while waiting:
+        value = waiting.pop()
+        operands = value.operands if isinstance(value, Result) else ()
+        new = {each for each in operands if isinstance(each, Value)} - found
+        found |= new
+        waiting += new
+    return sorted(found, key=lambda value: value.place)
 
 
 def sine(value: Any) -> Any:
