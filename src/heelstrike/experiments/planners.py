@@ -142,7 +142,7 @@ def compare_planners(
     GaitError
         If the robot cannot be planned for, or an argument makes no sense.
     """
-    given = [] if isinstance(speeds, str | int) else list(speeds)  # one text or index is not meant
+    given = [] if is_number(speeds) else list(speeds)
     if not given or not all(is_number(x) and np.isfinite(x) and x > 0.0 for x in given):
         raise GaitError(f"speeds must be positive numbers (m/s), got {given or speeds!r}")
     several = [float(speed) for speed in given]

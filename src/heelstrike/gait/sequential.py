@@ -62,7 +62,7 @@ def optimum_near(
         slope, value, slopes = first(unknowns)
         if not all(np.isfinite(each).all() for each in (slope, value, slopes)):
             return None
-        missed = np.maximum(lower - value, value - upper).max()
+        missed = np.maximum(lower - value, value - upper).max(initial=0.0)
         apart = np.where(priced > 0.0, upper - value, value - lower)[priced != 0.0]
         rest = np.abs(slope + slopes.T @ priced).max() / max(1.0, np.abs(slope).max())
         if strict and max(missed, apart.max(initial=0.0)) <= SATISFIED and rest <= STATIONARY:
