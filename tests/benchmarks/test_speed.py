@@ -103,6 +103,7 @@ def test_a_missing_engine_is_named_and_left_out(
     assert all("mujoco_us" not in row for row in found["scaling"]["joints"])
 
 
+@pytest.mark.slow
 def test_ctrl_c_keeps_the_parts_that_are_finished(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -169,6 +169,7 @@ def _inspect(*arguments: str, encoding: str) -> subprocess.CompletedProcess[byte
     )
 
 
+@pytest.mark.slow
 def test_a_pipe_gets_plain_text() -> None:
     """No colours, no warnings; without letters for it, no drawing but the rest."""
     done = _inspect("bravo7", encoding="utf-8")

@@ -13,6 +13,8 @@ from typer.testing import CliRunner
 import heelstrike as hs
 from heelstrike.cli.main import app
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 pytest.importorskip("gymnasium", minversion="1.1")
 
 SHORT = ("hopper", "--lanes", "8", "--decisions", "2000")

@@ -348,6 +348,7 @@ def test_a_push_and_a_slope_reach_the_walk(walk: Callable[..., Any], tmp_path: P
     assert abs(run.gap[0, run.robot.feet[0].contacts[0]]) < 1e-12
 
 
+@pytest.mark.slow
 def test_the_law_that_keeps_its_balance_is_named_and_does(
     walk: Callable[..., Any], tmp_path: Path
 ) -> None:

@@ -56,6 +56,7 @@ def probe(home: Path) -> float:
     return float(answer.stdout)
 
 
+@pytest.mark.slow
 def test_a_change_in_another_file_is_not_missed(tmp_path: Path) -> None:
     """`bias_force` calls a kernel that reads `model.py`'s neighbour: change the callee's file."""
     shutil.copytree(SOURCE, tmp_path / "heelstrike")
@@ -343,6 +344,7 @@ print(call(doubled.address, 21, written), written[0], helped, hits)
 """
 
 
+@pytest.mark.slow
 @BOTH_WAYS
 def test_a_separate_kernel_is_compiled_by_another_process_once(
     tmp_path: Path, documented: str

@@ -160,6 +160,7 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, st
     return home, fingerprints(home)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", EDITS)
 def test_an_edit_changes_what_it_must(copied: tuple[Path, dict[str, str]], case: str) -> None:
     home, before = copied

@@ -168,6 +168,7 @@ def is_whole(file: Path) -> bool:
     return hashlib.sha256(content[kept_code.DIGEST :]).digest() == content[: kept_code.DIGEST]
 
 
+@pytest.mark.slow
 @BY_PRIVATE_NAMES
 def test_damaged_machine_code_is_made_anew(program: Path, tmp_path: Path) -> None:
     """Unpickled or run, each of these takes the process along or fails until it is deleted."""
@@ -195,6 +196,7 @@ def test_without_a_place_to_write_it_runs_and_says_so_once(program: Path, tmp_pa
     assert "NUMBA_CACHE_DIR" in said
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs limits of POSIX")
 def test_a_full_disk_costs_a_warning(program: Path, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
@@ -204,6 +206,7 @@ def test_a_full_disk_costs_a_warning(program: Path, tmp_path: Path) -> None:
     assert kept(cache) == []
 
 
+@pytest.mark.slow
 @BY_PRIVATE_NAMES
 def test_processes_that_write_the_same_files_leave_whole_ones(
     program: Path, tmp_path: Path

@@ -111,6 +111,7 @@ def test_a_push_that_the_model_does_not_know_is_followed() -> None:
     assert error[200] < 0.2 * error[40]
 
 
+@pytest.mark.slow
 def test_without_noise_the_estimate_is_the_state() -> None:
     robot, gait = walking.bravo7(), walking.gait()
     controller = hs.Estimated(hs.ComputedTorque(robot, gait))

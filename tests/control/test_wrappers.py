@@ -276,6 +276,7 @@ def test_a_snapshot_keeps_all_of_it(inside: Any) -> None:
         assert later.controller.inside.function.partner.calls == 10  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 def test_a_shell_is_copied_by_pickle() -> None:
     wrapper = wrapped(hs.ComputedTorque(walking.bravo7(), walking.gait()))
     again = pickle.loads(pickle.dumps(wrapper))

@@ -13,6 +13,7 @@ import heelstrike as hs
 from heelstrike.cli.main import app
 
 
+@pytest.mark.slow
 def test_the_optimum_costs_least(bravo7: hs.Robot) -> None:
     found = hs.compare_planners(bravo7, speeds=[0.43], steps=3)
     preview, capture, optimum = found.walks

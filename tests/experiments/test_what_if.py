@@ -42,6 +42,7 @@ def test_what_to_change_works_when_it_is_done(name: str) -> None:
     assert tried.change == asked[0]
 
 
+@pytest.mark.slow
 def test_knees_that_a_gait_keeps_bent_stay_so() -> None:
     """On point feet a gait is designed with bent knees, and designed again with them."""
     robot = hs.load_robot("rabbit")

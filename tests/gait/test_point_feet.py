@@ -269,6 +269,7 @@ def test_what_makes_no_sense_on_points(rabbit: hs.Robot, rabbit_gait: hs.Gait) -
         _ = rabbit_gait.coefficients
 
 
+@pytest.mark.slow
 def test_an_impossible_gait_is_told(rabbit: hs.Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(SETTINGS, "max_iter", 30)  # more would only take longer
     with pytest.raises(InfeasibleGaitError, match=r"friction = 0 was found.* friction cone of the"):
@@ -327,6 +328,7 @@ def test_a_robot_s_own_speed_limits_hold(rabbit: hs.Robot, rabbit_gait: hs.Gait)
     assert gait.cost > rabbit_gait.cost
 
 
+@pytest.mark.slow
 def test_a_gait_keeps_to_the_lines_of_the_motors(rabbit: hs.Robot, rabbit_gait: hs.Gait) -> None:
     """Motors too slow for the gait that knows nothing of them: -τ₀ ≤ τ + τ₀/ω₀ ω ≤ τ₀."""
     lines = {"stall_torque": np.full(7, 12.0), "no_load_speed": np.full(7, 3.0)}

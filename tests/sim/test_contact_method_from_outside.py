@@ -17,6 +17,8 @@ from scenes.running import FAMILIES
 import heelstrike as hs
 from heelstrike.sim import Scheme
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 MOST_LINES = 120
 """What such a method may take."""
 

@@ -57,7 +57,16 @@ def test_every_figure_is_a_picture_with_units(what: str, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("what", FIGURES)
-@pytest.mark.parametrize("kind", ["fall", "one row", "slope, without gait"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "fall",
+        *(
+            pytest.param(kind, marks=pytest.mark.slow)
+            for kind in ("one row", "slope, without gait")
+        ),
+    ],
+)
 def test_unusual_runs_are_drawn_too(what: str, kind: str) -> None:
     figure = plot(unusual(kind), what)
     if kind == "fall":

@@ -19,6 +19,8 @@ from heelstrike.view.page.verdict import happened
 from heelstrike.view.spatial.page import page_in_space
 from heelstrike.view.spatial.verdict import judge_in_space
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> hs.SpatialRobot:

@@ -114,6 +114,7 @@ def test_virtual_constraints_have_the_multiplier_of_their_zero_dynamics() -> Non
     assert step.multipliers[0] == pytest.approx(zero.contraction, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_a_foot_that_slips_in_the_impact_and_comes_to_rest() -> None:
     """On little friction the new foot slides on for a while: an event of its own.
 

@@ -39,6 +39,7 @@ def asked(law: hs.Controller, state: hs.State) -> np.ndarray:
     return np.asarray(law.torque(0.2 * motion().duration, state, contacts))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_without_limits_it_is_motion_tracking(seed: int) -> None:
     """One solves a quadratic programme, the other equations, for the same accelerations."""

@@ -79,6 +79,7 @@ def test_it_recovers_from_pushes_that_computed_torque_does_not() -> None:
     assert not run(16.0, hs.ComputedTorque(rabbit(), running())).completed
 
 
+@pytest.mark.slow
 def test_both_legs_are_treated_alike() -> None:
     """Torques in the mirror image of a state are the mirror image of the torques."""
     motion, mirror = running(), rabbit().mirror

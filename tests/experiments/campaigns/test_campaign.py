@@ -290,6 +290,7 @@ def test_nothing_is_lost_and_nothing_runs_twice(
     assert len(seen) == 70
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="kill -9 is of POSIX")
 def test_killed_at_any_moment_it_goes_on(tmp_path: Path) -> None:
     program = (

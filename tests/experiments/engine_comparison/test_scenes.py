@@ -36,6 +36,7 @@ def test_the_scenes_are_not_all_at_rest() -> None:
     assert math.isclose(moving[1], 6.0**2 / (2.0 * 0.75 * 9.81))
 
 
+@pytest.mark.slow
 def test_the_table_says_how_far_off_and_who_does_not_bounce(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

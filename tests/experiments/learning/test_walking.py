@@ -16,6 +16,8 @@ from heelstrike.experiments.learning.ranges import Ranges
 from heelstrike.experiments.learning.walk_task import WalkTask
 from heelstrike.experiments.learning.walking import TERMS, WalkingCourse
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 WALK = WalkTask(speeds=(0.43, 0.43), gaits=1)
 STANDS = WalkTask(reference="posture", frame_skip=4)
 

@@ -21,6 +21,8 @@ from heelstrike.gait.recordings.forces import RecordedForces
 from heelstrike.gait.recordings.markers import RecordedMarkers, load_markers
 from heelstrike.gait.recordings.motion import RecordedMotion
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 THIGH, SHANK, ANKLE, TRUNK = 0.41, 0.43, 0.07, 0.48
 HEEL, TOE = np.array([-0.05, -0.04]), np.array([0.13, -0.05])
 PERIOD, SPEED, RATE = 1.1, 1.25, 100.0

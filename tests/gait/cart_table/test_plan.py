@@ -45,6 +45,7 @@ def test_the_zero_moment_point_stays_in_the_middle_of_the_sole(
         hs.plan_motion(bravo7, **STEP, corrections=0)
 
 
+@pytest.mark.slow
 def test_the_trunk_is_upright_and_the_centre_of_mass_level(
     bravo7: hs.Robot, planned: hs.Motion
 ) -> None:
@@ -66,6 +67,7 @@ def test_both_planners_at_a_given_height(bravo7: hs.Robot) -> None:
     assert low[0].cost > hs.plan_motion(bravo7, **STEP).cost  # knees are bent more
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "words"),
     [

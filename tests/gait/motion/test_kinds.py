@@ -107,6 +107,7 @@ def test_the_design_knows_how_it_closes(name: str) -> None:
         assert motion.closes_to == pytest.approx(missed, abs=0.03 * CLOSED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heavier", [1e-4, 1e-2])
 @pytest.mark.parametrize("name", ["rolling", "limp"])
 def test_motions_of_another_robot_do_not_close(name: str, heavier: float) -> None:
@@ -120,6 +121,7 @@ def test_motions_of_another_robot_do_not_close(name: str, heavier: float) -> Non
     assert missed == pytest.approx(gap(mechanics_of(other, motion.slope), motion), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_design_that_may_not_be_halved_tells_what_it_misses(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -146,6 +148,7 @@ def test_closing_is_of_ends_only() -> None:
     assert lacking(mechanics, bent) > 0.1 * robot.weight
 
 
+@pytest.mark.slow
 def test_soles_stay_above_the_obstacle() -> None:
     """All along them and at all times, to a tenth of a millimetre."""
     robot, motion, _ = loaded("stepping over")
@@ -168,6 +171,7 @@ def over(hurdle: OwnConstraint, robot: hs.Robot, places: np.ndarray) -> float:
     return float(np.array(casadi.DM(hurdle(now))).min())
 
 
+@pytest.mark.slow
 def test_a_sole_is_seen_wherever_it_is(bravo7: hs.Robot) -> None:
     """No place of it over the box is lower than it says: soles that tilt, stand upright or lie."""
     hurdle, rng = hs.over_obstacle(bravo7, **HURDLE), np.random.default_rng(5)
@@ -190,6 +194,7 @@ def test_a_sole_is_seen_wherever_it_is(bravo7: hs.Robot) -> None:
     assert seen > 50
 
 
+@pytest.mark.slow
 def test_a_foot_away_from_the_obstacle_is_free(bravo7: hs.Robot) -> None:
     hurdle = hs.over_obstacle(bravo7, **HURDLE)
     ahead = np.array([[0.25, 0.0], [0.45, 0.0]])

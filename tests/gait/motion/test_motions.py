@@ -12,6 +12,8 @@ from heelstrike import dynamics
 from heelstrike.gait import MotionPhase
 from heelstrike.gait.polynomials import gauss
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 STEEP = 0.08
 GENTLE = 0.1
 """Impulse (N s) of a foot that is set down at rest: rounding decides when."""

@@ -496,6 +496,7 @@ def little_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(READER, "ask", partial(ask, memory=2**28))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is bounded on Linux only")
 @pytest.mark.usefixtures("little_memory")
 @pytest.mark.parametrize("case", HEAVY)

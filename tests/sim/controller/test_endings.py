@@ -103,6 +103,7 @@ def test_what_is_tried_within_a_step_ends_nothing(method: Method) -> None:
     assert 0.0055 <= stopped.time[-1] <= 0.0075
 
 
+@pytest.mark.slow
 def test_shells_hand_it_on() -> None:
     for controller in (law(period=1e-3), Watching()):
         run = run_of(hs.Actuated(hs.Sensed(controller)))

@@ -36,7 +36,9 @@ def test_a_robot_on_which_events_pile_up_arrives(seed: int) -> None:
     assert sum(event.impulse[0] for event in bridges(run)) <= 1e-3 * run.time[-1]
 
 
-@pytest.mark.parametrize("seed", [3, 9, 10, 21, 26, 44, 59])
+@pytest.mark.parametrize(
+    "seed", [3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (9, 10, 21, 26, 44, 59))]
+)
 def test_points_that_chatter_to_rest_need_no_bridge_and_no_leap(seed: int) -> None:
     """Several of them, within microseconds; every jump of the velocity is that of its impulses."""
     setting = Setting.of(random_scene(seed))

@@ -186,6 +186,7 @@ def unsealed(tmp_path: Path) -> Path:
     return run_file("compliant", tmp_path)
 
 
+@pytest.mark.slow
 def test_no_damage_goes_unseen(sealed: Path, tmp_path: Path) -> None:
     """What is read of a damaged file is what was saved, or nothing."""
     whole = load_run(sealed)
@@ -223,6 +224,7 @@ def test_a_seal_that_is_cut_short(sealed: Path, missing: int, tmp_path: Path) ->
         load_run(path)
 
 
+@pytest.mark.slow
 def test_damage_where_there_is_no_checksum(unsealed: Path, tmp_path: Path) -> None:
     content = unsealed.read_bytes()
     path = tmp_path / "damaged.nc"

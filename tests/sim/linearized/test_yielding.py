@@ -83,6 +83,7 @@ def test_friction_slows_what_slides_by_the_weight(friction: FrictionLaw) -> None
 FINEST: dict[str, Any] = {"rtol": 1e-11, "atol": 1e-13}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "friction",
     [BristleFriction(), pytest.param(RegularisedFriction(speed=1e-3), marks=pytest.mark.slow)],

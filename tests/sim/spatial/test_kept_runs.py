@@ -128,6 +128,7 @@ def test_what_the_controller_told_is_recorded(run: AnyRun) -> None:
     assert run.log["calls"].values.tolist() == [1 + 3 * i for i in range(len(run.time))]
 
 
+@pytest.mark.slow
 def test_a_table_has_a_column_a_number(run: AnyRun, tmp_path: Path) -> None:
     path = run.save(tmp_path / "run.csv")
     with path.open(encoding="utf-8", newline="") as file:
@@ -182,6 +183,7 @@ def test_a_run_is_not_attached_to_a_robot_of_the_plane(run: AnyRun, tmp_path: Pa
     assert hs.load_run(path, run.robot).robot is run.robot
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_from_its_end(robot: hs.SpatialRobot) -> None:
     law = spring(Gains(kp=np.array([8.0])))
     whole = hs.simulate(robot, law, duration=0.4, **begin(robot))
@@ -209,6 +211,7 @@ np.save(sys.argv[3], np.concatenate((simulation.state.q, simulation.state.v)))
 """
 
 
+@pytest.mark.slow
 def test_a_snapshot_goes_on_in_another_process(robot: hs.SpatialRobot, tmp_path: Path) -> None:
     """Ground, pushes and all that contact remembers come along."""
     whole = hs.simulate(robot, duration=0.6, record_every=3, **begin(robot))
@@ -313,6 +316,7 @@ def test_a_law_that_writes_beyond_its_torques_ends_the_run(robot: hs.SpatialRobo
     assert "wrote beyond its arrays, to torque[1]" in run.message
 
 
+@pytest.mark.slow
 def test_files_of_many_points_are_small(made: Maker, tmp_path: Path) -> None:
     """Where they are follows from the positions and is not written: found again, it is the same.
 

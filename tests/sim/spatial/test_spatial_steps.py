@@ -183,6 +183,7 @@ def test_a_ball_lands_on_a_box_and_rolls_off_its_edge(made: Maker) -> None:
     assert np.min(run.gap) >= -2e-5  # the way round the edge bends by (h v)² / r in a step
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("beyond", [2e-3, -2e-3])
 def test_a_ball_meets_the_edge_of_a_box_along_the_line_to_its_middle(
     made: Maker, beyond: float

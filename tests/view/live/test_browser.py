@@ -89,6 +89,7 @@ def test_sliders_and_choices_act(chromium: Any, viewer: Viewer) -> None:
         wait_until(lambda: not session.live.message.startswith("the robot fell"), "a new begin")
 
 
+@pytest.mark.slow
 def test_scrub_step_back_and_jump(chromium: Any, viewer: Viewer) -> None:
     with Page(chromium, viewer) as seen:
         wait_until(lambda: seen.time > 1.0, "a walk")
@@ -128,6 +129,7 @@ def test_scrub_step_back_and_jump(chromium: Any, viewer: Viewer) -> None:
         wait_until(lambda: seen.time == pytest.approx(now - 1e-3), "a step back by the keyboard")
 
 
+@pytest.mark.slow
 def test_curves_follow(chromium: Any, viewer: Viewer) -> None:
     with Page(chromium, viewer) as seen:
         wait_until(lambda: seen.time > 0.4, "a walk")
@@ -144,6 +146,7 @@ def test_curves_follow(chromium: Any, viewer: Viewer) -> None:
         wait_until(lambda: seen.time < before, "the time that was clicked at")
 
 
+@pytest.mark.slow
 def test_two_at_once_close_and_come_again(chromium: Any, viewer: Viewer) -> None:
     with Page(chromium, viewer) as one:
         with Page(chromium, viewer) as other:
@@ -166,6 +169,7 @@ def test_it_says_so_when_the_server_stops(chromium: Any, viewer: Viewer) -> None
         assert seen.page.locator("#play").is_disabled()
 
 
+@pytest.mark.slow
 def test_a_page_that_stays_open_forgets_the_oldest_frames(chromium: Any, viewer: Viewer) -> None:
     with Page(chromium, viewer) as seen:
         seen.halt()

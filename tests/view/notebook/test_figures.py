@@ -19,6 +19,8 @@ from heelstrike.view.comparison_figure import draw_comparison
 
 SETUP = """
 import heelstrike as hs
+
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
 robot = hs.load_robot("bravo7")
 run = hs.simulate(robot, state=robot.reference_state(), duration=0.01)
 run.plot("zmp")

@@ -113,6 +113,7 @@ def test_keys(chromium: Any, files: dict[str, Path]) -> None:
     opened.check()
 
 
+@pytest.mark.slow
 def test_a_page_in_a_frame_may_play_at_once(chromium: Any, files: dict[str, Path]) -> None:
     """Not for people who asked their system for stillness."""
     opened = Opened(chromium, files["walk"], "#autoplay").ready()
@@ -124,6 +125,7 @@ def test_a_page_in_a_frame_may_play_at_once(chromium: Any, files: dict[str, Path
     still.check()
 
 
+@pytest.mark.slow
 def test_a_page_in_a_frame_leaves_the_page_around_it_at_its_top(
     chromium: Any, files: dict[str, Path]
 ) -> None:
@@ -157,6 +159,7 @@ def test_mouse(chromium: Any, files: dict[str, Path]) -> None:
     opened.check()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["walk", "report"])
 def test_on_a_phone(chromium: Any, files: dict[str, Path], name: str) -> None:
     opened = Opened(chromium, files[name], **PHONE).ready()
@@ -180,6 +183,7 @@ def test_a_report_plays_its_film(chromium: Any, files: dict[str, Path]) -> None:
     opened.check()
 
 
+@pytest.mark.slow
 def test_a_report_of_a_fall_begins_where_it_went_wrong(chromium: Any, tmp_path: Path) -> None:
     """A click on what happened takes the film there."""
     run, gait = falls.run_of("pushed forwards"), walking.gait()

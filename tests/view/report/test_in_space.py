@@ -22,6 +22,8 @@ from heelstrike.view.report.account import account_of
 from heelstrike.view.report.differences import differences
 from heelstrike.view.report.space import InSpace
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 POST = """
 <mujoco model="post"><compiler angle="radian"/><worldbody><body name="foot" pos="0 0 0.02">
   <freejoint name="root"/><geom type="box" size="0.1 0.08 0.02" mass="2"/>
