@@ -177,7 +177,8 @@ def equations(name: str) -> Equations:
         return casadi.Function(of, inputs, [casadi.cse(output)])
 
     contacts = model.contact_position[list(robot.feet[0].contacts)]
-    (first, *_, last), radii = discs(0)
+    centers, radii = discs(0)
+    first, last = centers[0], centers[-1]
     above = casadi.SX()
     if len(radii) > 1:
         assert len({*radii, *discs(1)[1]}) == 1
