@@ -16,8 +16,8 @@ The requests are those of `benchmarks/gait_requests.py`, drawn so that each robo
 - **more**: by how much the gait costs more than the best that another program finds, from the gait
   and from as many of the usual starts as `--starts` says. All coordinates, velocities,
   accelerations, forces and torques at 51 instants are unknowns. On flat feet joints follow one
-  cubic each, as in the design; on points Hermite and Simpson's rule joins them. It holds limits at
-  its instants only.
+  cubic each, as in the design, whose ranges and heights of the foot in the air are looked at at 501
+  instants; on points Hermite and Simpson's rule joins them. Other limits hold at its instants only.
 
 Results are added to the file line by line, and what is in it already is not done again.
 """
@@ -49,8 +49,8 @@ SEGMENTS = 25
 FINE = 1000
 """Intervals of the check."""
 HEIGHTS = 500
-"""Intervals between which the other program looks at the height of a foot in the air: a fifth of a
-millimetre between its 51 instants was worth 16 % of the cost of one gait."""
+"""Intervals between which the other program looks at the joints and at the height of a foot in the
+air: a fifth of a millimetre between its 51 instants was worth 16 % of the cost of one gait."""
 MOST = 21
 """Requests that are judged."""
 AFTER = 0.05
@@ -399,6 +399,7 @@ class Other:
             joints = x.cubics @ casadi.DM(powers(self.heights, 0))
             posture = casadi.vertcat(casadi.MX.zeros(held, self.heights.size), joints)
             heights = of.above.map(self.heights.size)(posture)
+            positive += [joints - robot.model.lower[3:], robot.model.upper[3:] - joints]
         else:
             for motion, rate in ((x.q, x.v), (x.v, x.a)):
                 y, f = motion[free, :], rate[free, :]
