@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
 from heelstrike.blas_threads import one_blas_thread
+from heelstrike.errors import GaitNotFoundError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.cost_rate import undefined
 from heelstrike.gait.gait import Footing, Gait, Phase, actuated_joints, fingerprint
@@ -48,14 +50,22 @@ def designed(request: Request, profile: ClearanceProfile, report: Callable[[floa
     return designed_gait(program, unknowns, optimal)
 
 
+@one_blas_thread()
 def between(request: Request, corners: Sequence[tuple[Gait, float]]) -> Gait:
-    """Gait between others, whose motions count by weights: it satisfies all equations of a step."""
+    """Gait between others: the optimum near the mean of their motions, which count by weights.
+
+    If it is not reached, the mean is changed as little as makes it satisfy all equations of a step.
+    """
     profiles = {gait.clearance_profile for gait, _ in corners}
     profile = ClearanceProfile.SMOOTH if len(profiles) > 1 else profiles.pop()
     program = Program(request, transcribed(request), profile, *first_instants(request))
     mean = np.sum([weight * program.resampled(gait) for gait, weight in corners], axis=0)
-    unknowns = program.polished(program.in_bounds(mean), within_limits=False)
-    return designed_gait(program, unknowns, optimal=False)
+    mean = program.in_bounds(mean)
+    near = replace(program, near=True).solve(mean)
+    if near.converged:
+        with suppress(GaitNotFoundError):  # it breaks limits between the instants
+            return designed_gait(program, *held_between_nodes(program, near))
+    return designed_gait(program, program.polished(mean, within_limits=False), optimal=False)
 
 
 def _best_of_starts(program: Program, report: Callable[[float], None]) -> Solution:

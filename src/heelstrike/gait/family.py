@@ -17,7 +17,7 @@ import numpy as np
 from heelstrike.arguments import is_number, refusal, takes
 from heelstrike.errors import GaitError, InfeasibleGaitError, WriteError
 from heelstrike.field_texts import dataclass
-from heelstrike.gait.branches import Pair, Place, on_the_cheaper_branch, spending
+from heelstrike.gait.branches import Pair, Place, on_the_cheaper_branch
 from heelstrike.gait.cost import costs_of
 from heelstrike.gait.file import LARGEST_NUMBER, check_robot, entries_of, gait_of
 from heelstrike.gait.gait import Gait
@@ -74,12 +74,11 @@ class GaitFamily:
     def at(self, **values: float) -> Gait:
         """Gait between those of the grid.
 
-        The motion is interpolated, linearly between the gaits at the corners of the cell and by
-        polynomials of third degree through those around it, then changed as little as makes it
-        satisfy all equations of a step: the foot lands in its place, and the velocities after the
-        impact are those with which the step began. The linear one is returned, unless the other is
-        cheaper and breaks no limit more than it. Limits between the gaits are not enforced;
-        `gait.margins` tells how far they are.
+        The motions of the gaits at the corners of the cell are interpolated linearly. From there
+        the optimiser goes to the nearest optimum, which holds all limits. If it does not get there,
+        the interpolated motion is changed as little as makes it satisfy all equations of a step:
+        the foot lands in its place, and the velocities after the impact are those with which the
+        step began. Limits are not enforced then; `gait.margins` tells how far they are.
 
         Parameters
         ----------
@@ -89,31 +88,22 @@ class GaitFamily:
         Returns
         -------
         Gait
-            The gait; `gait.optimal` is False, unless it is one of the grid.
+            The gait; `gait.optimal` tells whether it is an optimum.
 
         Raises
         ------
         GaitError
             If a value is missing, of no axis or out of range, or the cell has a gap.
         """
-        corners = [(self._corner(place), weight) for place, weight in self._weights(values, 2)]
+        corners = [(self._corner(place), weight) for place, weight in self._weights(values)]
         if len(corners) == 1:
             return corners[0][0]
         from heelstrike.gait.design import between
 
-        request = request_of(self.robot, **self.asked, **values)
-        linear, around = between(request, corners), self._weights(values, 4)
-        if len(around) <= len(corners) or any(place not in self.gaits for place, _ in around):
-            return linear
-        try:
-            cubic = between(request, [(self.gaits[place], weight) for place, weight in around])
-        except GaitError:  # it swings too far for a gait
-            return linear
-        cheaper = spending(cubic) < spending(linear)
-        return cubic if cheaper and cubic.margins.breaks_no_more_than(linear.margins) else linear
+        return between(request_of(self.robot, **self.asked, **values), corners)
 
-    def _weights(self, values: Mapping[str, float], width: int) -> list[tuple[Place, float]]:
-        """Places about a point, so many along each axis, with Lagrange's weights but for zeros."""
+    def _weights(self, values: Mapping[str, float]) -> list[tuple[Place, float]]:
+        """Corners of the cell that a point is in, with their weights but for zeros."""
         if set(values) != set(self.axes):
             raise GaitError(
                 f"give a value of each axis, {', '.join(self.axes)}; "
@@ -128,19 +118,12 @@ class GaitFamily:
                 raise GaitError(
                     f"{name} = {value:g} is outside of the family, {axis[0]:g} to {axis[-1]:g}"
                 )
-            count = min(width, axis.size)
-            first = int(np.searchsorted(axis, value, side="right")) - width // 2
-            near = range(axis.size)[max(0, min(first, axis.size - count)) :][:count]
-            weights = [
-                (
-                    i,
-                    float(
-                        np.prod([(value - axis[j]) / (axis[i] - axis[j]) for j in near if j != i])
-                    ),
-                )
-                for i in near
-            ]
-            along.append([each for each in weights if each[1] != 0.0])
+            before = int(np.searchsorted(axis, value, side="right")) - 1
+            if axis[before] == value:
+                along.append([(before, 1.0)])
+                continue
+            share = float((value - axis[before]) / (axis[before + 1] - axis[before]))
+            along.append([(before, 1.0 - share), (before + 1, share)])
         return [
             (tuple(i for i, _ in place), float(np.prod([weight for _, weight in place])))
             for place in product(*along)

@@ -6,9 +6,6 @@ from dataclasses import field
 
 from heelstrike.field_texts import dataclass
 
-ALIKE = 1e-9
-"""Margins that differ by less than this, in their own unit, differ by rounding."""
-
 
 @dataclass(frozen=True)
 class Margins:
@@ -46,35 +43,3 @@ class Margins:
     """How far (m, rad) the landing foot is from its place flat on the ground."""
     impact_error: float
     """Residual of the equations of the impact, relative to the robot's weight (s m)."""
-
-    def breaks_no_more_than(self, other: Margins) -> bool:
-        """Whether each limit is kept, or broken by no more than another gait breaks it.
-
-        Parameters
-        ----------
-        other : Margins
-            Those of the other gait.
-
-        Returns
-        -------
-        bool
-            Whether it is so.
-        """
-        pairs = zip(self._left(), other._left(), strict=True)
-        return all(own >= min(of_other, 0.0) - ALIKE for own, of_other in pairs)
-
-    def _left(self) -> tuple[float, ...]:
-        """How much is left of each limit; negative where it is broken."""
-        return (
-            self.normal_force,
-            1.0 - self.friction_use,
-            self.zero_moment_point,
-            self.clearance,
-            self.joint_range,
-            self.torque,
-            self.impulse,
-            1.0 - self.impulse_friction_use,
-            self.impulse_center,
-            -self.landing_velocity,
-            self.lift_velocity,
-        )
