@@ -154,7 +154,7 @@ class SpatialRows:
                 np.einsum("tpn,tn->tp", row, v) for v in (chord, self.v[:-1], self.v[1:])
             )
             left = np.where(gap < 0.0, -gap / h - moved, 0.0)
-            pressed = (force > 0.0) & (gap <= touching)
+            pressed = (force > 0.0) & (gap <= touching) & ~bounces  # else it is the impact's force
             left = np.maximum(left, np.where(pressed, np.abs(gap / h + moved), 0.0))
             closed = bounces & (force > 0.0) & (np.minimum(gap, gap + h * moved) <= touching)
             left = np.maximum(left, np.where(closed, -e * before - after, 0.0))

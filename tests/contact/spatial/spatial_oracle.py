@@ -65,9 +65,10 @@ def natural_map(delassus: Floats, free: Floats, friction: Floats, impulse: Float
         counts = range(friction.size)
         largest = [max(delassus[3 * k + i, 3 * k + i] for i in range(3)) for k in counts]
         weights = [1 / Decimal(float(each)).sqrt() if each > 0 else Decimal(0) for each in largest]
-        beta = max(
-            abs(Decimal(float(free[3 * k + i]))) * weights[k] for k in counts for i in range(3)
-        )
+        counted = [Decimal(float(each)) for each in free]
+        for k in counts:  # what opens counts a hundredth
+            counted[3 * k] = max(-counted[3 * k], counted[3 * k] / 100)
+        beta = max(abs(counted[3 * k + i]) * weights[k] for k in counts for i in range(3))
         worst = Decimal(0)
         for k in counts:
             mu = Decimal(float(friction[k]))

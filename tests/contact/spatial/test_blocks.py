@@ -81,6 +81,12 @@ def made_problem(seed: int) -> BlockProblem:
     )  # fmt: skip
 
 
+def opens(problem: BlockProblem, block: int, row: int) -> bool:
+    """Whether a row is the normal one of what opens."""
+    one_sided = problem.set[block] in (CONE, HALF_LINE) and row == problem.first[block]
+    return bool(one_sided and problem.free[row] > 0.0)
+
+
 def judged(problem: BlockProblem, impulse: np.ndarray) -> float:
     """Natural map in extended precision, written a second time: by distances, block by block."""
     w = problem.delassus.astype(Long)
@@ -90,7 +96,9 @@ def judged(problem: BlockProblem, impulse: np.ndarray) -> float:
         part = slice(problem.first[block], problem.first[block + 1])
         weight.append(1 / np.sqrt(np.max(np.diag(w)[part])))
     beta = max(
-        abs(Long(problem.free[row])) * weight[block]
+        abs(Long(problem.free[row]))
+        * weight[block]
+        * (Long("1e-2") if opens(problem, block, row) else 1)
         for block in range(problem.count)
         for row in range(problem.first[block], problem.first[block + 1])
     )

@@ -106,12 +106,20 @@ def residuals(problem: BlockProblem, work: BlockWorkspace, x: np.ndarray) -> lis
 
 
 def test_the_units_are_those_of_the_documentation() -> None:
-    """β = max |b_i| s_c with s_c = 1/√max diag W_cc; impulses count in β s_c, and come back."""
+    """β = max |b_i| s_c with s_c = 1/√max diag W_cc; impulses count in β s_c, and come back.
+
+    A normal velocity that opens, here that of the second point, counts a hundredth.
+    """
     problem, work = posed(0)
+    problem.free[[0, 3, 5]] = -0.1, 30.0, -0.2
+    uncompiled(scale_blocks)(problem, work.settings, work.scaled)
     diagonal = np.diag(problem.delassus)
     s = np.array([1.0 / math.sqrt(max(diagonal[a:b])) for a, b in pairwise(FIRST)])
     rows = np.repeat(s, np.diff(FIRST))
-    beta = np.max(np.abs(problem.free) * rows)
+    counted = np.abs(problem.free) * rows
+    assert np.argmax(counted) == 3
+    counted[3] *= 1e-2
+    beta = np.max(counted)
     scaled = work.scaled
     assert scaled.unit == pytest.approx(beta)
     np.testing.assert_allclose(scaled.matrix, problem.delassus * np.outer(rows, rows), rtol=1e-14)
@@ -123,6 +131,31 @@ def test_the_units_are_those_of_the_documentation() -> None:
     answer = block_answer(BLOCKS, ROWS)
     uncompiled(give_impulses)(problem, scaled, work.iterate.x, answer)
     np.testing.assert_allclose(answer.impulse, impulse, rtol=1e-14)
+
+
+def test_what_is_far_from_the_ground_excuses_nothing() -> None:
+    """A point that opens at 50 m/s beside one that does not: friction of the other off by 1e-8.
+
+    The first needs no impulse and knows nothing of the second. What it adds to the size of the data
+    is half of theirs, so that it changes nothing; and nothing counts in units of zero where all
+    opens.
+    """
+    off = []
+    for far in (0.0, 5e1):
+        problem = block_problem(
+            2, 6, count=2, first=np.array([0, 3, 6]), set=np.array([CONE, CONE]),
+            friction=np.array([0.5, 0.5]), bound=np.zeros(2), delassus=np.eye(6),
+            free=np.array([-1.0, 1.0, 0.0, far, 0.0, 0.0]),
+        )  # fmt: skip
+        work, answer = block_workspace(2, 6, ready=False), block_answer(2, 6)
+        answer.impulse[:2] = 1.0, -0.5 - 1e-8
+        off.append(uncompiled(certify_blocks)(problem, work.settings, work.scaled, answer))
+        assert work.scaled.unit == 1.0
+    assert off[0] == pytest.approx(off[1], rel=1e-3)
+    assert 4e-9 < off[0] < 1e-8
+    problem.free[:2] = 1.0, 0.0
+    answer.impulse[:] = 0.0
+    assert uncompiled(certify_blocks)(problem, work.settings, work.scaled, answer) < 1e-11
 
 
 def test_data_below_the_floor_count_in_units_of_the_floor() -> None:

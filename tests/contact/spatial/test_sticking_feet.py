@@ -93,6 +93,18 @@ def test_what_is_off_by_more_is_looked_at() -> None:
     assert np.isclose(answer.velocity[:12:3].max(), 1e-9 * size, rtol=1e-3)
 
 
+@pytest.mark.parametrize(("left", "sticks"), [(0.8e-10, True), (1.25e-10, False)])
+def test_where_rounding_of_gaps_ends(left: float, sticks: bool) -> None:
+    """What is left of a corner, a quarter of what it is off by, is searched from 1e-10 on."""
+    status, iterations, answer, size = stand(4.0 * left)
+    assert status == SOLVED
+    assert (iterations == 1) is sticks
+    if sticks:
+        assert np.allclose(np.abs(answer.velocity[:12:3]) / size, left, rtol=0.1, atol=0.0)
+    else:
+        assert answer.residual < 1e-12
+
+
 @pytest.mark.parametrize("size", [1, 2, 3, 8, 33])
 def test_elimination_solves_as_numpy_does(size: int) -> None:
     """Zeros on the diagonal, so that rows must be exchanged."""

@@ -28,7 +28,8 @@ DRY = "frictionloss='0.1'"
 def posed(robot: hs.SpatialRobot, *, speed: float = 0.0, dry: int = STICK) -> SpatialMemory:
     """The contact problem of a biped on its soles without torques, which glides at a speed.
 
-    Its points are thought to stick, and dry friction to do what `dry` says, forwards. There is no
+    Its points are thought to stick, and dry friction to do what `dry` says, forwards or
+    backwards in turn: where all are alike rounding decides what slides meanwhile. There is no
     Delassus matrix yet, only what is no number.
     """
     memory = allocate_spatial_memory(robot)
@@ -40,7 +41,7 @@ def posed(robot: hs.SpatialRobot, *, speed: float = 0.0, dry: int = STICK) -> Sp
     )  # fmt: skip
     table.mode[table.kind == POINT] = STICK
     table.mode[table.kind == DRY_JOINT] = dry
-    table.impulse[table.kind == DRY_JOINT, 0] = 1.0
+    table.impulse[table.kind == DRY_JOINT, 0] = np.resize([1.0, -1.0, -1.0], 12)
     uncompiled(find_free_velocity)(
         robot.model, 0.0, STEP, memory.q, memory.v, memory.torque, memory.pushes, equations,
         memory.next_v,
@@ -102,7 +103,7 @@ def test_it_is_the_answer_of_the_solver(made: Maker, dry: int) -> None:
     they were thought to slide, or the other way round.
     """
     robot = biped(made, more=DRY)
-    memory, other = posed(robot, dry=dry), posed(robot, dry=dry)
+    memory, other = (posed(robot, dry=dry) for _ in range(2))
     problem, answer, expected = (
         memory.assembly.problem,
         memory.assembly.answer,
@@ -200,6 +201,30 @@ def test_what_slips_is_left_to_the_solvers(made: Maker) -> None:
     memory = posed(robot, speed=1.0)
     assert not goes_on(robot, memory)
     assert memory.solver.tally.solves == 0
+
+
+def test_what_rounding_of_gaps_leaves_is_taken(made: Maker) -> None:
+    """One corner's gap is off, so that a foot cannot hold it: 0.8e-10 are taken, 1.25e-10 not.
+
+    What is left grows with how far it is off; what is more is left to the solvers, or solved with
+    other modes.
+    """
+    robot = biped(made, more=DRY)
+
+    def off_by(share: float) -> tuple[bool, float]:
+        memory = posed(robot)
+        scaled = memory.solver.scaled
+        assert goes_on(robot, memory)
+        size = scaled.unit / scaled.scale[0]
+        memory = posed(robot)
+        memory.assembly.problem.free[0] += share * size
+        taken = goes_on(robot, memory)
+        return taken, memory.assembly.answer.residual
+
+    left = off_by(1e-10)[1] / 1e-10
+    for residual, as_it_is in ((0.8e-10, True), (1.25e-10, False)):
+        taken, found = off_by(residual / left)
+        assert (taken and found == pytest.approx(residual, rel=0.05)) is as_it_is
 
 
 def test_few_rows_are_left_to_the_solvers(made: Maker) -> None:

@@ -54,10 +54,6 @@ friction of what they hold, contradict each other by the rounding of their gaps:
 a step of 1e-3 s and the 1e-2 m/s that gravity gives in it, 1e-11, and a few of them add up. To look
 for what is better is in vain."""
 
-NEARLY, NEAR = 1e-13, 1e-8
-"""Residual that one more refinement is expected to leave where it is the last, and what there may
-be before it: what is held by dry friction alone comes nearer more slowly than all of it did."""
-
 PROJECTIONS, CORRECTIONS = 100, 2
 """How often impulses that hold are brought into their cones, and held again each time."""
 

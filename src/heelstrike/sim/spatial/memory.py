@@ -126,9 +126,9 @@ class SpatialHolding(Bundle):
 
     tree: TreeFactor = part(TreeFactor)
     """Their matrix and its factor."""
-    steady: Floats = array("nv")
+    part: Floats = array("nv")
     along: Floats = array("nv")
-    """steady, along: Impulses along the velocities: of dry friction that slides, and of all."""
+    """part, along: Impulses along the velocities, and what is added up to them."""
     change: Floats = array("nv")
     """Change of the velocities that impulses make."""
     weighted: Floats = array("capacity")

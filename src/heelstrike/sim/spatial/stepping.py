@@ -165,12 +165,11 @@ def call_what_is_missed(
 ) -> bool:  # fmt: skip
     """Call what the velocity that was found takes through the ground or a stop; return if any."""
     called = False
+    place = 0  # candidates are in the order of the table
     for entry in range(table.kind.shape[0]):
-        if table.kind[entry] == DRY_JOINT:
-            continue
-        taking_part = table.called[entry] == 1
-        for place in range(count):
-            taking_part = taking_part or candidate[place] == entry
+        listed = place < count and candidate[place] == entry
+        place += listed
+        taking_part = listed or table.called[entry] == 1 or table.kind[entry] == DRY_JOINT
         if taking_part or is_far(step, entry, table):
             continue
         speed = entry_speed(model, tree, entry, table, feet, q, v)
