@@ -21,6 +21,7 @@ from dataclasses import field
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.straight_line import play
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
 from heelstrike.contact.sets import INTERVAL, LINE, is_empty, room, row_of
@@ -112,14 +113,16 @@ def certify(
     count = problem.count
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
     root, slope = scaling.root, scaling.slope
-    weigh(problem, settings, impulse, scaling)
+    at_once = weigh_at_once(problem, settings, impulse, scaling, velocity)
+    if not at_once:
+        weigh(problem, settings, impulse, scaling)
     unit = scaling.unit
     rounding = (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + scaling.effort)
     sharply = rounding > VISIBLE
-    if not sharply:
-        sum_velocities(problem, impulse, velocity)
-    else:
+    if sharply:
         rounding = sum_velocities_sharply(problem, impulse, scaling, velocity)
+    elif not at_once:
+        sum_velocities(problem, impulse, velocity)
     scaling.rounding = rounding
     answer.rest = REST_TOLERANCE * unit * (1.0 + scaling.effort)
     inverse = 1.0 / unit if unit > 0.0 else 0.0
@@ -208,10 +211,39 @@ def weigh(problem: ContactProblem, settings: Settings, impulse: Floats, scaling:
         if weight > 0.0 and abs(free[i]) > unit * size:  # a few are divided, not all
             unit = abs(free[i]) / size
         effort += size * abs(impulse[i])
+    note_size(unit, effort, scaling)
+
+
+@kernel
+def note_size(unit: float, effort: float, scaling: Scaling) -> None:
+    """Keep the size of the data, and the effort in units of it."""
     if effort > 0.0:
         effort = effort / unit if unit > 0.0 else math.inf
     scaling.effort = effort
     scaling.unit = unit
+
+
+@kernel
+def weigh_at_once(
+    problem: ContactProblem, settings: Settings, impulse: Floats, scaling: Scaling, velocity: Floats
+) -> bool:
+    """Do what :func:`weigh` and :func:`sum_velocities` do by a program; return whether there is one.
+
+    There is none for rows that nothing moves, and none for many.
+    """
+    rows, delassus, size = row_of(problem.count, problem.first), problem.delassus, scaling.size
+    if rows == 0 or rows >= scaling.programs.shape[0] or settings.skewed != 0:
+        return False
+    program, free, root = scaling.programs[rows], problem.free, scaling.root
+    if delassus.shape[1] == rows:
+        play(program, (delassus, free, impulse, root, velocity, size))
+    else:
+        for i in range(rows):
+            for j in range(rows):
+                scaling.matrix[i * rows + j] = delassus[i, j]
+        play(program, (scaling.matrix, free, impulse, root, velocity, size))
+    note_size(max(settings.floor, size[0]), size[1], scaling)
+    return bool(size[2] > 0.0)
 
 
 @kernel

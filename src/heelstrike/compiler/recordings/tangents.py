@@ -31,6 +31,7 @@ _PARTIAL: dict[Operation, Callable[..., tuple[Any, ...]]] = {
     Operation.NEGATE: lambda _, __: (-1.0,),
     Operation.SINE: lambda _, angle: (cosine(angle),),
     Operation.COSINE: lambda _, angle: (-sine(angle),),
+    Operation.ROOT: lambda root, _: (0.5 / root,),
     Operation.INVERT_ABOVE: lambda inverse, *_: (-inverse * inverse, 0.0),
 }
 """Derivatives of a result by its operands, of the result and of these."""
