@@ -123,6 +123,8 @@ class StickingRows(Bundle):
     """Equation of each row of the problem, -1 for none."""
     sharers: Floats = array("2 capacity")
     """How many rows share each equation."""
+    edge: Floats = array("2 capacity")
+    """Tangential over normal impulse where the contact of an equation slips, else zero."""
     pulled: Integers = array("capacity", of=int)
     """Whether each contact would have pulled in an attempt before."""
     x: Floats = array("2 capacity")
