@@ -20,7 +20,7 @@ from dataclasses import field
 
 import numpy as np
 
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
@@ -177,7 +177,7 @@ def certify(
     return max(complementarity, max(cone, non_penetration)) + rounding
 
 
-@kernel
+@rare_kernel
 def scale_beside(normal_scale: float, upper: float, lower: float, friction: float) -> float:
     """What makes friction that moves nothing comparable: the normal impulse's unit, or its own.
 
@@ -195,7 +195,7 @@ def sign(value: float) -> float:
     return 1.0 if value > 0.0 else (-1.0 if value < 0.0 else 0.0)
 
 
-@kernel
+@rare_kernel
 def weigh(problem: ContactProblem, settings: Settings, impulse: Floats, scaling: Scaling) -> None:
     """Write the weights of the rows, the size of the data, beta, and the effort."""
     delassus, free, root = problem.delassus, problem.free, scaling.root
@@ -246,7 +246,7 @@ def weigh_at_once(
     return bool(size[2] > 0.0)
 
 
-@kernel
+@rare_kernel
 def general_weight(size: int, row: int, matrix: Floats) -> float:
     """Weight of a row of any matrix: the least that keeps ``|M_ij| <= sqrt(weight_i weight_j)``.
 
@@ -269,7 +269,7 @@ def relative_speed(velocity: float, root: float, inverse: float) -> float:
     return sign(velocity)
 
 
-@kernel
+@rare_kernel
 def sum_velocities(problem: ContactProblem, impulse: Floats, velocity: Floats) -> None:
     """Write ``velocity = G impulse + free``."""
     delassus, free, rows = problem.delassus, problem.free, row_of(problem.count, problem.first)
@@ -292,7 +292,7 @@ def sum_velocities(problem: ContactProblem, impulse: Floats, velocity: Floats) -
         velocity[beside] = even_beside + odd_beside
 
 
-@kernel
+@rare_kernel
 def sum_velocities_sharply(
     problem: ContactProblem, impulse: Floats, scaling: Scaling, velocity: Floats
 ) -> float:

@@ -10,7 +10,7 @@ Whatever is less usual is left to the general way, and the certificate decides a
 
 from __future__ import annotations
 
-from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.certificate import REST_TOLERANCE, certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
@@ -111,7 +111,7 @@ def list_equations(
     return size, slips
 
 
-@kernel
+@rare_kernel
 def solve_slipping(size: int, problem: ContactProblem, rows: StickingRows) -> int:
     """Solve ``(G_n + G_t r) x = -b`` over the listed rows; return the rank, or -1 to give up.
 
@@ -191,7 +191,7 @@ def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> tup
     return outcome, rank
 
 
-@kernel
+@rare_kernel
 def list_last(place: int, size: int, count: int, rows: StickingRows) -> None:
     """Let an equation change places with the last."""
     source, sharers, last = rows.row, rows.sharers, size - 1
@@ -204,7 +204,7 @@ def list_last(place: int, size: int, count: int, rows: StickingRows) -> None:
             rows.equation[row] = place
 
 
-@kernel
+@rare_kernel
 def leave_out_idle(size: int, rows: StickingRows) -> None:
     """Take from the solution what lies along directions that change no velocity.
 
@@ -249,7 +249,7 @@ def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -
         vector[i] -= ratio * direction[i]
 
 
-@dissolved_kernel
+@rare_kernel
 def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> int:
     """Solve ``G x = -b`` over the listed rows, of least norm; return the rank, or -1 to give up.
 
@@ -310,7 +310,7 @@ def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> i
     return rank
 
 
-@kernel
+@rare_kernel
 def shorten(rank: int, size: int, rows: StickingRows) -> None:
     """Spread the solution from the independent rows over all, to the least norm.
 
@@ -415,7 +415,7 @@ def share_impulses(
     return pulling
 
 
-@kernel
+@rare_kernel
 def share_within_cones(
     problem: ContactProblem, place: int, rows: StickingRows, answer: ContactAnswer
 ) -> bool:
@@ -526,7 +526,7 @@ def repeat(
     return False
 
 
-@kernel
+@rare_kernel
 def take_back_slips(problem: ContactProblem, mode: Integers) -> None:
     """Let contacts that were named slipping stick again, as they were asked to."""
     for contact in range(problem.count):
