@@ -212,9 +212,9 @@ class _RareLowering(_UnfinishedLowering):
 
     def run_pass(self, state: Any) -> bool:
         super().run_pass(state)
-        library, name = state.library, state["cr"].fndesc.mangled_name
+        module, name = state.library._final_module, state["cr"].fndesc.mangled_name
         for attribute in ("noinline", "cold"):
-            library._final_module.get_function(name).add_function_attribute(attribute)
+            module.get_function(name).add_function_attribute(attribute)
         return True
 
 

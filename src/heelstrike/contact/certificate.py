@@ -195,7 +195,7 @@ def sign(value: float) -> float:
     return 1.0 if value > 0.0 else (-1.0 if value < 0.0 else 0.0)
 
 
-@rare_kernel
+@kernel
 def weigh(problem: ContactProblem, settings: Settings, impulse: Floats, scaling: Scaling) -> None:
     """Write the weights of the rows, the size of the data, beta, and the effort."""
     delassus, free, root = problem.delassus, problem.free, scaling.root
@@ -227,21 +227,17 @@ def note_size(unit: float, effort: float, scaling: Scaling) -> None:
 def weigh_at_once(
     problem: ContactProblem, settings: Settings, impulse: Floats, scaling: Scaling, velocity: Floats
 ) -> bool:
-    """Do what :func:`weigh` and :func:`sum_velocities` do by a program; return whether there is one.
+    """Do what :func:`weigh` and :func:`sum_velocities` do by a program; return success.
 
-    There is none for rows that nothing moves, and none for many.
+    There is one where few rows fill their matrix and each of them is moved by something.
     """
     rows, delassus, size = row_of(problem.count, problem.first), problem.delassus, scaling.size
-    if rows == 0 or rows >= scaling.programs.shape[0] or settings.skewed != 0:
+    if rows >= scaling.programs.shape[0] or delassus.shape[1] != rows or settings.skewed != 0:
         return False
     program, free, root = scaling.programs[rows], problem.free, scaling.root
-    if delassus.shape[1] == rows:
-        play(program, (delassus, free, impulse, root, velocity, size))
-    else:
-        for i in range(rows):
-            for j in range(rows):
-                scaling.matrix[i * rows + j] = delassus[i, j]
-        play(program, (scaling.matrix, free, impulse, root, velocity, size))
+    if program == 0:
+        return False
+    play(program, (delassus, free, impulse, root, velocity, size))
     note_size(max(settings.floor, size[0]), size[1], scaling)
     return bool(size[2] > 0.0)
 
@@ -269,7 +265,7 @@ def relative_speed(velocity: float, root: float, inverse: float) -> float:
     return sign(velocity)
 
 
-@rare_kernel
+@kernel
 def sum_velocities(problem: ContactProblem, impulse: Floats, velocity: Floats) -> None:
     """Write ``velocity = G impulse + free``."""
     delassus, free, rows = problem.delassus, problem.free, row_of(problem.count, problem.first)

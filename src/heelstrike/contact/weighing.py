@@ -35,8 +35,9 @@ def weigh_rows(
         Receives ``g = sqrt(diag G)``.
     velocity : (n,) float
         Receives ``G impulse + free``.
-    size : (2,) float
-        Receives the largest ``|free| / g``, of rows that have a weight, and ``g |impulse|``, summed.
+    size : (3,) float
+        Receives the largest ``|free| / g``, ``g |impulse|``, summed, and the least of the diagonal:
+        the first is of use where that is more than zero.
     """
     rows = root.shape[0]
     for i in range(rows):
@@ -68,9 +69,7 @@ def weighing_programs() -> NDArray[np.int64]:
                 weigh_rows,
                 {
                     "delassus": np.zeros((rows, rows)),
-                    **{
-                        name: np.zeros(rows) for name in ("free", "impulse", "root", "velocity")
-                    },
+                    **{name: np.zeros(rows) for name in ("free", "impulse", "root", "velocity")},
                     "size": np.zeros(3),
                 },
                 name=f"weigh_{rows}",

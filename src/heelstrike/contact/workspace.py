@@ -107,9 +107,8 @@ class Scaling(Bundle):
     """The velocities that cancel, in units of the data's."""
     rounding: float = cell(float)
     """What rounding may hide from it."""
-    matrix: Floats = array("entries")
     size: Floats = array(3)
-    """matrix, size: Scratch of the programs."""
+    """Scratch of the programs."""
     programs: Integers = array("weighed", of=int, address=True)
     """Addresses of the programs that weigh few rows, by their number; zero where there is none."""
 

@@ -37,7 +37,7 @@ from heelstrike.contact.solvers.gauss_seidel import gauss_seidel
 from heelstrike.contact.solvers.known_modes import AS_GOOD, CLEAN
 from heelstrike.contact.solvers.lemke import lemke
 from heelstrike.contact.solvers.reduction import reduce_problem, scale_matrix
-from heelstrike.contact.weighing import MOST_ROWS, weighing_programs
+from heelstrike.contact.weighing import weighing_programs
 from heelstrike.contact.workspace import (
     Combinations,
     ContactAnswer,
@@ -337,9 +337,7 @@ def contact_workspace(
     weighing = weighing_programs() if symmetric else np.zeros(1, np.int64)
     work = ContactWorkspace.allocate(
         capacity=contacts,
-        scaling=Scaling.allocate(
-            capacity=contacts, entries=MOST_ROWS * MOST_ROWS, programs=weighing
-        ),
+        scaling=Scaling.allocate(capacity=contacts, programs=weighing),
         sticking=StickingRows.allocate(
             capacity=contacts, half=LARGEST * (LARGEST + 1) // 2, programs=programs
         ),

@@ -119,28 +119,27 @@ def solve_slipping(size: int, problem: ContactProblem, rows: StickingRows) -> in
     against their diagonals, whatever the units of the rows.
     """
     delassus, source, edge = problem.delassus, rows.row, rows.edge
-    matrix, x = rows.factor, rows.x
+    matrix, x, inverse = rows.factor, rows.x, rows.pivot
     for i in range(size):
         row = row_of(i, source)
-        x[i] = -problem.free[row]
         for j in range(size):
             column = row_of(j, source)
             matrix[i, j] = delassus[row, column]
             if edge[j] != 0.0:
                 matrix[i, j] += edge[j] * delassus[row, column + 1]
-    for k in range(size):
-        row = row_of(k, source)
-        if not matrix[k, k] > EARLY_PIVOT * delassus[row, row]:
-            return -1
-        for i in range(k + 1, size):
-            ratio = matrix[i, k] / matrix[k, k]
+        x[i] = -problem.free[row]
+        for k in range(i):
+            ratio = matrix[i, k] * inverse[k]
             x[i] -= ratio * x[k]
             for j in range(k + 1, size):
                 matrix[i, j] -= ratio * matrix[k, j]
+        if not matrix[i, i] > EARLY_PIVOT * delassus[row, row]:
+            return -1
+        inverse[i] = 1.0 / matrix[i, i]
     for i in range(size - 1, -1, -1):
         for j in range(i + 1, size):
             x[i] -= matrix[i, j] * x[j]
-        x[i] /= matrix[i, i]
+        x[i] *= inverse[i]
     return size
 
 
@@ -191,7 +190,7 @@ def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> tup
     return outcome, rank
 
 
-@rare_kernel
+@kernel
 def list_last(place: int, size: int, count: int, rows: StickingRows) -> None:
     """Let an equation change places with the last."""
     source, sharers, last = rows.row, rows.sharers, size - 1
@@ -204,7 +203,7 @@ def list_last(place: int, size: int, count: int, rows: StickingRows) -> None:
             rows.equation[row] = place
 
 
-@rare_kernel
+@kernel
 def leave_out_idle(size: int, rows: StickingRows) -> None:
     """Take from the solution what lies along directions that change no velocity.
 
@@ -249,7 +248,7 @@ def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -
         vector[i] -= ratio * direction[i]
 
 
-@rare_kernel
+@dissolved_kernel
 def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> int:
     """Solve ``G x = -b`` over the listed rows, of least norm; return the rank, or -1 to give up.
 
@@ -310,7 +309,7 @@ def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> i
     return rank
 
 
-@rare_kernel
+@kernel
 def shorten(rank: int, size: int, rows: StickingRows) -> None:
     """Spread the solution from the independent rows over all, to the least norm.
 
@@ -415,7 +414,7 @@ def share_impulses(
     return pulling
 
 
-@rare_kernel
+@kernel
 def share_within_cones(
     problem: ContactProblem, place: int, rows: StickingRows, answer: ContactAnswer
 ) -> bool:
@@ -456,8 +455,9 @@ def name_by_velocity(
     """Name what contacts do; return how many were not at rest but are, or -1 if one slips.
 
     One may slip that was to do so. Contacts at rest may carry impulses, and only with all of these
-    admitted is the least norm unique. One that would pull need not be admitted, if it is not quite at rest: neither where it
-    parts, nor where it comes nearer by so little that the answer is clean.
+    admitted is the least norm unique. One that would pull need not be admitted, if it is not quite
+    at rest: neither where it parts, nor where it comes nearer by so little that the answer is
+    clean.
     """
     mode, velocity = answer.mode, answer.velocity
     root, rest, first = scaling.root, answer.rest, problem.first
@@ -526,7 +526,7 @@ def repeat(
     return False
 
 
-@rare_kernel
+@kernel
 def take_back_slips(problem: ContactProblem, mode: Integers) -> None:
     """Let contacts that were named slipping stick again, as they were asked to."""
     for contact in range(problem.count):

@@ -501,7 +501,7 @@ def solve_impact(
     return status == SOLVED
 
 
-@rare_kernel
+@kernel
 def find_slips(
     members: int, problem: ContactProblem, member: Integers, answer: ContactAnswer
 ) -> None:

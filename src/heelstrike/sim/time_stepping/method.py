@@ -417,7 +417,7 @@ def free_velocity(
             next_v[i] += step * rate[i]
 
 
-@rare_kernel
+@kernel
 def velocity_by_loops(
     model: Model, step: float, scheme: int, q: Floats, v: Floats, torque: Floats,
     stiffness: Floats, equations: Equations, next_v: Floats,
@@ -557,7 +557,7 @@ def select_stops(
     return count
 
 
-@rare_kernel
+@kernel
 def select_corners(
     model: Model, rule: Rule, count: int, first: int, v: Floats, next_v: Floats, tree: Workspace,
     second_faces: Contacts, gaps: Floats, restitution: Floats, directions: Directions,
@@ -596,7 +596,7 @@ def select_corners(
     return count
 
 
-@rare_kernel
+@kernel
 def select_constraints(
     count: int, rule: Rule, v: Floats, next_v: Floats, restitution: Floats, called: Integers,
     rows: Rows, bounce: Floats, listing: Listing,
