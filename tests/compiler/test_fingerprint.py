@@ -19,7 +19,7 @@ from fresh_python import fresh_python
 from numba import config, float64, njit
 
 import heelstrike
-from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.fingerprint import fingerprint
 from heelstrike.compiler.private_numba import PrivateNumba
 
@@ -132,7 +132,7 @@ EDITS: dict[str, tuple[list[tuple[str, str, str]], set[str]]] = {
     ),
     "how code is called": (
         [("compiler/straight_line.py", "kind.layout != ", "kind.layout == ")],
-        {"loop"},
+        {"loop", "solvers"},
     ),
     "what compiles": (
         [("compiler/private_numba.py", ", InlineClosureLikes)\n\n", ")\n\n")],
@@ -264,6 +264,7 @@ changed_default.__name__ = "with_default"
         ("KIND", Other),
         ("inner", kernel(changed_inner)),
         ("inner", dissolved_kernel(inner.py_func)),  # type: ignore[attr-defined]
+        ("inner", rare_kernel(inner.py_func)),  # type: ignore[attr-defined]
         ("jitted", njit(fastmath=True)(jitted.py_func)),
         ("with_default", changed_default),
     ],

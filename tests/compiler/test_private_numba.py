@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fresh_python import fresh_python
+from numba import types
 from numba.core.types.functions import BaseFunction
 
 import heelstrike
@@ -179,3 +180,14 @@ def test_threads_that_compile_at_once_leave_numba_as_it_was() -> None:
     numba.compile(compile_meanwhile)
     others[0].join()
     assert BaseFunction.get_call_type is before
+
+
+@pytest.mark.parametrize("rare", [False, True])
+def test_what_is_rare_is_called_and_not_taken_in(rare: bool) -> None:
+    """By what LLVM is told of it; that it computes the same is tried before all others."""
+    numba_in_use()
+    apart = PrivateNumba().part(private_numba._inner, dissolved=False, rare=rare)
+    signature = types.float64(types.float64[::1], types.int64)
+    numba_in_use().compile(lambda: apart.compile(signature))
+    text = str(apart.get_compile_result(signature).library._final_module)
+    assert ("noinline" in text) == ("cold" in text) == rare

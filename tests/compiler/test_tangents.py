@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from math import cos, sin
+from math import cos, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,14 @@ import pytest
 from numpy.typing import NDArray
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.compiler.recordings.recording import Program, Recording, inverse_above
+from heelstrike.compiler.recordings.recording import (
+    Program,
+    Recording,
+    inverse_above,
+    larger,
+)
 from heelstrike.compiler.recordings.tangents import tangents
-from heelstrike.compiler.recordings.tape import Entry, Operation, Tape, Value
+from heelstrike.compiler.recordings.tape import Entry, Operation, Result, Tape, Value
 
 Floats = NDArray[np.float64]
 
@@ -25,6 +30,9 @@ PLAYED = {
     Operation.NEGATE: lambda a: -a,
     Operation.SINE: math.sin,
     Operation.COSINE: math.cos,
+    Operation.ROOT: math.sqrt,
+    Operation.MAGNITUDE: abs,
+    Operation.LARGER: max,
     Operation.INVERT_ABOVE: lambda a, b: 1.0 / a if a > b else 0.0,
 }
 
@@ -46,23 +54,28 @@ def everything(x: Floats, y: Floats, result: Floats) -> None:
     result[1] = -x[0] + y[0] * y[0] - 3.0
     result[2] = inverse_above(x[1], 0.5) * y[1]
     result[3] = 7.0
+    result[4] = sqrt(x[1]) * abs(y[1]) + abs(y[0])
+    result[5] = larger(x[0] * y[0], x[1]) + larger(y[1], 2.0 * x[0]) + larger(x[0], 0.0)
 
 
 def test_every_operation_has_its_derivative() -> None:
     """Against central differences of the same kernel; what is no value has none."""
     x, y = np.array([0.3, 0.8]), np.array([1.7, -0.4])
-    given = {"x": x, "y": y, "result": np.zeros(4)}
+    given = {"x": x, "y": y, "result": np.zeros(6)}
     program = Program(
-        everything, {**given, "slopes": np.zeros((4, 4))},
+        everything, {**given, "slopes": np.zeros((6, 4))},
         derivatives={"slopes": ("result", ("x", "y"))},
     )  # fmt: skip
-    recorded = Recording(program).arrays["slopes"]
+    recording = Recording(program)
+    done = {each.operation for each in recording.tape.values if isinstance(each, Result)}
+    assert done == set(Operation)
+    recorded = recording.arrays["slopes"]
     found = np.array([[number(each, given) for each in row] for row in recorded])
     columns = []
     for each in 1e-6 * np.eye(4):
         ends = []
         for side in (1.0, -1.0):
-            result = np.zeros(4)
+            result = np.zeros(6)
             everything(x + side * each[:2], y + side * each[2:], result)
             ends.append(result)
         columns.append((ends[0] - ends[1]) / 2e-6)

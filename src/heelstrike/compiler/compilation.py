@@ -65,22 +65,25 @@ class Kernel:
     which is kept on disk.
     """
 
-    def __init__(self, function: Callable[..., Any], *, dissolved: bool = False) -> None:
+    def __init__(
+        self, function: Callable[..., Any], *, dissolved: bool = False, rare: bool = False
+    ) -> None:
         update_wrapper(self, function)
         self.py_func = function
         self._called = False
         self.dissolved = dissolved
+        self.rare = rare
 
     def __reduce__(self) -> str | tuple[Any, ...]:
         """Copies and pickles are the one of that name: so Numba knows loops that enclose it."""
         if "<locals>" in self.py_func.__qualname__:
-            return Kernel, (self.py_func,), {"dissolved": self.dissolved}
+            return Kernel, (self.py_func,), {"dissolved": self.dissolved, "rare": self.rare}
         return self.py_func.__qualname__
 
     @cached_property
     def part(self) -> Any:
         """What Numba takes it for where another kernel names it."""
-        return numba_in_use().part(self.py_func, dissolved=self.dissolved)
+        return numba_in_use().part(self.py_func, dissolved=self.dissolved, rare=self.rare)
 
     def __get__(self, instance: Any, owner: Any = None) -> Any:
         """Bind it to the bundle whose method it is."""
@@ -116,6 +119,17 @@ def dissolved_kernel(function: Function) -> Function:
     small kernel does.
     """
     compiled: Any = Kernel(function, dissolved=True)
+    result: Function = compiled
+    return result
+
+
+def rare_kernel(function: Function) -> Function:
+    """Turn a function into a :class:`Kernel` that stays out of those that call it.
+
+    For kernels that most steps do without: what a loop has taken in takes registers and room in the
+    instruction cache from what it does always.
+    """
+    compiled: Any = Kernel(function, rare=True)
     result: Function = compiled
     return result
 

@@ -71,7 +71,7 @@ class DocumentedNumba:
             if kind.method(name) is not None:
                 overload_method(type(kind), name)(_calling(kind.method(name)))
 
-    def part(self, function: Callable[..., Any], *, dissolved: bool) -> Any:  # noqa: ARG002
+    def part(self, function: Callable[..., Any], *, dissolved: bool, rare: bool) -> Any:  # noqa: ARG002
         """Return a kernel as the kernels that call it know it."""
         return njit(**OPTIONS)(function)
 

@@ -106,7 +106,8 @@ class _Account:
             self._write("module", value.__name__)
         elif hasattr(value, "py_func"):  # a kernel, or a function compiled by Numba
             options = getattr(value, "targetoptions", None) or {}
-            self._write(getattr(value, "dissolved", False), sorted(map(repr, options.items())))
+            placed = getattr(value, "dissolved", False), getattr(value, "rare", False)
+            self._write(*placed, sorted(map(repr, options.items())))
             self.add_function(value.py_func)
         elif isinstance(value, types.FunctionType):
             self.add_function(value)

@@ -62,9 +62,12 @@ class PrivateNumba(DocumentedNumba):
     shaping = (*DocumentedNumba.shaping, "heelstrike.compiler.private_members", __name__)
     level = 3
 
-    def part(self, function: Callable[..., Any], *, dissolved: bool) -> Any:
+    def part(self, function: Callable[..., Any], *, dissolved: bool, rare: bool) -> Any:
         """Return a kernel without machine code of its own; it counts no references."""
-        return _unfinished(function, no_cpython_wrapper=True, forceinline=dissolved, _nrt=False)
+        passes = _RareKernelCompiler if rare else _InnerKernelCompiler
+        return _unfinished(
+            function, passes, no_cpython_wrapper=True, forceinline=dissolved, _nrt=False
+        )
 
     def kept(
         self, function: Callable[..., Any], *, boundscheck: bool = False, separate: bool = False
@@ -125,7 +128,7 @@ class PrivateNumba(DocumentedNumba):
         name, key = "private_numba.tested", bytes.fromhex(self.made_of(_inner))
         if kept_code.read(places, name, key) is not None:
             return
-        outer = _outer(self.part(_inner, dissolved=False))
+        outer = _outer(self.part(_inner, dissolved=False, rare=True))
         compiled = self.kept(outer)
         compiled._cache.places = []
         signature = types.float64(types.float64[::1], types.int64)
@@ -201,6 +204,20 @@ class _UnfinishedLowering(NativeLowering):
         return True
 
 
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _RareLowering(_UnfinishedLowering):
+    """Turn a kernel into an unfinished module that others call, but do not take in."""
+
+    _name = "rare_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        super().run_pass(state)
+        module, name = state.library._final_module, state["cr"].fndesc.mangled_name
+        for attribute in ("noinline", "cold"):
+            module.get_function(name).add_function_attribute(attribute)
+        return True
+
+
 def _check_result(name: str, kind: Any) -> None:
     """Refuse a kernel that returns an array: nobody would count the caller's new reference."""
     parts = getattr(kind, "types", (kind,))
@@ -217,11 +234,13 @@ _NEEDLESS = (NopythonRewrites, InlineOverloads, InlineClosureLikes)
 class _InnerKernelCompiler(CompilerBase):
     """Numba's compiler without what kernels do not need, ending in `_UnfinishedLowering`."""
 
+    lowering: type[NativeLowering] = _UnfinishedLowering
+
     def define_pipelines(self) -> list[Any]:
         """Leave steps out, and replace the one that makes machine code."""
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
         pipeline.passes = [
-            (_UnfinishedLowering, "unfinished lowering") if step is NativeLowering else (step, text)
+            (self.lowering, "unfinished lowering") if step is NativeLowering else (step, text)
             for step, text in pipeline.passes
             if step not in _NEEDLESS
         ]
@@ -229,10 +248,18 @@ class _InnerKernelCompiler(CompilerBase):
         return [pipeline]
 
 
-def _unfinished(function: Callable[..., Any], **more: bool) -> Any:
+class _RareKernelCompiler(_InnerKernelCompiler):
+    """The same for kernels that others do not take in."""
+
+    lowering = _RareLowering
+
+
+def _unfinished(
+    function: Callable[..., Any], passes: type[CompilerBase] = _InnerKernelCompiler, **more: bool
+) -> Any:
     """Return a function that Numba compiles up to an unfinished module."""
     options = OPTIONS | {"no_cfunc_wrapper": True} | more
-    return njit(**options, pipeline_class=_InnerKernelCompiler)(function)
+    return njit(**options, pipeline_class=passes)(function)
 
 
 def _loop(compiled: Any, cache: _Cache, signature: Any, fixed: Fixed) -> Any:

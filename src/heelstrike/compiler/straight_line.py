@@ -196,6 +196,12 @@ class _Writer:
                 return builder.fdiv(*values)
             case Operation.NEGATE:
                 return builder.fneg(*values)
+            case Operation.ROOT | Operation.MAGNITUDE:
+                name = "llvm.sqrt" if result.operation is Operation.ROOT else "llvm.fabs"
+                function = builder.module.declare_intrinsic(name, [_DOUBLE])
+                return builder.call(function, values)
+            case Operation.LARGER:
+                return builder.select(builder.fcmp_ordered(">", *values), *values)
             case Operation.INVERT_ABOVE:
                 inverse = builder.fdiv(ir.Constant(_DOUBLE, 1.0), values[0])
                 above = builder.fcmp_ordered(">", *values)

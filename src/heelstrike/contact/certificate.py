@@ -20,7 +20,8 @@ from dataclasses import field
 
 import numpy as np
 
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import kernel, rare_kernel
+from heelstrike.compiler.straight_line import play
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
 from heelstrike.contact.sets import INTERVAL, LINE, is_empty, room, row_of
@@ -112,14 +113,16 @@ def certify(
     count = problem.count
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
     root, slope = scaling.root, scaling.slope
-    weigh(problem, settings, impulse, scaling)
+    at_once = weigh_at_once(problem, settings, impulse, scaling, velocity)
+    if not at_once:
+        weigh(problem, settings, impulse, scaling)
     unit = scaling.unit
     rounding = (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + scaling.effort)
     sharply = rounding > VISIBLE
-    if not sharply:
-        sum_velocities(problem, impulse, velocity)
-    else:
+    if sharply:
         rounding = sum_velocities_sharply(problem, impulse, scaling, velocity)
+    elif not at_once:
+        sum_velocities(problem, impulse, velocity)
     scaling.rounding = rounding
     answer.rest = REST_TOLERANCE * unit * (1.0 + scaling.effort)
     inverse = 1.0 / unit if unit > 0.0 else 0.0
@@ -174,7 +177,7 @@ def certify(
     return max(complementarity, max(cone, non_penetration)) + rounding
 
 
-@kernel
+@rare_kernel
 def scale_beside(normal_scale: float, upper: float, lower: float, friction: float) -> float:
     """What makes friction that moves nothing comparable: the normal impulse's unit, or its own.
 
@@ -208,6 +211,12 @@ def weigh(problem: ContactProblem, settings: Settings, impulse: Floats, scaling:
         if weight > 0.0 and abs(free[i]) > unit * size:  # a few are divided, not all
             unit = abs(free[i]) / size
         effort += size * abs(impulse[i])
+    note_size(unit, effort, scaling)
+
+
+@kernel
+def note_size(unit: float, effort: float, scaling: Scaling) -> None:
+    """Keep the size of the data, and the effort in units of it."""
     if effort > 0.0:
         effort = effort / unit if unit > 0.0 else math.inf
     scaling.effort = effort
@@ -215,6 +224,25 @@ def weigh(problem: ContactProblem, settings: Settings, impulse: Floats, scaling:
 
 
 @kernel
+def weigh_at_once(
+    problem: ContactProblem, settings: Settings, impulse: Floats, scaling: Scaling, velocity: Floats
+) -> bool:
+    """Do what :func:`weigh` and :func:`sum_velocities` do by a program; return success.
+
+    There is one where few rows fill their matrix and each of them is moved by something.
+    """
+    rows, delassus, size = row_of(problem.count, problem.first), problem.delassus, scaling.size
+    if rows >= scaling.programs.shape[0] or delassus.shape[1] != rows or settings.skewed != 0:
+        return False
+    program, free, root = scaling.programs[rows], problem.free, scaling.root
+    if program == 0:
+        return False
+    play(program, (delassus, free, impulse, root, velocity, size))
+    note_size(max(settings.floor, size[0]), size[1], scaling)
+    return bool(size[2] > 0.0)
+
+
+@rare_kernel
 def general_weight(size: int, row: int, matrix: Floats) -> float:
     """Weight of a row of any matrix: the least that keeps ``|M_ij| <= sqrt(weight_i weight_j)``.
 
@@ -260,7 +288,7 @@ def sum_velocities(problem: ContactProblem, impulse: Floats, velocity: Floats) -
         velocity[beside] = even_beside + odd_beside
 
 
-@kernel
+@rare_kernel
 def sum_velocities_sharply(
     problem: ContactProblem, impulse: Floats, scaling: Scaling, velocity: Floats
 ) -> float:

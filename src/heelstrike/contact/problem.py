@@ -288,9 +288,9 @@ def run_solvers(
 def _memory(count: int) -> ContactWorkspace:
     """Return memory to solve in; that of few contacts is kept, one for each thread."""
     if count > KEPT_CONTACTS:
-        return contact_workspace(count)
+        return contact_workspace(count, symmetric=False)
     if not hasattr(_kept, "memory"):
-        _kept.memory = contact_workspace(KEPT_CONTACTS)
+        _kept.memory = contact_workspace(KEPT_CONTACTS, symmetric=False)
     memory: ContactWorkspace = _kept.memory
     return memory
 

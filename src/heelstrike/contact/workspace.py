@@ -107,6 +107,10 @@ class Scaling(Bundle):
     """The velocities that cancel, in units of the data's."""
     rounding: float = cell(float)
     """What rounding may hide from it."""
+    size: Floats = array(3)
+    """Scratch of the programs."""
+    programs: Integers = array("weighed", of=int, address=True)
+    """Addresses of the programs that weigh few rows, by their number; zero where there is none."""
 
 
 class StickingRows(Bundle):
@@ -118,6 +122,8 @@ class StickingRows(Bundle):
     """Equation of each row of the problem, -1 for none."""
     sharers: Floats = array("2 capacity")
     """How many rows share each equation."""
+    edge: Floats = array("2 capacity")
+    """Tangential over normal impulse where the contact of an equation slips, else zero."""
     pulled: Integers = array("capacity", of=int)
     """Whether each contact would have pulled in an attempt before."""
     x: Floats = array("2 capacity")

@@ -10,7 +10,7 @@ import numpy as np
 
 from heelstrike.arguments import check_fields
 from heelstrike.compiler.bundle import Bundle, array
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import kernel, rare_kernel
 from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.places import add_point_force, place_of, velocity_at
 from heelstrike.dynamics.workspace import Workspace
@@ -227,7 +227,7 @@ def switch_at(time: float, pushes: Pushes) -> tuple[bool, float]:
     return changed, following
 
 
-@kernel
+@rare_kernel
 def add_pushes(model: Model, tree: Workspace, pushes: Pushes, force: Floats) -> None:
     """Add the generalised force Jᵀf of the pushes to `force`."""
     for i in range(pushes.link.shape[0]):

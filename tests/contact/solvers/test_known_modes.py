@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import heelstrike as hs
-from heelstrike.contact.modes import STICK
+from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.problem import solve_contact
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.solvers.known_modes import repeat
@@ -67,3 +69,49 @@ def test_points_of_a_sole_share_friction_as_far_as_their_cones_reach(part: float
             halves = pressed[:, 1].reshape(2, 2).mean(axis=1).repeat(2)
             edges += bool(np.any(np.abs(halves) > friction * pressed[:, 0]))
     assert edges >= (10 if 0.5 < part < 1.0 else 0)
+
+
+def asked(delassus: Any, free: Any, friction: Any, modes: Any) -> tuple[bool, ContactAnswer]:
+    """Whether modes are repeated, and the answer."""
+    count = len(modes)
+    work = contact_workspace(count)
+    problem = contact_problem(count, count=count, delassus=delassus, free=free, friction=friction)
+    answer = ContactAnswer.allocate(capacity=count, mode=np.array(modes, np.int64))
+    return repeat(problem, work.settings, work.sticking, work.scaling, answer), answer
+
+
+def test_what_slips_goes_on_slipping() -> None:
+    """As the general way has it, whatever the others do; and both ways occur."""
+    draw, seen = np.random.default_rng(3), set()
+    for _ in range(120):
+        count = int(draw.integers(1, 5))
+        jacobian = draw.standard_normal((2 * count, 9))
+        delassus, free = jacobian @ jacobian.T, draw.standard_normal(2 * count)
+        friction = draw.uniform(0.1, 0.5, count)
+        general = solve_contact(delassus, free, friction)
+        if not general.certificate.valid or not {SLIP_FORWARD, SLIP_BACKWARD} & {*general.mode}:
+            continue
+        seen |= set(general.mode)
+        held, answer = asked(delassus, free, friction, general.mode)
+        assert held
+        assert answer.mode.tolist() == [*general.mode]
+        np.testing.assert_allclose(answer.impulse, general.impulse.ravel(), atol=1e-11)
+    assert seen == {OPEN, STICK, SLIP_FORWARD, SLIP_BACKWARD}
+
+
+def test_what_comes_to_rest_sticks_at_the_next_try() -> None:
+    """A block that friction of 0.8 would hold; and what slips the other way is not repeated."""
+    block, free = np.eye(2), np.array([-1.0, 0.8])
+    held, answer = asked(block, free, np.array([0.8]), [SLIP_FORWARD])  # at rest, to the last digit
+    assert held
+    assert answer.mode.tolist() == [STICK]
+    np.testing.assert_allclose(answer.impulse, [1.0, -0.8], atol=1e-15)
+    held, answer = asked(block, free, np.array([0.5]), [SLIP_BACKWARD])
+    assert not held
+
+
+def test_slipping_rows_that_depend_on_each_other_are_left_to_the_general_way() -> None:
+    """Two points at one place: how they share what presses is a question of least norm."""
+    twice = np.kron(np.ones((2, 2)), np.eye(2))
+    held, _ = asked(twice, np.array([-1.0, 2.0] * 2), np.full(2, 0.5), [SLIP_FORWARD] * 2)
+    assert not held

@@ -24,6 +24,9 @@ _WRITTEN = {
     Operation.NEGATE: "-{}",
     Operation.SINE: "sin({})",
     Operation.COSINE: "cos({})",
+    Operation.ROOT: "sqrt({})",
+    Operation.MAGNITUDE: "fabs({})",
+    Operation.LARGER: "{0} > {1} ? {0} : {1}",
     Operation.INVERT_ABOVE: "{0} > {1} ? 1.0 / {0} : 0.0",
 }
 

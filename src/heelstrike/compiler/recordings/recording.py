@@ -27,7 +27,16 @@ def inverse_above(value: float, least: float) -> float:
     return 1.0 / value if value > least else 0.0
 
 
-_RECORDED = {math.sin: tape.sine, math.cos: tape.cosine, inverse_above: tape.inverse_above}
+@kernel
+def larger(one: float, other: float) -> float:
+    """The larger of two numbers; the second where the first is none."""
+    return one if one > other else other
+
+
+_RECORDED = {
+    math.sin: tape.sine, math.cos: tape.cosine, math.sqrt: tape.root,
+    inverse_above: tape.inverse_above, larger: tape.larger,
+}  # fmt: skip
 """What takes the place of functions that kernels call; no other function may be asked for a
 number that is not known yet."""
 

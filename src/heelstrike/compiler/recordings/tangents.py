@@ -19,6 +19,7 @@ from heelstrike.compiler.recordings.tape import (
     Symbols,
     Value,
     cosine,
+    inverse_above,
     needed,
     sine,
 )
@@ -31,9 +32,18 @@ _PARTIAL: dict[Operation, Callable[..., tuple[Any, ...]]] = {
     Operation.NEGATE: lambda _, __: (-1.0,),
     Operation.SINE: lambda _, angle: (cosine(angle),),
     Operation.COSINE: lambda _, angle: (-sine(angle),),
+    Operation.ROOT: lambda root, _: (0.5 / root,),
+    Operation.MAGNITUDE: lambda magnitude, value: (value / magnitude,),
+    Operation.LARGER: lambda _, one, other: _shares(one - other),
     Operation.INVERT_ABOVE: lambda inverse, *_: (-inverse * inverse, 0.0),
 }
 """Derivatives of a result by its operands, of the result and of these."""
+
+
+def _shares(difference: Any) -> tuple[Any, Any]:
+    """What the larger of two numbers changes with each, by what the first is larger."""
+    first = inverse_above(difference, 0.0) * difference
+    return first, 1.0 - first
 
 
 def tangents(values: Symbols, by: Sequence[Any]) -> Symbols:

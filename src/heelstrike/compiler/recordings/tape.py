@@ -28,6 +28,9 @@ class Operation(Enum):
     NEGATE = "negate"
     SINE = "sin"
     COSINE = "cos"
+    ROOT = "square root"
+    MAGNITUDE = "magnitude"
+    LARGER = "the larger of both"
     INVERT_ABOVE = "inverse of the first if it is more than the second, or else zero"
 
 
@@ -71,6 +74,9 @@ class Value:
 
     def __neg__(self) -> Any:
         return self.tape.record(Operation.NEGATE, self)
+
+    def __abs__(self) -> Any:
+        return self.tape.record(Operation.MAGNITUDE, self)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -138,6 +144,19 @@ def sine(value: Any) -> Any:
 def cosine(value: Any) -> Any:
     """Cosine of a number or of a value of a tape."""
     return value.tape.record(Operation.COSINE, value) if _waits(value) else math.cos(value)
+
+
+def root(value: Any) -> Any:
+    """Square root of a number or of a value of a tape."""
+    return value.tape.record(Operation.ROOT, value) if _waits(value) else math.sqrt(value)
+
+
+def larger(one: Any, other: Any) -> Any:
+    """The larger of two numbers or values of a tape; the second where the first is none."""
+    for value in (one, other):
+        if _waits(value):
+            return value.tape.record(Operation.LARGER, one, other)
+    return one if one > other else other
 
 
 def inverse_above(value: Any, least: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from numba import types
 
 from heelstrike.compiler.compilation import kernel
@@ -36,6 +37,7 @@ from heelstrike.contact.solvers.gauss_seidel import gauss_seidel
 from heelstrike.contact.solvers.known_modes import AS_GOOD, CLEAN
 from heelstrike.contact.solvers.lemke import lemke
 from heelstrike.contact.solvers.reduction import reduce_problem, scale_matrix
+from heelstrike.contact.weighing import weighing_programs
 from heelstrike.contact.workspace import (
     Combinations,
     ContactAnswer,
@@ -312,7 +314,9 @@ def begin(
     reduce_problem(problem, answer.mode, slope, reduced)
 
 
-def contact_workspace(capacity: int, *, ready: bool = True) -> ContactWorkspace:
+def contact_workspace(
+    capacity: int, *, ready: bool = True, symmetric: bool = True
+) -> ContactWorkspace:
     """Allocate the memory to solve contact problems of up to ``capacity`` contacts.
 
     Parameters
@@ -322,14 +326,18 @@ def contact_workspace(capacity: int, *, ready: bool = True) -> ContactWorkspace:
     ready : bool
         Whether to see to it that the solvers are compiled. Those who say no call
         ``try_solvers.finish()`` before they solve.
+    symmetric : bool
+        Whether matrices will be symmetric to the last digit, as certificates by programs take them.
     """
     if ready:
         try_solvers.finish()
     contacts = max(int(capacity), 1)
     rows = 2 * contacts
     programs = elimination_programs()
+    weighing = weighing_programs() if symmetric else np.zeros(1, np.int64)
     work = ContactWorkspace.allocate(
         capacity=contacts,
+        scaling=Scaling.allocate(capacity=contacts, programs=weighing),
         sticking=StickingRows.allocate(
             capacity=contacts, half=LARGEST * (LARGEST + 1) // 2, programs=programs
         ),

@@ -1,16 +1,16 @@
-"""The usual case, fast: contacts go on sticking, or stay open, as in the solve before.
+"""The usual case, fast: contacts go on sticking or slipping, or stay open, as in the solve before.
 
 Sticking contacts make one symmetric system. Vertices of one flat foot share their tangential row,
 so that only the sum of their friction is determined; among all splits the equal one has the least
 norm. Where a vertex cannot hold its share, the others hold what is left, as far as their cones
 reach. Rows may depend on each other otherwise, as those of two feet under straight legs do.
-Whatever is less usual, as slip is, is left to the general way, and the certificate decides as
-always.
+Where something slips, the system is not symmetric, and rows may not depend on each other.
+Whatever is less usual is left to the general way, and the certificate decides as always.
 """
 
 from __future__ import annotations
 
-from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.certificate import REST_TOLERANCE, certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
@@ -56,16 +56,24 @@ FAILS, HOLDS, MAY_DRIFT = range(3)
 
 
 @dissolved_kernel
+def edge_of(mode: int, friction: float) -> float:
+    """Tangential over normal impulse of a contact that slips, zero of others."""
+    if mode == SLIP_FORWARD:
+        return -friction
+    return friction if mode == SLIP_BACKWARD else 0.0
+
+
+@dissolved_kernel
 def list_equations(
     first_try: bool, problem: ContactProblem, mode: Integers, rows: StickingRows
-) -> int:
+) -> tuple[int, bool]:
     """List the rows that shall have no velocity; return how many differ, or -1 to give up.
 
-    In the first try nothing has been found to pull.
+    In the first try nothing has been found to pull. Whether anything slips is returned, too.
     """
     delassus, first, friction = problem.delassus, problem.first, problem.friction
     source, equation, sharers = rows.row, rows.equation, rows.sharers
-    size, end = 0, 0
+    size, end, slips = 0, 0, False
     for contact in range(problem.count):
         row, end = end, row_of(contact + 1, first)
         tangent = row + 1
@@ -74,14 +82,15 @@ def list_equations(
             rows.pulled[contact] = 0
         if mode[contact] == OPEN and problem.set[contact] != LINE:
             continue
-        has_friction = friction[contact] > 0.0
-        if mode[contact] >= SLIDING_FORWARD or (has_friction and mode[contact] != STICK):
-            return -1
+        if mode[contact] >= SLIDING_FORWARD:
+            return -1, slips
         equation[row] = size
         source[size] = row
         sharers[size] = 1.0
+        edge = rows.edge[size] = edge_of(mode[contact], friction[contact])
         size = (size + 1) & EVERY_ROW
-        if not has_friction:
+        slips = slips or edge != 0.0
+        if edge != 0.0 or not friction[contact] > 0.0:
             continue
         diagonal = delassus[tangent, tangent]
         for earlier in range(contact - 1, -1, -1):  # neighbours of a sole are next to each other
@@ -97,7 +106,40 @@ def list_equations(
             equation[tangent] = size
             source[size] = tangent
             sharers[size] = 1.0
+            rows.edge[size] = 0.0
             size = (size + 1) & EVERY_ROW
+    return size, slips
+
+
+@rare_kernel
+def solve_slipping(size: int, problem: ContactProblem, rows: StickingRows) -> int:
+    """Solve ``(G_n + G_t r) x = -b`` over the listed rows; return the rank, or -1 to give up.
+
+    What slips rubs with r times what it presses with. No rows change places: pivots are held
+    against their diagonals, whatever the units of the rows.
+    """
+    delassus, source, edge = problem.delassus, rows.row, rows.edge
+    matrix, x, inverse = rows.factor, rows.x, rows.pivot
+    for i in range(size):
+        row = row_of(i, source)
+        for j in range(size):
+            column = row_of(j, source)
+            matrix[i, j] = delassus[row, column]
+            if edge[j] != 0.0:
+                matrix[i, j] += edge[j] * delassus[row, column + 1]
+        x[i] = -problem.free[row]
+        for k in range(i):
+            ratio = matrix[i, k] * inverse[k]
+            x[i] -= ratio * x[k]
+            for j in range(k + 1, size):
+                matrix[i, j] -= ratio * matrix[k, j]
+        if not matrix[i, i] > EARLY_PIVOT * delassus[row, row]:
+            return -1
+        inverse[i] = 1.0 / matrix[i, i]
+    for i in range(size - 1, -1, -1):
+        for j in range(i + 1, size):
+            x[i] -= matrix[i, j] * x[j]
+        x[i] *= inverse[i]
     return size
 
 
@@ -339,7 +381,8 @@ def share_impulses(
         row, end = end, row_of(contact + 1, first)
         normal = tangent = share_of(row, rows)
         if end > row + 1:
-            tangent = share_of(row + 1, rows)
+            edge = edge_of(answer.mode[contact], friction[contact])
+            tangent = edge * normal if edge != 0.0 else share_of(row + 1, rows)
             inside = inside and abs(tangent) <= friction[contact] * normal
             impulse[row + 1] = tangent
         impulse[row] = normal
@@ -364,7 +407,9 @@ def share_impulses(
             impulse[row], across = projected(problem, contact, impulse[row], impulse[row + 1])
             if across != impulse[row + 1]:
                 place = rows.equation[row + 1]
-                if not alone or place < 0 or not share_within_cones(problem, place, rows, answer):
+                if edge_of(answer.mode[contact], friction[contact]) != 0.0:
+                    impulse[row + 1] = across
+                elif not alone or place < 0 or not share_within_cones(problem, place, rows, answer):
                     return -1
     return pulling
 
@@ -407,11 +452,12 @@ def share_within_cones(
 def name_by_velocity(
     problem: ContactProblem, pulled: Integers, scaling: Scaling, answer: ContactAnswer
 ) -> int:
-    """Name what contacts do; return how many were open but at rest, or -1 if one slips.
+    """Name what contacts do; return how many were not at rest but are, or -1 if one slips.
 
-    Contacts at rest may carry impulses, and only with all of these admitted is the least norm
-    unique. One that would pull need not be admitted, if it is not quite at rest: neither where it
-    parts, nor where it comes nearer by so little that the answer is clean.
+    One may slip that was to do so. Contacts at rest may carry impulses, and only with all of these
+    admitted is the least norm unique. One that would pull need not be admitted, if it is not quite
+    at rest: neither where it parts, nor where it comes nearer by so little that the answer is
+    clean.
     """
     mode, velocity = answer.mode, answer.velocity
     root, rest, first = scaling.root, answer.rest, problem.first
@@ -427,11 +473,13 @@ def name_by_velocity(
             size = scaling.unit * root[normal]
             moves = velocity[normal] >= -CLEAN * size and abs(velocity[normal]) > BARELY * size
             pressed += not (moves and pulled[contact] == 1)
-        mode[contact] = STICK
+        asked, mode[contact] = mode[contact], STICK
         if end > tangent and abs(velocity[tangent]) > rest * root[tangent]:
             mode[contact] = SLIP_FORWARD if velocity[tangent] > 0.0 else SLIP_BACKWARD
-            if problem.friction[contact] > 0.0:
+            if problem.friction[contact] > 0.0 and mode[contact] != asked:
                 return -1
+        elif edge_of(asked, problem.friction[contact]) != 0.0:
+            pressed += 1
     return pressed
 
 
@@ -450,14 +498,18 @@ def repeat(
     """
     drifts = False
     for attempt in range(TRIES):
-        size = list_equations(attempt == 0, problem, answer.mode, rows)
+        size, slips = list_equations(attempt == 0, problem, answer.mode, rows)
         if size < 0:
             return False
-        solved, rank = (FAILS, 0) if drifts else solve_at_once(size, problem, rows)
-        if solved == FAILS:
+        solved, rank = FAILS, 0
+        if slips:
+            rank = solve_slipping(size, problem, rows)
+        elif not drifts:
+            solved, rank = solve_at_once(size, problem, rows)
+        if solved == FAILS and not slips:
             rank = solve_equations(size, problem, rows)
-            if rank < 0:
-                return False
+        if rank < 0:
+            return False
         changed = share_impulses(problem, rank == size, rows, answer)
         if changed < 0:
             return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.words import bits_of, stay_below, word_at
 from heelstrike.contact.ground import GroundModel, ground_height
 from heelstrike.contact.sets import INTERVAL
@@ -60,7 +60,7 @@ def note_residual(residual: Floats, tally: Tally) -> None:
     tally.non_penetration = max(tally.non_penetration, residual[2])
 
 
-@kernel
+@rare_kernel
 def log_event(
     time: float, kind: int, place: int, normal: float, tangent: float, told: Told
 ) -> None:

@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
-from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE, row_of
@@ -168,7 +168,7 @@ def left_alone(
     return deepest, bounces
 
 
-@kernel
+@rare_kernel
 def relax(bounds_gaps: bool, deepest: float, bounces: bool, steps: int, impact: Impact) -> bool:
     """Ask a step without an answer for less: no way out, no bounce; return if it asked for any.
 
@@ -212,7 +212,7 @@ def changes(kind: int, assembly: Assembly, before: Integers) -> bool:
     return False
 
 
-@kernel
+@rare_kernel
 def close_gaps(step: float, count: int, gap: Floats, assembly: Assembly) -> None:
     """Count negative gaps of the candidates as zero."""
     problem = assembly.problem
@@ -366,7 +366,7 @@ def pose_impact(
         impact.answer.mode[place] = mode[source]
 
 
-@kernel
+@rare_kernel
 def energy_made(
     problem: ContactProblem, bounce: Floats, share: float, answer: ContactAnswer
 ) -> float:
@@ -440,7 +440,7 @@ def hardest_point(force: Floats) -> int:
     return hardest
 
 
-@kernel
+@rare_kernel
 def pose_way_out(
     step: float, candidate: Integers, gap: Floats, velocity: Floats, problem: ContactProblem,
     impact: Impact,

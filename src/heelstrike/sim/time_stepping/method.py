@@ -34,7 +34,7 @@ import numpy as np
 
 from heelstrike.arguments import check_fields
 from heelstrike.compiler.bundle import Bundle, array, number, part
-from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.compiler.words import bits_of, copy_words, stay_below
 from heelstrike.contact.ground import GroundModel
@@ -844,7 +844,7 @@ def write_unit(joint: int, sign: float, row: Floats) -> None:
     row[joint] = sign
 
 
-@kernel
+@rare_kernel
 def push_out(
     model: Model, near: int, count: int, straight: bool, step: float, order: Integers, gap: Floats,
     contacts: Contacts, points: Integers, problem: ContactProblem, equations: Equations,
@@ -916,7 +916,7 @@ def far_beyond(step: float, own: int, outside: Writers) -> float:
     return CLOSED_GAP + max(0.5 * step * step * outside.bias[own, 0], 0.0)
 
 
-@kernel
+@rare_kernel
 def call_points(
     model: Model, step: float, v: Floats, contacts: Contacts, tree: Workspace, usual: UsualPoints,
     calls: Calls,
@@ -929,7 +929,7 @@ def call_points(
             call(contact, calls)
 
 
-@kernel
+@rare_kernel
 def call_joints(step: float, q: Floats, v: Floats, rows: Rows, calls: Calls) -> None:
     """Call the stops and the constraints from outside that would go through at that velocity."""
     for stop in range(rows.first[STOP], rows.end[STOP]):
