@@ -32,7 +32,8 @@ def solved(
         return gradient.ravel(), values.ravel(), jacobian
 
     return optimum_near(
-        np.array(start), np.zeros(len(lower)), slopes,
+        np.array(start), np.zeros(len(lower)),
+        lambda at: float(casadi.Function("cost", [x], [cost])(at)), slopes,
         lambda at, given: casadi.densify(second(at, given)).full(),
         (np.array(lower), np.array(upper)),
     )  # fmt: skip
@@ -90,6 +91,30 @@ def test_a_maximum_is_none(start: float) -> None:
     """Newton's method leads to the maximum of the cosine, which is stationary."""
     found = solved(lambda x: (casadi.cos(x[0]), x), [start], [-np.inf], [np.inf])
     assert found is None
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_minimum_beyond_a_hill_is_none(held: bool) -> None:
+    """The curve bends down at the start, so that Newton's step goes up, into the dearer valley.
+
+    Alone, and with an equation y = x.
+    """
+    count, bound = (2, 0.0) if held else (1, np.inf)
+
+    def problem(x: casadi.SX) -> tuple[casadi.SX, casadi.SX]:
+        return (x[0] ** 2 - 1.0) ** 2 + 0.6 * x[-1], x[-1] - x[0] if held else x
+
+    assert solved(problem, [-0.5] * count, [-bound], [bound]) is None
+    found = solved(problem, [-0.9] * count, [-bound], [bound])
+    assert found is not None
+    assert found[0] == pytest.approx(np.roots([4.0, 0.0, -4.0, 0.6]).real.min(), abs=1e-8)
+
+
+def test_what_the_start_breaks_counts() -> None:
+    """The start is cheaper than the optimum, since it breaks the equation: that has its price."""
+    found = solved(lambda x: (casadi.sumsqr(x), casadi.sum1(x)), [0.1, 0.2], [2.0], [2.0])
+    assert found is not None
+    np.testing.assert_allclose(found[0], 1.0, rtol=0, atol=1e-9)
 
 
 def test_a_maximum_along_a_constraint_is_none() -> None:

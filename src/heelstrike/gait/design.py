@@ -28,6 +28,9 @@ from heelstrike.robot.state import State
 
 SAME_COST = 1e-6
 """Relative difference of the costs of two optima of the coarse grid from which on they differ."""
+NEARLY_SAME = 0.1
+"""Distance between motions on two grids, relative to their size, within which they count as one:
+the same optimum is off by 0.04, another one by more than 1, of the robot that has several."""
 NEARLY_BEST = 0.1
 """How much dearer than the best of them one may be, relative to it, that is solved on the whole
 grid, too: there the order may be another."""
@@ -90,15 +93,25 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
         feasible = nearest_to_feasible(rough, ATTEMPTS if last else 1)
         inside = [replace(rough, inside=True).solve(feasible)]
         solutions = [rough.solve(guesses[0])]
+    whole: list[Solution] = []
+    # Where another profile was too much for the foot, there often are several optima, of which the
+    # coarse grid may have but one.
+    hard = rough is not program and program.profile is not request.profiles[0]
     for k, guess in enumerate(guesses[1:]):
         report(0.05 + 0.7 * (k + 1) / len(guesses))
-        solutions.append(rough.solve(guess))
+        last = k + 2 == len(guesses)
+        if hard and last and _agree((*inside, *solutions)):
+            whole.append(program.solve(program.sampled(begun[-1])))
+        else:
+            solutions.append(rough.solve(guess))
     report(0.75)
     good = [solution for solution in (*inside, *solutions) if solution.converged]
     if rough is not program and good:
         # Optima that only the whole grid has are looked for, too.
-        lost = [start for start, at in zip(begun, solutions, strict=True) if not at.converged]
-        whole = [replace(program, near=True).solve(each.unknowns) for each in _different(good)]
+        lost = [start for start, at in zip(begun, solutions, strict=False) if not at.converged]
+        near = replace(program, near=True)
+        if not (whole and whole[0].converged and _nearly_same(whole[0], good[0])):
+            whole += [near.solve(each.unknowns) for each in _different(good)]
         whole += [program.solve(program.sampled(start)) for start in lost]
         if found := [solution for solution in whole if solution.converged]:
             return min(found, key=lambda solution: solution.objective)
@@ -106,6 +119,19 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
     good = good or [rough.at(feasible), *filter(rough.satisfied_by, (*inside, *solutions))]
     best = min(good, key=lambda solution: solution.objective)
     return best if rough is program else solved_again(program, best.unknowns)
+
+
+def _agree(solutions: Sequence[Solution]) -> bool:
+    """Whether all of two or more are optima that cost the same."""
+    costs = np.array([each.objective for each in solutions])
+    optima = costs.size > 1 and all(each.converged for each in solutions)
+    return bool(optima and np.ptp(costs) <= SAME_COST * np.abs(costs).min())
+
+
+def _nearly_same(one: Solution, other: Solution) -> bool:
+    """Whether motions on two grids are nearly the same."""
+    a, b = one.unknowns, other.unknowns
+    return bool(np.linalg.norm(a - b) <= NEARLY_SAME * np.linalg.norm(b))
 
 
 def _different(optima: Sequence[Solution]) -> list[Solution]:

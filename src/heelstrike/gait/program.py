@@ -423,7 +423,7 @@ class Program:
         if multipliers is not None:
             priced[: multipliers.size] = multipliers
         found = optimum_near(
-            self.in_bounds(guess), priced, slopes,
+            self.in_bounds(guess), priced, self._blocks.cost, slopes,
             lambda x, prices: self._blocks.second(x, 1.0, prices[:-2]),
             (lower - relaxed[0], upper + relaxed[1]),
         )  # fmt: skip

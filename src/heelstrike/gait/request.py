@@ -154,7 +154,9 @@ class Request:
             more = f"the robot's weight, {robot.weight:g} N, which"
             if self.slope:
                 more = f"the {carried:g} N of the robot's weight that, across this slope,"
-            raise GaitError(
+            # On less steep ground there may be such a gait.
+            refused = GaitError if self.force_margin >= robot.weight else InfeasibleGaitError
+            raise refused(
                 f"force_margin = {self.force_margin:g} N is more than {more} the ground carries on "
                 "average. Ask for less."
             )

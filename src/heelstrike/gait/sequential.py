@@ -25,6 +25,8 @@ STATIONARY = 1e-9
 """Size of the Lagrangian's gradient, relative to the cost's, that counts as zero."""
 SATISFIED = 1e-10
 """Violation of a scaled constraint that counts as zero."""
+NO_WORSE = 1e-8
+"""By how much more an optimum may cost than its start, relative to that: both are rounded."""
 NEARLY_DEPENDENT = 1e-10
 """Relative size of a diagonal entry of R from which on constraints depend on each other."""
 
@@ -32,7 +34,7 @@ Derivatives = tuple[Floats, Floats, Floats]
 
 
 def optimum_near(
-    start: Floats, multipliers: Floats,
+    start: Floats, multipliers: Floats, cost: Callable[[Floats], float],
     first: Callable[[Floats], Derivatives], second: Callable[[Floats, Floats], Floats],
     bounds: tuple[Floats, Floats],
 ) -> tuple[Floats, Floats] | None:  # fmt: skip
@@ -44,6 +46,8 @@ def optimum_near(
         Unknowns to begin from.
     multipliers : (m,) array
         Nearly the multipliers of the constraints, positive at upper bounds; zeros if unknown.
+    cost : callable
+        Returns f at unknowns.
     first : callable
         Returns ∇f (n,), the constraints g (m,) and their Jacobian (m, n) at unknowns.
     second : callable
@@ -54,19 +58,26 @@ def optimum_near(
     Returns
     -------
     tuple of two arrays, or None
-        Unknowns (n,) and multipliers (m,) of a strict local minimum; None if none was reached.
+        Unknowns (n,) and multipliers (m,) of a strict local minimum; None if none was reached, or
+        one that is worse than the start: steps are not damped, and may lead over a hill. What the
+        start breaks counts by the multipliers of the minimum, as in the exact penalty function of
+        S.-P. Han, *A Globally Convergent Method for Nonlinear Programming*, 1977.
     """
-    unknowns, priced, strict = start, multipliers, False
+    unknowns, priced, strict, begun = start, multipliers, False, np.zeros(0)
     lower, upper = bounds
     for step in range(MOST_STEPS + 1):
         slope, value, slopes = first(unknowns)
         if not all(np.isfinite(each).all() for each in (slope, value, slopes)):
             return None
-        missed = np.maximum(lower - value, value - upper).max(initial=0.0)
+        broken = np.maximum(np.maximum(lower - value, value - upper), 0.0)
+        begun = broken if step == 0 else begun
+        missed = broken.max(initial=0.0)
         apart = np.where(priced > 0.0, upper - value, value - lower)[priced != 0.0]
         rest = np.abs(slope + slopes.T @ priced).max() / max(1.0, np.abs(slope).max())
         if strict and max(missed, apart.max(initial=0.0)) <= SATISFIED and rest <= STATIONARY:
-            return unknowns, priced
+            worth = cost(start) + float(np.abs(priced) @ begun)
+            worse = cost(unknowns) > worth + NO_WORSE * max(1.0, abs(worth))
+            return None if worse else (unknowns, priced)
         if step == MOST_STEPS:
             break
         bend = second(unknowns, priced)
