@@ -72,7 +72,7 @@ def test_it_says_what_loops_say(
             change(problem, work)
             said.append(certified(work, problem, impulse))
             velocity = np.zeros(2 * (contacts + room))
-            at_once = weigh_at_once(problem, work.settings, impulse, work.scaling, velocity)
+            at_once = weigh_at_once(problem, work.settings, impulse, velocity, work.scaling)
             assert at_once == (symmetric and rows <= MOST_ROWS and len(problem.delassus) == rows)
         size = float(np.abs(impulse).max()) * 10.0
         for one, other in zip(*said, strict=True):
@@ -84,7 +84,7 @@ def test_rows_that_nothing_moves_are_left_to_loops() -> None:
     problem = contact_problem(1, count=1, delassus=np.diag([2.0, 0.0]), free=np.array([-1.0, 0.0]))
     answer = ContactAnswer.allocate(capacity=1, impulse=np.array([0.5, 0.0]))
     velocity = np.zeros(2)
-    assert not weigh_at_once(problem, work.settings, answer.impulse, work.scaling, velocity)
+    assert not weigh_at_once(problem, work.settings, answer.impulse, velocity, work.scaling)
     assert certify(problem, work.settings, work.scaling, answer) < 1e-14
     assert work.scaling.unit == pytest.approx(np.sqrt(0.5), rel=1e-15)
 

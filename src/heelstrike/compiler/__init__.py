@@ -4,7 +4,8 @@ Its doors, which other rooms import from:
 
 - ``bundle``: arrays and numbers by name, which kernels receive by address, and
   ``bundle_type``, the same in compiled code;
-- ``compilation``: ``kernel``, ``dissolved_kernel``, and how they are compiled, or left alone;
+- ``compilation``: ``kernel``, ``dissolved_kernel``, ``rare_kernel``, how they are compiled, or left
+  alone;
 - ``separate_kernel``: kernels compiled apart, called by their address;
 - ``straight_line``: kernels without loops, from what ``recordings`` keep of them, in which
   ``c_text`` writes the same in C;

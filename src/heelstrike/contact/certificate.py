@@ -113,7 +113,7 @@ def certify(
     count = problem.count
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
     root, slope = scaling.root, scaling.slope
-    at_once = weigh_at_once(problem, settings, impulse, scaling, velocity)
+    at_once = weigh_at_once(problem, settings, impulse, velocity, scaling)
     if not at_once:
         weigh(problem, settings, impulse, scaling)
     unit = scaling.unit
@@ -225,7 +225,7 @@ def note_size(unit: float, effort: float, scaling: Scaling) -> None:
 
 @kernel
 def weigh_at_once(
-    problem: ContactProblem, settings: Settings, impulse: Floats, scaling: Scaling, velocity: Floats
+    problem: ContactProblem, settings: Settings, impulse: Floats, velocity: Floats, scaling: Scaling
 ) -> bool:
     """Do what :func:`weigh` and :func:`sum_velocities` do by a program; return success.
 

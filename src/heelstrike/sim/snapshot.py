@@ -20,7 +20,7 @@ from heelstrike.robot.state import State
 from heelstrike.sim.image import Image
 
 _IDENTITY = "identity"
-_FORMAT = 10
+_FORMAT = 11
 
 
 @dataclass(frozen=True, eq=False)
