@@ -210,7 +210,6 @@ def optimize_motion(
     if refine:
         found = _refined(found)
         report(0.9)
-        found = _held_between(found)
     motion = motion_of(found.program, found.program.polished(found.unknowns), found.optimal)
     if refine:
         motion = _closed(found, motion, report)
@@ -600,24 +599,55 @@ def _again(program: MotionProgram, start: Floats, multipliers: Floats | None) ->
         If what is found violates a constraint.
     """
     unknowns, found, told = program.solve(start, multipliers)
+    if told["return_status"] != "Solve_Succeeded" and not program.falling:
+        return _again(replace(program, falling=True), start, multipliers)
     if np.abs(program.violations(unknowns)).max() > FEASIBLE:
         raise GaitNotFoundError(_not_found(program, unknowns))
     return _Found(program, unknowns, found, told["return_status"] == "Solve_Succeeded")
 
 
 def _refined(found: _Found) -> _Found:
-    """Double the pieces of phases in which points that stand move between the ends of pieces."""
+    """Add pieces where points slip, and instants where limits fail, until neither does.
+
+    As many pieces as it takes are there before the optimum is sought on them, and the instants at
+    which the motion fails that is known by then: each optimum costs far more than looking.
+    """
+    rounds = 0
+    while rounds < ROUNDS:
+        program, start, prices = found.program, found.unknowns, found.multipliers
+        finer, unknowns = _without_slip(program, start)
+        if finer is program:
+            rounds += 1
+        else:
+            program, start, prices = finer, unknowns, None
+        more = _with_failing(program, start, CLOSE if prices is None else CLOSER)
+        if more is None and program is found.program:
+            break
+        priced = None if prices is None or more is None else more.multipliers_of(program, prices)
+        found = _again(more or program, start, priced)
+    return found
+
+
+def _without_slip(program: MotionProgram, unknowns: Floats) -> tuple[MotionProgram, Floats]:
+    """Double the pieces of phases in which points that stand move between the ends of pieces.
+
+    Equations are satisfied on them by the least change of the unknowns. Pieces are doubled again
+    only where points move far less by that, but still too fast.
+    """
+    slips = np.full(len(program.request.phases), np.inf)
     while True:
-        program, unknowns = found.program, found.unknowns
-        before = tuple(phase.pieces for phase in program.request.phases)
-        pieces = tuple(
-            max(own, min(2 * own, MOST_PIECES)) if _slip(program, unknowns, p) > STILL else own
-            for p, own in enumerate(before)
-        )
+        before = [phase.pieces for phase in program.request.phases]
+        now = np.array([_slip(program, unknowns, p) for p in range(len(before))])
+        doubled = (now > STILL) & (now <= FAR_LESS * slips)
+        pieces = [
+            max(own, min(2 * own, MOST_PIECES)) if more else own
+            for own, more in zip(before, doubled.tolist(), strict=True)
+        ]
         if pieces == before:
-            return found
+            return program, unknowns
+        slips = np.where(doubled, now, slips)
         finer = _with_pieces(program, pieces)
-        found = _again(finer, finer.polished(_resampled(program, unknowns, finer)), None)
+        program, unknowns = finer, finer.polished(_resampled(program, unknowns, finer))
 
 
 def _with_pieces(program: MotionProgram, pieces: Sequence[int]) -> MotionProgram:
@@ -752,6 +782,8 @@ MOST_HALVED = 192
 """Pieces that a phase may come to have where they are halved, so that a motion closes."""
 STILL = 3e-4
 """Velocity (m/s) that a point that stands may have between the ends of pieces."""
+FAR_LESS = 0.25
+"""Share of the velocity before that is left where more pieces help."""
 MOST_PIECES = 48
 """Pieces of a phase beyond which the mesh is not refined."""
 
