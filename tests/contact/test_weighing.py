@@ -21,6 +21,10 @@ from heelstrike.contact.workspace import (
 )
 
 
+CANCELS = 3
+"""Of what a certificate writes, the first are differences: worst, velocities, residuals."""
+
+
 def random_problem(draw: Any, contacts: int, room: int, stop: bool) -> ContactProblem:
     """Contacts of a body, in memory for some more; the last may be a stop."""
     rows = 2 * contacts - stop
@@ -60,7 +64,7 @@ def certified(work: ContactWorkspace, problem: ContactProblem, impulse: Any) -> 
 def test_it_says_what_loops_say(
     contacts: int, stop: bool, room: int, change: Callable[[Any, Any], None]
 ) -> None:
-    """In memory of that size or more, with a stop, under a floor; some have too many rows."""
+    """In memory of that size; loops say it where there is more, a stop of one row, or too many."""
     draw = np.random.default_rng([contacts, stop, room])
     for _ in range(5):
         problem = random_problem(draw, contacts, room, stop)
@@ -75,8 +79,10 @@ def test_it_says_what_loops_say(
             at_once = weigh_at_once(problem, work.settings, impulse, velocity, work.scaling)
             assert at_once == (symmetric and rows <= MOST_ROWS and len(problem.delassus) == rows)
         size = float(np.abs(impulse).max()) * 10.0
-        for one, other in zip(*said, strict=True):
-            np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-13 * size)
+        for place, (one, other) in enumerate(zip(*said, strict=True)):
+            # What is left of sums that cancel is as exact as their terms, all else as it is itself.
+            left = 1e-13 * size if place < CANCELS else 0.0
+            np.testing.assert_allclose(one, other, rtol=1e-12, atol=left)
 
 
 def test_rows_that_nothing_moves_are_left_to_loops() -> None:
