@@ -20,7 +20,6 @@ from heelstrike.contact.workspace import (
     contact_problem,
 )
 
-
 CANCELS = 3
 """Of what a certificate writes, the first are differences: worst, velocities, residuals."""
 

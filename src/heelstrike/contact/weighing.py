@@ -61,10 +61,9 @@ def weigh_rows(
 
 @lru_cache(maxsize=1)
 def weighing_programs() -> NDArray[np.int64]:
-    """Addresses of the programs by the number of rows, (MOST_ROWS + 1,); there is none for zero,
-    nor for an odd number.
+    """Addresses of the programs by the number of rows, (MOST_ROWS + 1,).
 
-    Read-only: all workspaces share them.
+    There is none for zero rows, nor for an odd number. Read-only: all workspaces share them.
     """
     programs = np.zeros(MOST_ROWS + 1, dtype=np.int64)
     programs[2::2] = straight_line_code(
