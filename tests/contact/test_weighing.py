@@ -112,3 +112,14 @@ def test_a_matrix_that_is_not_quite_symmetric_is_taken_as_it_is() -> None:
     solution = solve_contact(matrix, [-1.0, 0.1], 0.9)
     impulse, velocity = solution.impulse.ravel(), solution.velocity.ravel()
     np.testing.assert_allclose(velocity, matrix @ impulse + [-1.0, 0.1], atol=1e-15)
+
+
+def test_what_slides_as_prescribed_does_not_excuse_the_contacts_after_it() -> None:
+    problem = contact_problem(
+        2, count=2, delassus=np.eye(4), free=np.array([-1.0, 0.0] * 2), friction=np.full(2, 0.5)
+    )
+    answer = ContactAnswer.allocate(capacity=2, impulse=np.array([1.0, -0.5, 1.0, 0.9]))
+    work = contact_workspace(2)
+    work.scaling.slope[0] = -0.5
+    certify(problem, work.settings, work.scaling, answer)
+    assert answer.residual[1] == pytest.approx(0.4, rel=1e-12)
