@@ -25,7 +25,7 @@ STATIONARY = 1e-9
 """Size of the Lagrangian's gradient, relative to the cost's, that counts as zero."""
 SATISFIED = 1e-10
 """Violation of a scaled constraint that counts as zero."""
-NO_WORSE = 1e-8
+DEARER_BY_ROUNDING = 1e-8
 """By how much more an optimum may cost than its start with what that breaks, relative to the sizes
 of both: costs are rounded."""
 NEARLY_DEPENDENT = 1e-10
@@ -77,7 +77,7 @@ def optimum_near(
         rest = np.abs(slope + slopes.T @ priced).max() / max(1.0, np.abs(slope).max())
         if strict and max(missed, apart.max(initial=0.0)) <= SATISFIED and rest <= STATIONARY:
             before, allowed = cost(start), float(np.abs(priced) @ begun)
-            most = before + allowed + NO_WORSE * (abs(before) + allowed)
+            most = before + allowed + DEARER_BY_ROUNDING * (abs(before) + allowed)
             return (unknowns, priced) if cost(unknowns) <= most else None  # None if it is NaN
         if step == MOST_STEPS:
             break
