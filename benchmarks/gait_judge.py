@@ -1,4 +1,4 @@
-"""Found gaits, judged by equations and a program that share no code with their design.
+"""Found gaits, judged by equations and a program of their own.
 
     python benchmarks/gait_judge.py RESULTS.jsonl              # 21 of the 200 requests
     python benchmarks/gait_judge.py RESULTS.jsonl --most 40    # as many
@@ -18,6 +18,11 @@ The requests are those of `benchmarks/gait_requests.py`, drawn so that each robo
   accelerations, forces and torques at 51 instants are unknowns. On flat feet joints follow one
   cubic each, as in the design, whose ranges and heights of the foot in the air are looked at at 501
   instants; on points Hermite and Simpson's rule joins them. Other limits hold at its instants only.
+
+The package gives what the judge does not make itself: the request with its defaults, the starts,
+the mirror image, and the height of the clearance profile. An error in those is not found. Requests
+that are not drawn, or of which no gait was found, are not confirmed: nothing here shows that there
+is no gait.
 
 Results are added to the file line by line, and what is in it already is not done again.
 """

@@ -166,6 +166,13 @@ def test_the_ground_does_not_carry_more_than_the_weight(bravo7: hs.Robot) -> Non
         assert not isinstance(caught.value, hs.InfeasibleGaitError)
 
 
+@pytest.mark.usefixtures("never")
+def test_a_family_without_any_gait_is_refused(bravo7: hs.Robot) -> None:
+    margin = 0.8 * bravo7.weight
+    with pytest.raises(hs.InfeasibleGaitError, match="across this slope"):
+        hs.gait_family(bravo7, slope=[0.8, 0.9], **STEP, force_margin=margin, friction=2.0)
+
+
 @pytest.mark.parametrize(
     ("phases", "asked", "said"),
     [

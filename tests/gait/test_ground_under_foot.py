@@ -61,6 +61,16 @@ def test_the_steps_are_those_that_were_designed(walked: tuple[hs.Gait, hs.Run]) 
     np.testing.assert_allclose(np.subtract(late, early), expected, atol=2e-5)  # of interpolation
 
 
+@pytest.mark.slow
+def test_high_stairs_are_descended(bravo7: hs.Robot) -> None:
+    """Here the phase at which the foot is too low moves with every instant that is added."""
+    gait = hs.optimize_gait(
+        bravo7, step_length=0.35, step_duration=0.80, rise=-0.10, clearance=0.02
+    )
+    assert gait.optimal
+    assert gait.margins.clearance >= -1e-9
+
+
 def test_a_file_keeps_the_ground(walked: tuple[hs.Gait, hs.Run], tmp_path) -> None:  # type: ignore[no-untyped-def]
     gait, _ = walked
     gait.save(tmp_path / "gait.json")

@@ -117,6 +117,33 @@ def test_what_the_start_breaks_counts() -> None:
     np.testing.assert_allclose(found[0], 1.0, rtol=0, atol=1e-9)
 
 
+def test_a_cost_that_is_not_a_number_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The derivatives lead to the optimum, at which the cost has no value."""
+
+    def found(cost: float) -> object:
+        return optimum_near(
+            np.array([0.5]), np.zeros(1), lambda at: cost if at[0] > 0.9 else 1.0,
+            lambda at: (2.0 * (at - 1.0), np.zeros(1), np.zeros((1, 1))),
+            lambda _, __: np.full((1, 1), 2.0), (np.array([-1.0]), np.array([1.0])),
+        )  # fmt: skip
+
+    assert found(0.0) is not None
+    assert found(np.nan) is None
+
+
+@pytest.mark.parametrize("unit", [1e-12, 1.0, 1e12])
+def test_how_much_dearer_is_relative_to_the_cost(unit: float) -> None:
+    def found(more: float) -> object:
+        return optimum_near(
+            np.array([0.5]), np.zeros(1), lambda at: unit * (1.0 + more * (at[0] > 0.9)),
+            lambda at: (2.0 * (at - 1.0), np.zeros(1), np.zeros((1, 1))),
+            lambda _, __: np.full((1, 1), 2.0), (np.array([-1.0]), np.array([1.0])),
+        )  # fmt: skip
+
+    assert found(1e-9) is not None
+    assert found(1e-7) is None
+
+
 def test_a_maximum_along_a_constraint_is_none() -> None:
     """On the circle, (1, 0) is stationary, and the most."""
     found = solved(lambda x: (x[0], casadi.sumsqr(x)), [0.98, 0.05], [1.0], [1.0])

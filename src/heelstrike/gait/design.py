@@ -31,6 +31,9 @@ SAME_COST = 1e-6
 NEARLY_SAME = 0.1
 """Distance between motions on two grids, relative to their size, within which they count as one:
 the same optimum is off by 0.04, another one by more than 1, of the robot that has several."""
+NEARLY_SAME_COST = 1e-3
+"""Relative difference of the costs of the same optimum on two grids: that of the coarse one has ten
+digits in most gaits."""
 NEARLY_BEST = 0.1
 """How much dearer than the best of them one may be, relative to it, that is solved on the whole
 grid, too: there the order may be another."""
@@ -57,17 +60,21 @@ def designed(request: Request, profile: ClearanceProfile, report: Callable[[floa
 def between(request: Request, corners: Sequence[tuple[Gait, float]]) -> Gait:
     """Gait between others: the optimum near the mean of their motions, which count by weights.
 
-    If it is not reached, the mean is changed as little as makes it satisfy all equations of a step.
+    If none is reached, nor with the request's further profiles, the mean is changed as little as
+    makes it satisfy all equations of a step.
     """
     profiles = {gait.clearance_profile for gait, _ in corners}
     profile = ClearanceProfile.SMOOTH if len(profiles) > 1 else profiles.pop()
     program = Program(request, transcribed(request), profile, *first_instants(request))
     mean = np.sum([weight * program.resampled(gait) for gait, weight in corners], axis=0)
     mean = program.in_bounds(mean)
-    near = replace(program, near=True).solve(mean)
-    if near.converged:
-        with suppress(GaitNotFoundError):  # it breaks limits between the instants
-            return designed_gait(program, *held_between_nodes(program, near))
+    given = request.profiles
+    further = given[given.index(profile) + 1 :] if profile in given else ()  # ask less of the foot
+    for each in (program, *(replace(program, profile=other) for other in further)):
+        near = replace(each, near=True).solve(mean)
+        if near.converged:
+            with suppress(GaitNotFoundError):  # it breaks limits between the instants
+                return designed_gait(each, *held_between_nodes(each, near, near_only=True))
     return designed_gait(program, program.polished(mean, within_limits=False), optimal=False)
 
 
@@ -94,9 +101,9 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
         inside = [replace(rough, inside=True).solve(feasible)]
         solutions = [rough.solve(guesses[0])]
     whole: list[Solution] = []
-    # Where another profile was too much for the foot, there often are several optima, of which the
+    # Where the parabola is too much for the foot, there often are several optima, of which the
     # coarse grid may have but one.
-    hard = rough is not program and program.profile is not request.profiles[0]
+    hard = rough is not program and program.profile is ClearanceProfile.SMOOTH
     for k, guess in enumerate(guesses[1:]):
         report(0.05 + 0.7 * (k + 1) / len(guesses))
         last = k + 2 == len(guesses)
@@ -129,9 +136,11 @@ def _agree(solutions: Sequence[Solution]) -> bool:
 
 
 def _nearly_same(one: Solution, other: Solution) -> bool:
-    """Whether motions on two grids are nearly the same."""
+    """Whether motions on two grids are nearly the same, and cost nearly the same."""
     a, b = one.unknowns, other.unknowns
-    return bool(np.linalg.norm(a - b) <= NEARLY_SAME * np.linalg.norm(b))
+    near = np.linalg.norm(a - b) <= NEARLY_SAME * np.linalg.norm(b)
+    dearer = abs(one.objective - other.objective)
+    return bool(near and dearer <= NEARLY_SAME_COST * abs(other.objective))
 
 
 def _different(optima: Sequence[Solution]) -> list[Solution]:

@@ -6,7 +6,6 @@ import enum
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from contextlib import suppress
 from itertools import product
 from os import PathLike
 from pathlib import Path
@@ -75,10 +74,12 @@ class GaitFamily:
         """Gait between those of the grid.
 
         The motions of the gaits at the corners of the cell are interpolated linearly. From there
-        the optimiser goes to the nearest optimum, which holds all limits. If it does not get there,
-        the interpolated motion is changed as little as makes it satisfy all equations of a step:
-        the foot lands in its place, and the velocities after the impact are those with which the
-        step began. Limits are not enforced then; `gait.margins` tells how far they are.
+        the optimiser looks for an optimum nearby that holds all limits, and does not start from
+        other motions. If it finds none, it tries the smooth profile of the swing foot's clearance,
+        unless a profile was asked for. If that fails, too, the interpolated motion is changed as
+        little as makes it satisfy all equations of a step: the foot lands in its place, and the
+        velocities after the impact are those with which the step began. Limits are not enforced
+        then; `gait.margins` tells how far they are.
 
         Parameters
         ----------
@@ -208,6 +209,8 @@ def gait_family(
     ------
     GaitError
         If no argument is a sequence, or the file holds another family.
+    InfeasibleGaitError
+        If no point of the grid can have a gait.
 
     Examples
     --------
@@ -251,9 +254,14 @@ def gait_family(
     settled: set[Pair] = set()
     family = GaitFamily(robot, axes, _as_written({**asked, **fixed}), gaits, gaps, settled)
     places = list(_from_the_middle([axis.size for axis in axes.values()]))
+    refused: list[InfeasibleGaitError] = []
     for place in places:  # what makes no sense anywhere is refused before anything is designed
-        with suppress(InfeasibleGaitError):
+        try:
             request_of(robot, **family.asked, **_point(axes, place))
+        except InfeasibleGaitError as error:
+            refused.append(error)
+    if len(refused) == len(places):
+        raise refused[-1]
     if file is not None and Path(file).exists():
         saved = load_gait_family(file, robot)
         _check_same(family, saved)

@@ -132,8 +132,10 @@ class Gait(ShownInNotebooks):
     """What the optimiser was asked to make least, over one step, in its own unit; None in gaits of
     which only the torque cost is known."""
     optimal: bool = True
-    """Whether it is an optimum. A gait that is not satisfies all constraints nevertheless; a better
-    one may exist."""
+    """Whether it is an optimum. A gait of :func:`heelstrike.optimize_gait` that is not
+    satisfies all constraints nevertheless; a better one may exist. One of
+    :meth:`heelstrike.GaitFamily.at` that is not satisfies the equations of a step, but may break
+    limits; `margins` tells how far."""
     rise: float = 0.0
     """By how much (m) every foothold is higher than the one before, on level stairs."""
 

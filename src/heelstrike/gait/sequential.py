@@ -25,8 +25,9 @@ STATIONARY = 1e-9
 """Size of the Lagrangian's gradient, relative to the cost's, that counts as zero."""
 SATISFIED = 1e-10
 """Violation of a scaled constraint that counts as zero."""
-NO_WORSE = 1e-8
-"""By how much more an optimum may cost than its start, relative to that: both are rounded."""
+DEARER_BY_ROUNDING = 1e-8
+"""By how much more an optimum may cost than its start with what that breaks, relative to the sizes
+of both: costs are rounded."""
 NEARLY_DEPENDENT = 1e-10
 """Relative size of a diagonal entry of R from which on constraints depend on each other."""
 
@@ -75,9 +76,9 @@ def optimum_near(
         apart = np.where(priced > 0.0, upper - value, value - lower)[priced != 0.0]
         rest = np.abs(slope + slopes.T @ priced).max() / max(1.0, np.abs(slope).max())
         if strict and max(missed, apart.max(initial=0.0)) <= SATISFIED and rest <= STATIONARY:
-            worth = cost(start) + float(np.abs(priced) @ begun)
-            worse = cost(unknowns) > worth + NO_WORSE * max(1.0, abs(worth))
-            return None if worse else (unknowns, priced)
+            before, allowed = cost(start), float(np.abs(priced) @ begun)
+            most = before + allowed + DEARER_BY_ROUNDING * (abs(before) + allowed)
+            return (unknowns, priced) if cost(unknowns) <= most else None  # None if it is NaN
         if step == MOST_STEPS:
             break
         bend = second(unknowns, priced)

@@ -593,17 +593,42 @@ def _not_found(program: MotionProgram, unknowns: Floats) -> str:
 def _again(program: MotionProgram, start: Floats, multipliers: Floats | None) -> _Found:
     """Solve from nearly an optimum.
 
+    Where a barrier that follows the problem reaches no optimum, or one that is dearer than the
+    start, one that only falls is tried, too, and the better of both is returned.
+
     Raises
     ------
     GaitNotFoundError
         If what is found violates a constraint.
     """
-    unknowns, found, told = program.solve(start, multipliers)
-    if told["return_status"] != "Solve_Succeeded" and not program.falling:
-        return _again(replace(program, falling=True), start, multipliers)
-    if np.abs(program.violations(unknowns)).max() > FEASIBLE:
-        raise GaitNotFoundError(_not_found(program, unknowns))
-    return _Found(program, unknowns, found, told["return_status"] == "Solve_Succeeded")
+
+    def solved(by: MotionProgram) -> _Found:
+        unknowns, prices, told = by.solve(start, multipliers)
+        return _Found(program, unknowns, prices, told["return_status"] == "Solve_Succeeded")
+
+    found = solved(program)
+    if not program.falls:
+        begun = _Found(program, start, None, False)
+        dearer = _cost_of(found) > _cost_of(begun) + NO_DEARER * abs(_cost_of(begun))
+        if not found.optimal or (dearer and _satisfied(begun)):
+            falling = solved(replace(program, falling=True))
+            found = min(
+                (found, falling),
+                key=lambda each: (not _satisfied(each), not each.optimal, _cost_of(each)),
+            )
+    if not _satisfied(found):
+        raise GaitNotFoundError(_not_found(program, found.unknowns))
+    return found
+
+
+NO_DEARER = 1e-9
+"""By how much more, relative to it, an optimum may cost than a start that satisfies all
+constraints: both are rounded."""
+
+
+def _satisfied(found: _Found) -> bool:
+    """Whether all constraints of its program are satisfied."""
+    return bool(np.abs(found.program.violations(found.unknowns)).max() <= FEASIBLE)
 
 
 def _refined(found: _Found) -> _Found:

@@ -236,6 +236,14 @@ class MotionProgram:
         return int(self._ends[-1])
 
     @property
+    def falls(self) -> bool:
+        """Whether the barrier only falls.
+
+        Near a motion of least energy one that follows the problem led to a dearer one.
+        """
+        return self.falling or (self.near > 0.0 and self.powers > 0)
+
+    @property
     def powers(self) -> int:
         """How many powers of motors have bounds."""
         return 0 if self.rounded else self.functions.powers
@@ -380,13 +388,11 @@ class MotionProgram:
         price, prices = casadi.MX.sym("price"), casadi.MX.sym("prices", len(places))
         all_prices = casadi.MX(g.numel(), 1)
         all_prices[places] = prices
-        # Near a motion of least energy one that follows the problem led to a dearer one.
-        falls = self.falling or (self.near > 0.0 and self.powers > 0)
         return Ipopt(
             x, f, g[places], gradient=blocks.gradient(x), jacobian=blocks.jacobian(x)[places, :],
             hessian=(price, prices, blocks.hessian(x, price, all_prices)),
             settings=(NEAR | {"mu_init": self.near} if self.near else SETTINGS)
-            | (MORE_ITERATIONS if falls else MORE_ITERATIONS | ADAPTIVE),
+            | (MORE_ITERATIONS if self.falls else MORE_ITERATIONS | ADAPTIVE),
         )  # fmt: skip
 
     def _gaps(self, phases: list[PhaseUnknowns]) -> list[Any]:
