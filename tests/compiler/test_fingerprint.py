@@ -160,8 +160,14 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, st
     return home, fingerprints(home)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("case", EDITS)
+QUICK = ("words", "a kernel that is called", "a constant in another file")
+"""Edits that stand for all where time is short."""
+
+
+@pytest.mark.parametrize(
+    "case",
+    [each if each in QUICK else pytest.param(each, marks=pytest.mark.slow) for each in EDITS],
+)
 def test_an_edit_changes_what_it_must(copied: tuple[Path, dict[str, str]], case: str) -> None:
     home, before = copied
     edits, expected = EDITS[case]

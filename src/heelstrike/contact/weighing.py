@@ -1,6 +1,6 @@
 """What a certificate weighs rows by, and the velocities of an impulse, as straight-line code.
 
-One program for each number of rows, for all robots.
+One program for each even number of rows, for all robots.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ from heelstrike.compiler.straight_line import straight_line_code
 from heelstrike.contact.workspace import Floats
 
 MOST_ROWS = 10
-"""Rows of the largest problem with a program; its length grows with the square of their number."""
+"""Rows of the largest problem with a program; its length grows with the square of their number.
+
+Matrices are laid out for whole contacts of two rows, so that an odd number never fills one.
+"""
 
 
 @kernel
@@ -29,7 +32,7 @@ def weigh_rows(
     Parameters
     ----------
     delassus : (n, n) float
-        Semidefinite.
+        Symmetric: its columns are read as rows.
     free, impulse : (n,) float
     root : (n,) float
         Receives ``g = sqrt(diag G)``.
@@ -58,12 +61,12 @@ def weigh_rows(
 
 @lru_cache(maxsize=1)
 def weighing_programs() -> NDArray[np.int64]:
-    """Addresses of the programs by the number of rows, (MOST_ROWS + 1,); there is none for zero.
+    """Addresses of the programs by the number of rows, (MOST_ROWS + 1,).
 
-    Read-only: all workspaces share them.
+    There is none for zero rows, nor for an odd number. Read-only: all workspaces share them.
     """
     programs = np.zeros(MOST_ROWS + 1, dtype=np.int64)
-    programs[1:] = straight_line_code(
+    programs[2::2] = straight_line_code(
         [
             Program(
                 weigh_rows,
@@ -75,7 +78,7 @@ def weighing_programs() -> NDArray[np.int64]:
                 name=f"weigh_{rows}",
                 side_by_side=True,
             )
-            for rows in range(1, MOST_ROWS + 1)
+            for rows in range(2, MOST_ROWS + 1, 2)
         ]
     )
     programs.flags.writeable = False

@@ -114,7 +114,7 @@ class Scaling(Bundle):
 
 
 class StickingRows(Bundle):
-    """The rows that shall have no velocity, where all contacts stick or are open."""
+    """The rows that shall have no velocity: of what presses, and of what sticks."""
 
     row: Integers = array("2 capacity", of=int)
     """Row of the problem of each equation."""

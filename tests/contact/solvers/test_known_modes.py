@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
-from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
-from heelstrike.contact.problem import solve_contact
+from heelstrike.contact.modes import LEMKE, OPEN, SLIP_BACKWARD, SLIP_FORWARD, SOLVED, STICK
+from heelstrike.contact.problem import solve_contact, solve_contact_kernel
+from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.solvers.known_modes import repeat
 from heelstrike.contact.workspace import ContactAnswer, contact_problem
@@ -97,6 +98,34 @@ def test_what_slips_goes_on_slipping() -> None:
         assert answer.mode.tolist() == [*general.mode]
         np.testing.assert_allclose(answer.impulse, general.impulse.ravel(), atol=1e-11)
     assert seen == {OPEN, STICK, SLIP_FORWARD, SLIP_BACKWARD}
+
+
+def test_stops_lines_and_dry_joints_go_on_beside_what_slips() -> None:
+    """Of all kinds, as Lemke's method has it; dry joints slip, too."""
+    draw, held, slid = np.random.default_rng(11), 0, 0
+    for _ in range(150):
+        kind = draw.choice([CONE, HALF_LINE, LINE, INTERVAL], 4)
+        jacobian = draw.standard_normal((8, 9))
+        jacobian[1::2][(kind == HALF_LINE) | (kind == LINE)] = 0.0
+        jacobian[0::2][kind == INTERVAL] = 0.0
+        problem = contact_problem(
+            4, count=4, delassus=jacobian @ jacobian.T, free=jacobian @ draw.standard_normal(9),
+            friction=np.select([kind == CONE, kind == INTERVAL], [0.3, 1.0]),
+            bound=np.full(4, 0.1), set=kind,
+        )  # fmt: skip
+        work, solution = contact_workspace(4), ContactAnswer.allocate(capacity=4)
+        if solve_contact_kernel(np.array([LEMKE]), problem, work, solution) != SOLVED:
+            continue
+        slips = np.isin(solution.mode, [SLIP_FORWARD, SLIP_BACKWARD])
+        if not np.any(slips & (kind == CONE)):
+            continue
+        answer = ContactAnswer.allocate(capacity=4, mode=solution.mode)
+        if repeat(problem, work.settings, work.sticking, work.scaling, answer):
+            held += 1
+            slid += bool(np.any(slips & (kind == INTERVAL)))
+            np.testing.assert_allclose(answer.impulse, solution.impulse, atol=1e-10)
+    assert held >= 50
+    assert slid >= 25
 
 
 def test_what_comes_to_rest_sticks_at_the_next_try() -> None:

@@ -50,7 +50,7 @@ RESTING = 5.0
 which way: where it may rest, its dry friction may be anything up to its size."""
 SETTLED_FIT = 0.02
 """Standard deviations by which no parameter changes any more."""
-NO_WORSE = 1e-7
+ROUNDED_RISE = 1e-7
 """Rise of the mean square that is rounding."""
 SHORTEST_STEP = 1e-3
 """Part of a step below which it is taken, whatever comes of it."""
@@ -160,7 +160,7 @@ class Fitting:
             matrix, squares = found.matrix + known, found.squares
             right = found.right + known @ (there - begun)
             away = squares + float((there - begun) @ known @ (there - begun))
-            if away > least + NO_WORSE * found.rows and part > SHORTEST_STEP:
+            if away > least + ROUNDED_RISE * found.rows and part > SHORTEST_STEP:
                 part *= 0.5  # too far: a shorter step from where it began
             else:
                 least, part = away, 1.0

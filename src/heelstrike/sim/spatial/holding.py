@@ -67,7 +67,7 @@ TERMS = 3
 """How many terms of the series are added up. What holds least, dry friction alone, has q of 1e-5 to
 1e-4, and four times their cube is left."""
 
-HELD = 1e-13
+NOTHING_LEFT = 1e-13
 """Velocities, of data of size one, of what sticks below which nothing is to be gained."""
 
 WELL_ROUNDED = 1e-11
@@ -284,7 +284,7 @@ def goes_on_holding(
             give_impulses(problem, scaled, iterate.x, answer)
             residual = certify_along(model, factor, problem, last, rows, scaled, holding, answer)
             left = take_velocities(problem, scaled, answer, mode, u)
-            if left <= HELD or left > STAGNANT * before:
+            if left <= NOTHING_LEFT or left > STAGNANT * before:
                 break
             before = left
         if answer.residual <= STUCK and residual <= solver.settings.tolerance:

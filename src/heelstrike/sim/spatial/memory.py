@@ -128,7 +128,7 @@ class SpatialHolding(Bundle):
     """Their matrix and its factor."""
     part: Floats = array("nv")
     along: Floats = array("nv")
-    """part, along: Impulses along the velocities, and what is added up to them."""
+    """part, along: A term of the impulses along the velocities, and the sum of all terms."""
     change: Floats = array("nv")
     """Change of the velocities that impulses make."""
     weighted: Floats = array("capacity")
