@@ -31,6 +31,12 @@ METHODS = {
     "event-driven": hs.EventDriven(rtol=1e-10, atol=1e-12),
     "compliant": hs.Compliant(rtol=1e-8, atol=1e-10),
 }
+QUICK = "time stepping"
+"""The method that stands for all where time is short."""
+EACH = [
+    pytest.param(method, id=name, marks=() if name == QUICK else pytest.mark.slow)
+    for name, method in METHODS.items()
+]
 
 
 def pendulum() -> Robot:
@@ -43,7 +49,7 @@ def swinging(method: Any) -> hs.Simulation:
     return hs.Simulation(robot, state=state, method=method, stop_when_fallen=False)
 
 
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("method", EACH)
 def test_a_pendulum_braked_in_mid_swing_stays_where_it_is(method: Any) -> None:
     """It is held with m g l sin θ, and has lost what it moved with, ½ I ω²."""
     simulation = swinging(method)
@@ -74,7 +80,7 @@ def test_a_pendulum_braked_in_mid_swing_stays_where_it_is(method: Any) -> None:
         assert np.abs(balance.residual).max() < 1e-6
 
 
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("method", EACH)
 def test_a_brake_lets_go_on_command(method: Any) -> None:
     """From rest where it was held, as a pendulum that begins there."""
     simulation = swinging(method)
@@ -122,7 +128,7 @@ def slipping(limit: float = LIMIT, dry_friction: float = 0.0) -> Robot:
     return build.build()
 
 
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("method", EACH)
 def test_a_brake_that_slips_slows_down_and_holds_then(method: Any) -> None:
     """It stops where ½ I ω² and the weight's work are τ Δθ, and holds it with m g l sin θ then.
 
@@ -167,7 +173,7 @@ def test_a_brake_that_slips_slows_down_and_holds_then(method: Any) -> None:
     assert simulation.record.friction_torque[-1, 0] == pytest.approx(5.0, abs=1e-3)
 
 
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("method", EACH)
 def test_a_brake_that_slips_holds_up_to_its_limit(method: Any) -> None:
     """One per cent above the weight, and one below."""
     weight = MASS * 9.81 * LENGTH * np.sin(0.7)
@@ -336,7 +342,7 @@ def test_a_brake_takes_hold_with_the_ground_under_the_foot() -> None:
     assert away["fine"] < 0.05 * away["coarse"] < 0.05
 
 
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("method", EACH)
 def test_two_brakes_stop_a_loop_that_one_would_stop(method: Any) -> None:
     """Four bars have one way to move: brakes of crank and rocker are told the same twice."""
     build = RobotBuilder("four_bar")

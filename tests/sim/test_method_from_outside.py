@@ -36,6 +36,8 @@ from heelstrike.sim import (
     solve_mass_matrix,
 )
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 
 class Numbers(hs.Bundle):
     """What the kernels read."""

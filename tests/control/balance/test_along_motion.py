@@ -14,6 +14,8 @@ from heelstrike import dynamics
 from heelstrike.control.balance.shifted_feet import LEG_DAMPING, shift_leg
 from heelstrike.gait.gait import fingerprint
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 FAST = 2.2
 AWAY = 0.02
 """Largest error of joints (rad) in a state that is not on the motion."""

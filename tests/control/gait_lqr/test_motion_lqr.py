@@ -15,6 +15,8 @@ from heelstrike.control.gait_lqr.phases import PhasedOrbit
 from heelstrike.control.gait_lqr.phases_law import first_level
 from heelstrike.sim.controller.interface import Contacts
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 SPEED = 2.0
 
 

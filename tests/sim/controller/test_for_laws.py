@@ -114,6 +114,7 @@ def run_of(controller: Any, *, duration: float = 0.02, **options: Any) -> hs.Run
     return hs.simulate(walking.bravo7(), controller, state=start, duration=duration, **options)
 
 
+@pytest.mark.slow
 def test_a_law_of_parts_solves_equations_and_programmes() -> None:
     run = run_of(law())
     assert run.completed, run.message

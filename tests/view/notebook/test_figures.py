@@ -17,10 +17,10 @@ from PIL import Image
 
 from heelstrike.view.comparison_figure import draw_comparison
 
+pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
+
 SETUP = """
 import heelstrike as hs
-
-pytestmark = pytest.mark.slow  # left to `make test` by continuous integration
 robot = hs.load_robot("bravo7")
 run = hs.simulate(robot, state=robot.reference_state(), duration=0.01)
 run.plot("zmp")

@@ -109,7 +109,7 @@ def test_a_fall_names_what_came_first() -> None:
     verdict = judge(falls.run_of("pushed forwards"), walking.gait())
     assert not verdict.good
     first, why, change = re.split(r"\. (?=First|To)", verdict.headline)
-    time = re.match(r"bravo7 falls at ([\d.]+) s, after 2 steps", first)
+    time = re.match(r"bravo7 falls at ([\d.]+) s, after [2-4] steps", first)
     assert time is not None, first
     assert float(time[1]) == pytest.approx(1.8, abs=0.1)
     assert why.startswith("First cause: the left foot tips over its toe at 1.0")

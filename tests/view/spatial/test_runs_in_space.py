@@ -158,6 +158,7 @@ def embedded(path: Path) -> dict[str, object]:
     return json.loads(found[1])
 
 
+@pytest.mark.slow
 def test_a_page_holds_the_run(run: hs.sim.spatial.SpatialRun, tmp_path: Path) -> None:
     path = run.save_html(tmp_path / "run.html", command="heelstrike simulate <x>")
     text = path.read_text(encoding="utf-8")

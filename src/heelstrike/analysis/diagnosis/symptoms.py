@@ -50,6 +50,8 @@ ON_HEEL, FLAT, ON_TOE, NOTHING_PUSHES = -1, 0, 1, 9
 EARLY, LATE, LATE_UNSEEN = 0.85, 1.1, 1.3
 """Parts of a step before which a foot lands early, and after which late: of a gait, or of the steps
 of the run."""
+ENOUGH_STEPS = 3
+"""Steps of a run of no known gait from which it is known how long a step takes."""
 EARLY_ON_RISE = 0.97
 """The first of them where the ground rises under the foot, which makes it land early."""
 TOUCHES = 1e-3
@@ -179,14 +181,24 @@ class Walk:
         """How long a step takes, in s: of the gait, or as usual in the run."""
         if self.gait is not None:
             return float(self.gait.step_duration)
-        if len(self.landings) > 3:
+        if len(self.landings) > ENOUGH_STEPS:
             return float(np.median(np.diff(self.landings)))
         return STEP_OF_HEIGHT * self.pace
+
+    def usual_before(self, count: int) -> float:
+        """How long a step takes, in s: of the gait, or usually in so many steps if they are enough.
+
+        Those after it may be the short ones of a fall, beside which any would be late.
+        """
+        if self.gait is None:
+            before = np.diff(self.landings[: count + 1])
+            return float(np.median(before)) if len(before) >= ENOUGH_STEPS else np.inf
+        return self.step_duration
 
     @cached_property
     def steps_known(self) -> bool:
         """Whether it is known that the robot means to step, and how fast."""
-        return self.gait is not None or len(self.landings) > 3
+        return self.gait is not None or len(self.landings) > ENOUGH_STEPS
 
     @cached_property
     def speed(self) -> float:
@@ -435,10 +447,11 @@ def _late_landings(walk: Walk) -> Iterator[Symptom]:
     run = walk.run
     if not walk.steps_known:
         return
-    for landed, following in pairwise((*walk.landings, float(run.time[-1]))):
-        late = (following - landed) / walk.step_duration
+    for count, (landed, following) in enumerate(pairwise((*walk.landings, float(run.time[-1])))):
+        usual = walk.usual_before(count)
+        late = (following - landed) / usual
         if late > (LATE_UNSEEN if walk.gait is None else LATE):
-            due = landed + walk.step_duration
+            due = landed + usual
             row = min(int(np.searchsorted(run.time, due - 1e-9)), len(run.time) - 1)
             feet = [run.gap[row, list(foot.contacts)].min() for foot in run.robot.feet]
             swing = int(np.argmax(feet)) if feet else -1
