@@ -35,7 +35,7 @@ def held_between_nodes(
     solution : Solution
         Its optimum, or a point that satisfies its constraints.
     near_only : bool
-        Whether to give up where no optimum is found near the last, instead of beginning anew.
+        Whether to give up where no optimum is found near the last, instead of beginning again.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def solved_again(
     *,
     near_only: bool = False,
 ) -> Solution:
-    """Solve a program from the optimum of another, on other instants; if that fails, begin anew.
+    """Solve a program from the optimum of another, on other instants; if that fails, begin again.
 
     Raises
     ------
