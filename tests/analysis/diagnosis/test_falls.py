@@ -54,6 +54,25 @@ def test_without_its_gait_a_fall_still_has_its_cause(name: str) -> None:
     assert fall.cause is expected
 
 
+@pytest.mark.parametrize(
+    ("landings", "end", "late"),
+    [
+        ((0.0, 0.7, 1.03, 1.36, 1.69), 1.8, []),  # three short steps of a fall
+        ((0.0, 0.7, 1.4, 2.1), 3.2, [2.8]),
+        ((0.0, 0.7, 1.4), 2.5, []),  # too few to tell
+    ],
+)
+def test_steps_are_late_beside_those_before_them(
+    landings: tuple[float, ...], end: float, late: list[float]
+) -> None:
+    robot = walking.bravo7()
+    raised = robot.reference_state().q + 0.1 * np.eye(robot.nv)[1]  # no foot is down
+    walk = Walk(make_run(robot, np.linspace(0.0, end, 50), position=raised))
+    walk.__dict__["landings"] = landings
+    found = [each.time for each in find_symptoms(walk) if each.cause is Cause.LATE_TOUCHDOWN]
+    assert found == pytest.approx(late)
+
+
 def test_walks_that_go_well_have_none() -> None:
     gait = walking.gait()
     assert first_cause(walking.walk(steps=10), gait) is None

@@ -179,26 +179,19 @@ class Walk:
     @cached_property
     def step_duration(self) -> float:
         """How long a step takes, in s: of the gait, or as usual in the run."""
+        usual = self.usual_in(len(self.landings) - 1)
+        return usual if usual < np.inf else STEP_OF_HEIGHT * self.pace
+
+    def usual_in(self, steps: int) -> float:
+        """How long a step takes, in s: of the gait, or as usual in the first steps of the run.
+
+        It is infinite where no gait is known and these are too few.
+        """
         if self.gait is not None:
             return float(self.gait.step_duration)
-        if len(self.landings) > ENOUGH_STEPS:
-            return float(np.median(np.diff(self.landings)))
-        return STEP_OF_HEIGHT * self.pace
-
-    def usual_before(self, count: int) -> float:
-        """How long a step takes, in s: of the gait, or usually in so many steps if they are enough.
-
-        Those after it may be the short ones of a fall, beside which any would be late.
-        """
-        if self.gait is None:
-            before = np.diff(self.landings[: count + 1])
-            return float(np.median(before)) if len(before) >= ENOUGH_STEPS else np.inf
-        return self.step_duration
-
-    @cached_property
-    def steps_known(self) -> bool:
-        """Whether it is known that the robot means to step, and how fast."""
-        return self.gait is not None or len(self.landings) > ENOUGH_STEPS
+        if steps < ENOUGH_STEPS:
+            return np.inf
+        return float(np.median(np.diff(self.landings[: steps + 1])))
 
     @cached_property
     def speed(self) -> float:
@@ -445,10 +438,8 @@ def _rise(walk: Walk, x: float, row: int) -> float:
 
 def _late_landings(walk: Walk) -> Iterator[Symptom]:
     run = walk.run
-    if not walk.steps_known:
-        return
-    for count, (landed, following) in enumerate(pairwise((*walk.landings, float(run.time[-1])))):
-        usual = walk.usual_before(count)
+    for steps, (landed, following) in enumerate(pairwise((*walk.landings, float(run.time[-1])))):
+        usual = walk.usual_in(steps)  # those after it may be short ones of a fall
         late = (following - landed) / usual
         if late > (LATE_UNSEEN if walk.gait is None else LATE):
             due = landed + usual

@@ -892,8 +892,8 @@ def _failing(program: MotionProgram, unknowns: Floats, p: int) -> Instants:
 
 
 CLOSER = 1e-6
-"""Barrier parameter with which IPOPT begins where the multipliers of an optimum are known: 10 to
-20 iterations, where without them it takes 14 to 40."""
+"""Barrier parameter with which IPOPT begins where the multipliers of an optimum are known and the
+barrier only falls: 10 to 20 iterations, where without them it takes 14 to 40."""
 ALLOWED = 1e-5
 """Scaled violation that a limit may have between the instants at which it is looked at."""
 

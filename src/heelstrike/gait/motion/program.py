@@ -195,7 +195,8 @@ class MotionProgram:
     grids: tuple[Instants, ...]
     """When the constraints of each phase hold; equations where there is a weight."""
     near: float = 0.0
-    """Barrier parameter with which IPOPT begins where guesses are nearly optima; zero elsewhere."""
+    """Barrier parameter where guesses are nearly optima; zero elsewhere. IPOPT begins with it where
+    the barrier only falls; one that follows the problem is chosen at each iteration."""
     falling: bool = False
     """Whether the barrier only falls there, which takes more iterations."""
     rounded: bool = False
