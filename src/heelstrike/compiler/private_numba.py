@@ -128,7 +128,8 @@ class PrivateNumba(DocumentedNumba):
         name, key = "private_numba.tested", bytes.fromhex(self.made_of(_inner))
         if kept_code.read(places, name, key) is not None:
             return
-        outer = _outer(self.part(_inner, dissolved=False, rare=True))
+        parts = [self.part(_inner, dissolved=False, rare=rare) for rare in (False, True)]
+        outer = _outer(*parts)
         compiled = self.kept(outer)
         compiled._cache.places = []
         signature = types.float64(types.float64[::1], types.int64)
@@ -139,7 +140,7 @@ class PrivateNumba(DocumentedNumba):
         raw = _unfinished(outer, no_cpython_wrapper=False)
         loop = self.compile(lambda: _loop(raw, compiled._cache, signature, ()).entry_point)
         expected = np.ones(3)
-        wanted = _outer(_inner)(expected, 3)
+        wanted = _outer(_inner, _inner)(expected, 3)
         for call in (compiled, loaded.entry_point, loop):
             found = np.ones(3)
             if call(found, 3) != wanted or found.tobytes() != expected.tobytes():
@@ -152,11 +153,11 @@ def _inner(values: Any, place: int) -> float:
     return values[place] / 3.0
 
 
-def _outer(inner: Callable[..., float]) -> Callable[..., float]:
+def _outer(inner: Callable[..., float], rare: Callable[..., float]) -> Callable[..., float]:
     def outer(values: Any, count: int) -> float:
         total = 0.0
         for place in range(1, count):
-            total += inner(values, place)
+            total += inner(values, place) - rare(values, place)
         return total
 
     return outer
