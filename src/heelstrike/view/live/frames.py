@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from heelstrike.analysis.friction import friction_use
-from heelstrike.analysis.intervals import event_impulse, mean_over_intervals
+from heelstrike.analysis.intervals import event_impulse, mean_between, mean_over_intervals
 from heelstrike.analysis.motion import Motion, in_world, run_motion
 from heelstrike.analysis.support import foot_sums
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
@@ -185,11 +185,6 @@ def mean_forces(run: Run, rows: Integers) -> Floats:
 
     Where no time lies between two rows, those of the later one.
     """
-    found = run.contact_force[rows[1:]].copy()
-    elapsed = np.diff(run.time[rows])
-    lasting = np.flatnonzero(elapsed > 0.0)
-    if not len(lasting):
-        return found
     held = np.diff(run.time)[:, None, None]
     gained = mean_over_intervals(run, run.contact_force) * held
     if run.method.impulses_in_events:
@@ -197,10 +192,7 @@ def mean_forces(run: Run, rows: Integers) -> Floats:
         nx, nz = run.contact_normal[:-1, :, 0], run.contact_normal[:-1, :, 1]
         along = jumps[..., 0] * nx + jumps[..., 1] * nz, jumps[..., 0] * nz - jumps[..., 1] * nx
         gained = gained + np.stack(along, axis=-1)
-    impulse = np.concatenate((np.zeros((1, *gained.shape[1:])), np.cumsum(gained, axis=0)))
-    total = impulse[rows[lasting + 1]] - impulse[rows[lasting]]
-    found[lasting] = total / elapsed[lasting, None, None]
-    return found
+    return mean_between(run.time, gained, rows, run.contact_force[rows], since=True)[1:]
 
 
 def _only(run: Run, rows: Integers, forces: Floats) -> Run:
