@@ -155,12 +155,10 @@ def compare_in_engines(
     """Walk a case in other engines; tell, write and draw what came of it."""
     from heelstrike.experiments.engine_comparison import compare_engines
     from heelstrike.experiments.engine_comparison.comparison import STEP_SIZES
+    from heelstrike.experiments.engine_comparison.two_processes import walk_of
     from heelstrike.view.style import save_figure
 
-    assert asked.engines is not None
-    assert start.controller is not None
     check(case)
-    assert case.followed is not None
     if asked.search:
         asked.refuse_beside_search()
         _search(case, start, asked, steps, out, as_json=as_json)
@@ -175,15 +173,12 @@ def compare_in_engines(
         sizes = tuple(numbers_called(asked.sizes, "--sizes"))
     with stage("walking in engines") as show:
         comparison = compare_engines(
-            case.robot,
-            start.controller,
-            case.followed,
+            **walk_of(case, start),
             engines=asked.names,
             steps=QUICK_STEPS if asked.quick else steps,
             step_sizes=sizes,
             settings=asked.settings.split(","),
             control_period=asked.period,
-            friction=case.lowest_friction,
             folder=out / "engines",
             films=asked.films,
             progress=show.doing,
@@ -277,17 +272,13 @@ def pushes_in_engines(
 ) -> None:  # fmt: skip
     """Search for the largest push that is stood in engines."""
     from heelstrike.experiments.engine_comparison import compare_pushes
+    from heelstrike.experiments.engine_comparison.two_processes import walk_of
 
-    assert start.controller is not None
-    assert case.followed is not None
     with stage("pushing in engines") as show:
         table = compare_pushes(
-            case.robot,
-            start.controller,
-            case.followed,
+            **walk_of(case, start),
             engines=asked.names,
             settings=asked.settings.split(","),
-            friction=case.lowest_friction,
             control_period=asked.period,
             folder=out / "engines",
             processes=processes,
@@ -341,17 +332,13 @@ def _search(
     from heelstrike.experiments.engine_comparison import search
     from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
     from heelstrike.experiments.engine_comparison.entries import entries_called
+    from heelstrike.experiments.engine_comparison.two_processes import walk_of
     from heelstrike.experiments.engine_comparison.walk import Walk
     from heelstrike.experiments.engines import InvalidRunError
     from heelstrike.experiments.engines.packages import peers
     from heelstrike.whole_file import write_whole
 
-    assert case.followed is not None
-    assert start.controller is not None
-    walk = Walk(
-        case.robot, start.controller, case.followed, steps, CONTROL_PERIOD,
-        case.lowest_friction, 60.0,
-    )  # fmt: skip
+    walk = Walk(**walk_of(case, start), steps=steps, control_period=CONTROL_PERIOD, patience=60.0)
     versions = peers(load=False)
     file = out / "best_settings.json"
     out.mkdir(parents=True, exist_ok=True)

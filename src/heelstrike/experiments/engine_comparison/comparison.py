@@ -20,7 +20,7 @@ from heelstrike.experiments.engine_comparison.rows import EngineRow
 from heelstrike.experiments.engine_comparison.settings import (
     BEST,
     DEFAULTS,
-    best_settings,
+    has_best,
     settings_of,
 )
 from heelstrike.experiments.engine_comparison.tables import walk_table
@@ -184,7 +184,7 @@ def compare_engines(
         asked = [("heelstrike", "heelstrike", DEFAULTS, step) for step in step_sizes]
         for name, entry in entries.items():
             for which in settings:
-                if which == BEST and not best_settings().get(name, {}).get("settings"):
+                if which == BEST and not has_best(name):
                     continue  # none is better than the defaults
                 asked += [(name, entry.title, which, step) for step in step_sizes]
         rows: list[EngineRow] = []

@@ -27,11 +27,11 @@ from heelstrike.experiments.engine_comparison.kept import KeptRows, asked_of_eng
 from heelstrike.experiments.engine_comparison.settings import (
     BEST,
     DEFAULTS,
-    best_settings,
+    has_best,
     settings_of,
 )
 from heelstrike.experiments.engine_comparison.tables import short
-from heelstrike.experiments.engines.packages import PACKAGES, compared, peers
+from heelstrike.experiments.engines.packages import peers, refuse_absent
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.served import EngineProcesses, lent
 from heelstrike.field_texts import dataclass
@@ -183,12 +183,10 @@ def compare_compass(
     def made(name: str, entry: Entry, step: float, which: str) -> CompassRow:
         title = entry.title if which == settings else f"{entry.title}, {which}"
         row = CompassRow(name, title, step, None, "")
-        state = versions[entry.package]
-        if not compared({entry.package: state}):
-            return replace(row, reason=f"{PACKAGES[entry.package].title} is {state}")
         given = settings_of(name, entry, which)
         told = [name, step, begins, asked_of_engine(entry.package, given, versions)]
         try:
+            refuse_absent(entry.package, versions)
             found = kept.entries(
                 f"compass-{name}-{which}-{step:g}",
                 told,
@@ -206,7 +204,7 @@ def compare_compass(
                 own.append(made(name, entry, step, which))
             rows += own
             walks = any(row.walk is not None and not row.walk["ending"] for row in own)
-            if walks or not best_settings().get(name, {}).get("settings"):
+            if walks or not has_best(name):
                 break
     return CompassTable(STRIDES, settings, tuple(rows))
 

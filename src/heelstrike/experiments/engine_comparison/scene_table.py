@@ -24,7 +24,7 @@ from heelstrike.experiments.engine_comparison.scenes import (
 )
 from heelstrike.experiments.engine_comparison.settings import DEFAULTS, settings_of
 from heelstrike.experiments.engine_comparison.tables import short
-from heelstrike.experiments.engines.packages import PACKAGES, compared, peers
+from heelstrike.experiments.engines.packages import peers, refuse_absent
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.served import PATIENCE, EngineProcesses, lent
 from heelstrike.field_texts import dataclass
@@ -270,7 +270,5 @@ class _Engines:
 
     def _given(self, name: str, entry: Entry) -> dict[str, Any]:
         """Return the settings of an engine that is there."""
-        state = self._versions[entry.package]
-        if not compared({entry.package: state}):
-            raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
+        refuse_absent(entry.package, self._versions)
         return settings_of(name, entry, self._settings)

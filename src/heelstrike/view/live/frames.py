@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,15 +20,17 @@ from heelstrike.robot.named_tree import legs
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
-from heelstrike.sim.run import QUANTITIES, Run
+from heelstrike.sim.run import Run
 from heelstrike.view.live.layout import (
     MOST_PUSHES,
     FrameLayout,
     acting_pushes,
+    only,
     slider,
 )
-from heelstrike.view.page.curves import DASHED, Plot, Trace, alike, limits_in_words, side_of
+from heelstrike.view.page.curves import DASHED, Plot, Trace, alike, side_of
 from heelstrike.view.page.motion import frames as drawn
+from heelstrike.view.style import limits_in_words
 
 ROOM = 0.15
 """Share of a sole's length that its plot shows beyond either end."""
@@ -59,7 +60,8 @@ class Layout(FrameLayout):
     def frames(self, run: Run, rows: Sequence[int], pushes: Iterable[Push]) -> Floats:
         """Return the frames of some rows but the first; see `FrameLayout`."""
         rows_shown = np.asarray(rows[1:], dtype=np.int64)
-        each = _only(run, rows_shown, mean_forces(run, np.asarray(rows, dtype=np.int64)))
+        forces = mean_forces(run, np.asarray(rows, dtype=np.int64))
+        each = only(run, rows_shown, contact_force=forces)
         every = np.arange(len(rows_shown))
         motion = run_motion(each)
         zmp = zero_moment_point(each, motion=motion)
@@ -193,9 +195,3 @@ def mean_forces(run: Run, rows: Integers) -> Floats:
         along = jumps[..., 0] * nx + jumps[..., 1] * nz, jumps[..., 0] * nz - jumps[..., 1] * nx
         gained = gained + np.stack(along, axis=-1)
     return mean_between(run.time, gained, rows, run.contact_force[rows], since=True)[1:]
-
-
-def _only(run: Run, rows: Integers, forces: Floats) -> Run:
-    """Return a run of some rows, with forces (n, nc, 2) of its own."""
-    kept = {name: getattr(run, name)[rows] for name in ("time", *QUANTITIES)}
-    return replace(run, **kept | {"contact_force": forces}, pushes=())
