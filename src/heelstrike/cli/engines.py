@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 QUICK_STEPS, QUICK_SIZES = 4, (1e-3,)
 """Walking steps and step sizes (s) of a quick comparison."""
-QUICK_SEARCH: Mapping[str, int] = {"strides": 2, "halvings": 1}
+QUICK_SEARCH: Mapping[str, Any] = {"strides": 2, "halvings": 1}
 """How it searches for the largest push."""
 
 
