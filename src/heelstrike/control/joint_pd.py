@@ -14,6 +14,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import one_of
 from heelstrike.compiler.bundle import array, number
 from heelstrike.control.arguments import check_gait
 from heelstrike.control.computed_torque import pitch_of
@@ -152,13 +153,7 @@ class JointPD(Law):
         check_gait(robot, gait)
         refuse_loops(robot, "springs and dampers about a gait", ControllerError, loops=False)
         pitch_of(robot)
-        try:
-            known = Feedforward(feedforward)
-        except ValueError:
-            names = ", ".join(f"{each.value!r}" for each in Feedforward)
-            raise ControllerError(
-                f"feedforward must be one of {names}, got {feedforward!r}"
-            ) from None
+        known = one_of(Feedforward, "feedforward", feedforward, ControllerError)
         if gait.point_feet:
             raise ControllerError(
                 "springs and dampers about a gait need flat feet; for a gait on point feet use "

@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from heelstrike.arguments import one_of
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.loops import loop_displacement
@@ -124,17 +125,8 @@ def checked_setting(
         held=held,
         braked=on,
         checked=checked,
-        on_error=checked_on_error(on_error),
+        on_error=one_of(OnError, "on_error", on_error, SimulationError),
     )
-
-
-def checked_on_error(on_error: OnError | str) -> OnError:
-    """Return what becomes of an error in a controller, or refuse what is no such thing."""
-    try:
-        return OnError(on_error)
-    except ValueError:
-        known = ", ".join(repr(each.value) for each in OnError)
-        raise SimulationError(f"on_error is one of {known}; got {on_error!r}") from None
 
 
 def checked_pushes(robot: AnyRobot, pushes: Sequence[Push] | Push) -> tuple[Push, ...]:

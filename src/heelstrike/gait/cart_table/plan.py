@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from heelstrike.arguments import at_least, at_most, takes
+from heelstrike.arguments import at_least, at_most, one_of, takes
 from heelstrike.dynamics import center_of_mass, leg_joints, link_poses
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.cart_table.center_of_mass import Planner, followed
@@ -117,11 +117,7 @@ def plan_motion(
     >>> [len(phase.contacts) for phase in walk.phases]
     [4, 2]
     """
-    try:
-        way = Planner(planner)
-    except ValueError:
-        names = ", ".join(repr(each.value) for each in Planner)
-        raise GaitError(f"planner must be one of {names}, got {planner!r}") from None
+    way = one_of(Planner, "planner", planner, GaitError)
     _check_numbers(step_length, step_duration, double_support, height, clearance, corrections)
     both = double_support * step_duration
     front, rear = (foot.name for foot in robot.feet) if len(robot.feet) == 2 else ("", "")

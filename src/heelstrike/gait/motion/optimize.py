@@ -11,7 +11,7 @@ import casadi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.arguments import are_numbers, shown, takes
+from heelstrike.arguments import are_numbers, one_of, shown, takes
 from heelstrike.dynamics import (
     contact_positions,
     link_poses,
@@ -249,11 +249,7 @@ def checked_request(
         )
     if not robot.floating:
         raise GaitError(f"motion design needs a floating robot; robot {robot.name!r} is not one")
-    try:
-        goes_on = Repeat(repeat)
-    except ValueError:
-        names = ", ".join(repr(each.value) for each in Repeat)
-        raise GaitError(f"repeat must be one of {names}, got {repeat!r}") from None
+    goes_on = one_of(Repeat, "repeat", repeat, GaitError)
     if goes_on is Repeat.MIRRORED and robot.mirror is None:
         raise GaitError(
             f"robot {robot.name!r} has no mirror image; ask for a whole cycle, with repeat='same'"
