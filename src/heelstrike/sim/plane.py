@@ -194,12 +194,6 @@ class Plane(Dimension):
         """Brakes hold where the robot is now."""
         memory.loops.brake_position[:] = state.q[robot.model.brake_joint]
 
-    def check_fit(self, ground: Ground, memory: Memory) -> None:
-        """There is memory for any ground."""
-
-    def laid(self, memory: Memory) -> None:
-        """Nothing: methods remember what touches in their own bundles."""
-
     def unsolved(self, now: str, memory: Memory) -> str:
         """Say that nothing could certify a contact problem, and what it is like."""
         residual = memory.assembly.answer.residual.tolist()
