@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.mold import Mold
@@ -21,6 +20,7 @@ from heelstrike.contact.workspace import (
 from heelstrike.dynamics.articulated import ArticulatedBodies
 from heelstrike.dynamics.loops import LoopRows
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.constraint import friction_of
 from heelstrike.sim.contacts.rows import (
@@ -39,9 +39,6 @@ from heelstrike.sim.contacts.writers import lay_out_ties
 from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.push import Push, Pushes, pushes_on
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class CommonTally(Bundle):

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from heelstrike.robot.model import Floats
 
 
 def collocation(nodes: Floats) -> tuple[Floats, Floats, Floats]:

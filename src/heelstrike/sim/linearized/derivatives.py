@@ -13,6 +13,7 @@ from heelstrike.arguments import takes
 from heelstrike.contact.linearized.partials import FRICTION
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.compliant.method import Compliant
 from heelstrike.sim.contacts.loops import TAKES_HOLD
@@ -31,8 +32,6 @@ from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.time_stepping.method import TimeStepping
 from heelstrike.sim.whole_run import whole
-
-Floats = NDArray[np.float64]
 
 NOTHING: Mapping[str, ArrayLike] = MappingProxyType({})
 

@@ -6,18 +6,16 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from heelstrike.contact.linearized.motion import ActiveContacts, linearize_contact
 from heelstrike.errors import SimulationError
+from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.linearized.collocation import collocation
 from heelstrike.sim.linearized.inputs import NONE, TORQUE, Inputs
 from heelstrike.sim.linearized.law import AskedAlong
 from heelstrike.sim.linearized.pushed import pushed, switches
 from heelstrike.sim.simulation import Simulation
-
-Floats = NDArray[np.float64]
 
 PANEL, ALONE = 0.005, 0.05
 """Longest stretch of time (s) that is taken at once under a law, as gaits are smooth by pieces

@@ -26,7 +26,7 @@ from heelstrike.contact.linearized.slopes import plane
 from heelstrike.dynamics.queries.linearization import solved
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Model
+from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.compliant.corners import Corners
 from heelstrike.sim.compliant.dynamics import HELD, Laws, Rates, evaluate
 from heelstrike.sim.compliant.law import FrictionForces
@@ -40,8 +40,6 @@ from heelstrike.sim.linearized.time_step import find_pushes
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import share_over_step
 from heelstrike.sim.simulation import Simulation
-
-Floats = NDArray[np.float64]
 
 STAGES = 4
 """Nodes of a step, the last its end: collocation of order 7."""
