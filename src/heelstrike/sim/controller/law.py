@@ -13,7 +13,7 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.arguments import refusal, shown
+from heelstrike.arguments import are_numbers, refusal, shown
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.bundle_type import bundle_at
 from heelstrike.compiler.compilation import (
@@ -42,8 +42,6 @@ CONTROLLER_TYPE = types.FunctionType(CONTROLLER_SIGNATURE)
 controller_in = kept_value(CONTROLLER_TYPE)
 """``controller_in(words)``: what :attr:`ControllerFunction.words` keeps."""
 
-REAL = "biuf"
-"""Kinds of arrays of real numbers."""
 
 REAL_NUMBER = (int, float, np.integer, np.floating)
 
@@ -310,11 +308,7 @@ def controller(
 
 def per_actuator(name: str, value: ArrayLike, robot: Robot | SpatialRobot) -> NDArray[np.float64]:
     """Return one number for each actuator, (nu,), of one for all or for each."""
-    try:
-        gains = np.asarray(value)
-    except ValueError:  # rows of different lengths
-        gains = np.asarray(None)
-    gains = gains.astype(np.float64) if gains.dtype.kind in REAL else np.full(1, np.nan)
+    gains = np.array(value, dtype=np.float64) if are_numbers(value) else np.full(1, np.nan)
     if gains.ndim > 1 or gains.size not in (1, robot.nu) or not np.all(np.isfinite(gains)):
         raise ControllerError(
             f"{name} must be one finite number or {robot.nu} (one an actuator), got {value!r}"

@@ -11,7 +11,7 @@ from heelstrike.contact.linearized.motion import ActiveContacts, linearize_conta
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Controller
-from heelstrike.sim.linearized.collocation import collocation
+from heelstrike.sim.linearized.collocation import collocation, stage_equations
 from heelstrike.sim.linearized.inputs import NONE, TORQUE, Inputs
 from heelstrike.sim.linearized.law import AskedAlong
 from heelstrike.sim.linearized.pushed import pushed, switches
@@ -112,10 +112,7 @@ class Variation:
                 self._simulation.advance(start + span * NODES[0])
                 self._law.check_memory()
             slopes = [self._slope(start + span * node, active) for node in NODES]
-            system = np.eye(STAGES * size)
-            for i, j in np.ndindex(STAGES, STAGES):
-                block = span * MATRIX[i, j] * slopes[i][:, :size]
-                system[i * size : (i + 1) * size, j * size : (j + 1) * size] -= block
+            system = stage_equations(span * MATRIX, [slope[:, :size] for slope in slopes])
             rates = np.linalg.solve(system, np.vstack([slope @ error for slope in slopes]))
             stages = rates.reshape(STAGES, size, error.shape[1])
             error[:size] += span * np.tensordot(WEIGHTS, stages, axes=1)
