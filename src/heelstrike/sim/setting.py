@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Required, TypedDict
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.loops import loop_displacement
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.once_each import once_each
 from heelstrike.robot.loops import row_names
 from heelstrike.robot.model import SCALES, Model
 from heelstrike.robot.robot import Robot
@@ -156,21 +156,17 @@ def _held_by(setting: Setting) -> str:
     return f", {held}" if held else ""
 
 
-_DIGESTS: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
-
-
+@once_each
 def model_digest(model: Model | SpatialModel) -> str:
     """Return what tells the numbers of a robot from those of others."""
-    if model not in _DIGESTS:
-        digest = hashlib.sha256()
-        for name, value in model.members().items():
-            number: Any = model.declared[name]
-            usual = name in SCALES and np.all(value == number.default)
-            if number.later and (np.size(value) == 0 or usual):
-                continue  # snapshots that are older than the number stay good
-            digest.update(f"{name} {np.shape(value)} ".encode() + np.asarray(value).tobytes())
-        _DIGESTS[model] = digest.hexdigest()[:16]
-    return _DIGESTS[model]
+    digest = hashlib.sha256()
+    for name, value in model.members().items():
+        number: Any = model.declared[name]
+        usual = name in SCALES and np.all(value == number.default)
+        if number.later and (np.size(value) == 0 or usual):
+            continue  # snapshots that are older than the number stay good
+        digest.update(f"{name} {np.shape(value)} ".encode() + np.asarray(value).tobytes())
+    return digest.hexdigest()[:16]
 
 
 def check_state(robot: Robot, state: State) -> None:
