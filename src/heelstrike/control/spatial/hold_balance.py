@@ -23,7 +23,7 @@ from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import SOLVED, Program
-from heelstrike.control.quadratic.tasks import add_task, clear
+from heelstrike.control.quadratic.tasks import add_task, clear, keep_row, scratch_row
 from heelstrike.control.spatial.hold_posture import posture_of
 from heelstrike.control.spatial.soles import soles_in_space
 from heelstrike.dynamics.spatial.algebra import (
@@ -187,23 +187,6 @@ def place_soles(
             for i in range(3):
                 memory.jacobian[first + i, k] = moves[i]
                 memory.jacobian[first + 3 + i, k] = turns[i]
-
-
-@kernel
-def scratch_row(program: Program) -> int:
-    """Return a row of zeros behind those that count."""
-    row = program.count
-    for i in range(program.x.shape[0]):
-        program.rows[row, i] = 0.0
-    return row
-
-
-@kernel
-def keep_row(bound: float, level: int, program: Program) -> None:
-    """Let the row behind those that count be one of them."""
-    program.bound[program.count] = bound
-    program.level[program.count] = level
-    program.count += 1
 
 
 @kernel
