@@ -17,9 +17,14 @@ from heelstrike.contact.spatial.workspace import (
 @kernel
 def find_velocities(rows: int, scaled: ScaledBlocks, x: Floats, u: Floats) -> None:
     """Write ``u = matrix x + offset``; the matrix is symmetric."""
-    matrix, offset = scaled.matrix, scaled.offset
     for row in range(rows):
-        u[row] = offset[row]
+        u[row] = scaled.offset[row]
+    add_products(rows, scaled.matrix, x, u)
+
+
+@kernel
+def add_products(rows: int, matrix: Floats, x: Floats, u: Floats) -> None:
+    """Add ``matrix x`` to u; the matrix is symmetric."""
     for column in range(rows):
         own = x[column]
         if own != 0.0:

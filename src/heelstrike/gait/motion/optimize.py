@@ -813,10 +813,7 @@ def _fine(pieces: int, times: int = 1) -> Instants:
     """Instants at which limits are checked, or some times as many."""
     count = times * FINER * STAGES
     share = (np.arange(count) + 0.5) / count
-    return Instants(
-        pieces, np.repeat(np.arange(pieces), count), np.tile(share, pieces),
-        np.zeros(pieces * count),
-    )  # fmt: skip
+    return Instants.in_every_piece(pieces, share)
 
 
 def _rows_at(program: MotionProgram, unknowns: Floats, p: int, grid: Instants) -> Floats:
