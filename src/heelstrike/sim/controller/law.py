@@ -425,18 +425,16 @@ class Law:
         extents = extents_of(robot)
         try:
             self.parameters.check(extents)
-            begin = {k: v for k, v in self.memory.items() if self._is_of(self.function.memory, k)}
-            memory = self.function.memory.settable().allocate(extents, **begin)
+            kind = self.function.memory
+            known = kind.declared.keys() | kind.extent_names
+            begin = {name: each for name, each in self.memory.items() if name in known}
+            memory = kind.settable().allocate(extents, **begin)
             memory.check(extents)
         except TypeError as error:
             raise ControllerError(
                 f"controller {self.function.name!r} does not fit robot {robot.name!r}: {error}"
             ) from error
         return type(self.parameters).settable()(**self.parameters.members()), memory
-
-    @staticmethod
-    def _is_of(bundle: type[Bundle], name: str) -> bool:
-        return name in bundle.declared or name in bundle.extent_names
 
     def new_log(self, robot: Any) -> Bundle:
         """Return a log to begin with, all zeros.
