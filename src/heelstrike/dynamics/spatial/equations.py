@@ -40,12 +40,17 @@ def force_on_link(work: SpatialWorkspace, i: int, acceleration: Spatial) -> Spat
 
 
 @kernel
-def gather_forces(model: SpatialModel, work: SpatialWorkspace, force: Floats) -> None:
-    """Generalised force of the forces on all links, each of which receives those beyond it."""
+def gather_forces(
+    model: SpatialModel, work: SpatialWorkspace, acceleration: Floats, force: Floats
+) -> None:
+    """Generalised force of the forces on all links, each of which receives those beyond it.
+
+    And of what motors turn with their joints, at the joints' acceleration.
+    """
     for i in range(model.nl - 1, -1, -1):
         f = spatial(work.force, i)
         for k in range(model.first_velocity[i], model.last_velocity[i] + 1):
-            force[k] = power(spatial(work.motion, k), f)
+            force[k] = power(spatial(work.motion, k), f) + model.armature[k] * acceleration[k]
         parent = model.parent[i]
         if parent >= 0:
             write(parent, plus(spatial(work.force, parent), f), work.force)
@@ -68,9 +73,7 @@ def inverse_dynamics(
             a = plus(a, scaled(spatial(work.motion, k), acceleration[k]))
         write(i, a, work.acceleration)
         write(i, force_on_link(work, i, a), work.force)
-    gather_forces(model, work, force)
-    for k in range(model.nv):
-        force[k] += model.armature[k] * acceleration[k]
+    gather_forces(model, work, acceleration, force)
 
 
 @kernel
@@ -80,7 +83,7 @@ def bias_force(model: SpatialModel, work: SpatialWorkspace, force: Floats) -> No
     free_fall = (0.0, 0.0, 0.0, -gravity[0], -gravity[1], -gravity[2])
     for i in range(model.nl):
         write(i, force_on_link(work, i, free_fall), work.force)
-    gather_forces(model, work, force)
+    gather_forces(model, work, work.zero, force)
 
 
 @kernel
