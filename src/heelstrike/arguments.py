@@ -182,6 +182,27 @@ def one_of(kind: type[_Member], name: str, value: object, error: type[Heelstrike
         raise error(f"{name} must be one of {known}, got {value!r}") from None
 
 
+def positive(name: str, value: object, error: type[HeelstrikeError], unit: str = "") -> float:
+    """Return the positive, finite number that an argument is.
+
+    Parameters
+    ----------
+    name : str
+        What the argument is called.
+    value : object
+        The argument.
+    error : type
+        What is raised if it is no such number.
+    unit : str
+        Of what it is a number, as in "m".
+    """
+    number: Any = value
+    if not (is_number(value) and np.ndim(number) == 0 and 0.0 < number < np.inf):
+        of = f" ({unit})" if unit else ""
+        raise error(f"{name} must be a positive number{of}, got {value!r}")
+    return float(number)
+
+
 @functools.cache
 def _wanted(dataclass: Any) -> dict[str, tuple[str, ...]]:
     return {

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike import arguments
 from heelstrike.arguments import are_numbers, refusal, shown
 from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.gait import Gait
@@ -85,10 +85,7 @@ def positive(name: str, value: object) -> float:
     ControllerError
         If it is none.
     """
-    found = number_of(name, value)
-    if not 0.0 < found < math.inf:
-        raise ControllerError(f"{name} must be a positive number, got {found!r}")
-    return found
+    return arguments.positive(name, number_of(name, value), ControllerError)
 
 
 def numbers_of(name: str, value: ArrayLike) -> Floats:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Required, TypedDict
 
 import numpy as np
 
-from heelstrike.arguments import one_of
+from heelstrike.arguments import one_of, positive
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.loops import loop_displacement
@@ -104,8 +104,8 @@ def checked_setting(
     dimension = dimension_of(robot)
     ground = dimension.checked_ground(ground)
     state = dimension.checked_state(robot, state)
-    if control_period is not None and not 0.0 < control_period < np.inf:
-        raise SimulationError(f"control_period must be a positive number, got {control_period}")
+    if control_period is not None:
+        positive("control_period", control_period, SimulationError)
     if not (hasattr(record_every, "__index__") and 1 <= record_every <= MOST_EVERY):
         raise SimulationError(f"record_every must be a whole number ≥ 1, got {record_every!r}")
     if stop_when_fallen is None:

@@ -18,7 +18,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import positive, takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
@@ -443,8 +443,7 @@ class HoldBalance(Law):
         if not robot.floating:
             raise ControllerError(f"robot {robot.name!r} does not float: it cannot fall over")
         for name, value in (("friction", friction), ("joint_kp", joint_kp), ("joint_kd", joint_kd)):
-            if not 0.0 < value < np.inf:
-                raise ControllerError(f"{name} must be a positive number, got {value}")
+            positive(name, value, ControllerError)
         soles = soles_in_space(robot, whole)
         feet, nu = len(soles.link), robot.nu
         free = np.setdiff1d(np.arange(robot.nv), robot.model.actuator_velocity)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import positive
 from heelstrike.errors import ControllerError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
@@ -156,8 +157,7 @@ def preview_control(
         "jerk_weight": jerk_weight, "gravity": gravity, "horizon": horizon,
     }  # fmt: skip
     for name, value in given.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise ControllerError(f"{name} must be a positive number, got {value!r}")
+        positive(name, value, ControllerError)
     system, control = _with_sum(*_cart(period, height, gravity))
     weight = np.diag([error_weight, 0.0, 0.0, 0.0])
     cost = solve_discrete_are(system, control, weight, np.array([[jerk_weight]]))

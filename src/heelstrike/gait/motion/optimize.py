@@ -11,7 +11,7 @@ import casadi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.arguments import are_numbers, one_of, shown, takes
+from heelstrike.arguments import are_numbers, one_of, positive, shown, takes
 from heelstrike.dynamics import (
     contact_positions,
     link_poses,
@@ -257,7 +257,8 @@ def checked_request(
     if len(phases) == 0 or not all(isinstance(each, ContactPhase) for each in phases):
         raise GaitError("phases must be one ContactPhase or more, in their order")
     speed, duration = (
-        _positive(name, value) for name, value in (("speed", speed), ("duration", duration))
+        None if value is None else positive(name, value, GaitError)
+        for name, value in (("speed", speed), ("duration", duration))
     )
     for name in ("friction", "clearance", "force_margin", "landing_speed"):
         if not (np.isfinite(others[name]) and others[name] >= 0.0):
@@ -296,15 +297,6 @@ def checked_request(
     if goes_on is not Repeat.NEVER:
         _check_repetition(request)
     return request
-
-
-def _positive(name: str, value: Any) -> float | None:
-    """Return a number that was asked for, if it was."""
-    if value is None:
-        return None
-    if np.ndim(value) or not (np.isfinite(value) and value > 0.0):
-        raise GaitError(f"{name} must be positive, got {value}")
-    return float(value)
 
 
 def _check_repetition(request: MotionRequest) -> None:

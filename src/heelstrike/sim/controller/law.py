@@ -13,7 +13,7 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.arguments import are_numbers, refusal, shown
+from heelstrike.arguments import are_numbers, positive, refusal, shown
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.bundle_type import bundle_at
 from heelstrike.compiler.compilation import (
@@ -41,9 +41,6 @@ CONTROLLER_TYPE = types.FunctionType(CONTROLLER_SIGNATURE)
 
 controller_in = kept_value(CONTROLLER_TYPE)
 """``controller_in(words)``: what :attr:`ControllerFunction.words` keeps."""
-
-
-REAL_NUMBER = (int, float, np.integer, np.floating)
 
 
 class ControllerFunction:
@@ -367,10 +364,8 @@ class Law:
         self.memory = dict(memory or {})
         strange = self.memory.keys() - function.memory.declared - function.memory.extent_names
         strange -= function.log.extent_names
-        if period is not None and not (isinstance(period, REAL_NUMBER) and 0.0 < period < np.inf):
-            raise ControllerError(
-                f"the period of a controller must be a positive number of seconds, got {period!r}"
-            )
+        if period is not None:
+            positive("the period of a controller", period, ControllerError, "s")
         if strange:
             raise ControllerError(
                 f"the memory of controller {function.name!r} has no {', '.join(sorted(strange))}"
