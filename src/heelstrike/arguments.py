@@ -8,6 +8,7 @@ protocols, or what is not listed here, anything passes.
 
 from __future__ import annotations
 
+import enum
 import functools
 import inspect
 import os
@@ -24,6 +25,7 @@ from heelstrike.errors import HeelstrikeError
 
 _Parameters = ParamSpec("_Parameters")
 _Result = TypeVar("_Result")
+_Member = TypeVar("_Member", bound=enum.Enum)
 
 NUMBERS = "iuf"
 """Kinds of arrays that are numbers."""
@@ -157,6 +159,48 @@ def check_fields(instance: Any, error: type[HeelstrikeError]) -> None:
     for name, kinds in _wanted(kind).items():
         if not _is_any(value := getattr(instance, name), kinds):
             raise error(refusal(name, value, kinds))
+
+
+def one_of(kind: type[_Member], name: str, value: object, error: type[HeelstrikeError]) -> _Member:
+    """Return the member of a closed set that an argument is, or names by its value.
+
+    Parameters
+    ----------
+    kind : type
+        The set.
+    name : str
+        What the argument is called.
+    value : object
+        The argument.
+    error : type
+        What is raised if it is no such thing.
+    """
+    try:
+        return kind(value)
+    except ValueError:
+        known = ", ".join(repr(each.value) for each in kind)
+        raise error(f"{name} must be one of {known}, got {value!r}") from None
+
+
+def positive(name: str, value: object, error: type[HeelstrikeError], unit: str = "") -> float:
+    """Return the positive, finite number that an argument is.
+
+    Parameters
+    ----------
+    name : str
+        What the argument is called.
+    value : object
+        The argument.
+    error : type
+        What is raised if it is no such number.
+    unit : str
+        Of what it is a number, as in "m".
+    """
+    number: Any = value
+    if not (is_number(value) and np.ndim(number) == 0 and 0.0 < number < np.inf):
+        of = f" ({unit})" if unit else ""
+        raise error(f"{name} must be a positive number{of}, got {value!r}")
+    return float(number)
 
 
 @functools.cache

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from heelstrike.errors import WriteError
+from heelstrike.errors import HeelstrikeError, WriteError
 
 LONGEST_AGE = 86400.0
 """Seconds after which a file beside its target is abandoned, where one cannot ask its writer."""
@@ -68,7 +68,10 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         _in_progress.discard(beside.name)
 
 
-def write_whole(path: str | os.PathLike[str], content: str | bytes | memoryview) -> Path:
+def write_whole(
+    path: str | os.PathLike[str], content: str | bytes | memoryview,
+    error: type[HeelstrikeError] = WriteError,
+) -> Path:  # fmt: skip
     """Write a file at once; see :func:`whole_file`.
 
     Parameters
@@ -77,6 +80,8 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes | memoryview)
         File to write.
     content : str or bytes
         What is to be in it; text as UTF-8.
+    error : type
+        What is raised if it cannot be written.
 
     Returns
     -------
@@ -85,15 +90,18 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes | memoryview)
 
     Raises
     ------
-    WriteError
-        If it cannot be written; an older file is as it was.
+    HeelstrikeError
+        Of the type `error`, if it cannot be written; an older file is as it was.
     """
     try:
         data = content.encode("utf-8") if isinstance(content, str) else content
-    except UnicodeEncodeError as error:
-        raise WriteError(f"cannot write {path}: its content is no text ({error})") from error
-    with whole_file(path) as beside:
-        beside.write_bytes(data)
+    except UnicodeEncodeError as cause:
+        raise error(f"cannot write {path}: its content is no text ({cause})") from cause
+    try:
+        with whole_file(path) as beside:
+            beside.write_bytes(data)
+    except WriteError as cause:
+        raise error(str(cause)) from cause
     return Path(path)
 
 

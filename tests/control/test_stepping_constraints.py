@@ -261,7 +261,7 @@ def test_it_keeps_its_speed_down_a_slope() -> None:
         ({"kp": -1.0}, "kp must not be negative"),
         ({"response": -0.1}, "response must not be negative"),
         ({"trust": 1.5}, "trust lies from 0 to 1"),
-        ({"friction": 0.0}, "friction must be positive"),
+        ({"friction": 0.0}, "friction must be a positive number"),
     ],
 )
 def test_what_it_refuses(options: dict[str, float], said: str) -> None:

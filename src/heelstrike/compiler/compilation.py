@@ -149,7 +149,7 @@ def _typeof_kernel(value: Kernel, _: Any) -> Any:
     return numba.typeof(value.part)
 
 
-def compiled_for(signature: Any, function: Function, *, boundscheck: bool = False) -> Function:
+def compiled_for(signature: Any, function: Function) -> Function:
     """Compile a kernel at once for the given Numba signature, or load its machine code.
 
     Parameters
@@ -158,10 +158,8 @@ def compiled_for(signature: Any, function: Function, *, boundscheck: bool = Fals
         Types of the result and the arguments.
     function : callable
         The kernel.
-    boundscheck : bool
-        Whether an index beyond an array raises IndexError.
     """
-    compiled = numba_in_use().kept(function, boundscheck=boundscheck)
+    compiled = numba_in_use().kept(function)
     numba_in_use().compile(lambda: compiled.compile(signature))
     compiled.disable_compile()
     result: Function = compiled

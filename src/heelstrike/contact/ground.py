@@ -25,9 +25,8 @@ from heelstrike.contact.ground_shape import (
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
+from heelstrike.robot.model import Floats
 from heelstrike.tolerances import STRAIGHT_GROUND
-
-Floats = NDArray[np.float64]
 
 # Features further from a disc's centre than this (m) are not looked for: a robot that far from
 # every one of them is in free flight, and the distance to the ground below it will do.

@@ -13,7 +13,6 @@ from heelstrike.control.noise import RandomNumbers
 from heelstrike.control.policy.law import Policy
 from heelstrike.control.policy.network import Layer, Network, load_network
 from heelstrike.control.policy.reference import Reference
-from heelstrike.control.preview import PreviewControl, preview_control
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import Program
 from heelstrike.control.quadratic.solution import QuadraticSolution, solve_quadratic_program
@@ -23,6 +22,7 @@ from heelstrike.control.standing_lqr import StandingLQR
 from heelstrike.control.stepping_constraints import SteppingConstraints
 from heelstrike.control.virtual_constraints import VirtualConstraints
 from heelstrike.dynamics.dense import LinearEquations
+from heelstrike.gait.cart_table.preview import PreviewControl, preview_control
 from heelstrike.sim.controller.law import ControllerFunction, Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState, controlled_robot
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import positive, takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.around import Around, Shown, Wrapper, copy, copy_contacts, own_period
@@ -149,8 +149,7 @@ class Actuated(Around):
         late = periods("delay", delay, period)
         share, left = 1.0, 0.0
         if bandwidth is not None:
-            if not (math.isfinite(bandwidth) and bandwidth > 0.0):
-                raise ControllerError(f"the bandwidth must be positive (Hz), got {bandwidth!r}")
+            positive("the bandwidth", bandwidth, ControllerError, "Hz")
             passed = 2.0 * math.pi * bandwidth * period
             left = math.exp(-passed)
             share = 1.0 - (1.0 - left) / passed

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.arguments import refusal, shown
+from heelstrike import arguments
+from heelstrike.arguments import are_numbers, refusal, shown
 from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.motion.motion import Motion
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.controller.law import REAL, per_actuator
+from heelstrike.robot.spatial.robot import SpatialRobot
+from heelstrike.sim.controller.law import per_actuator
 
 
 def must_be(kind: type, name: str, value: object) -> None:
@@ -84,10 +85,7 @@ def positive(name: str, value: object) -> float:
     ControllerError
         If it is none.
     """
-    found = number_of(name, value)
-    if not 0.0 < found < math.inf:
-        raise ControllerError(f"{name} must be a positive number, got {found!r}")
-    return found
+    return arguments.positive(name, number_of(name, value), ControllerError)
 
 
 def numbers_of(name: str, value: ArrayLike) -> Floats:
@@ -98,16 +96,12 @@ def numbers_of(name: str, value: ArrayLike) -> Floats:
     ControllerError
         If there is another thing among them.
     """
-    try:
-        found = np.asarray(value)
-    except ValueError:  # rows of different lengths
-        found = np.asarray(None)
-    if found.dtype.kind not in REAL:
+    if not are_numbers(value):
         raise ControllerError(f"{name} must be numbers, got {shown(value)}")
-    return found.astype(np.float64)
+    return np.array(value, dtype=np.float64)
 
 
-def gains_of(name: str, value: ArrayLike, robot: Robot) -> Floats:
+def gains_of(name: str, value: ArrayLike, robot: Robot | SpatialRobot) -> Floats:
     """Return gains of each actuator, (nu,), that are not negative, of one for all or for each.
 
     Raises

@@ -14,13 +14,13 @@ torques are held meanwhile.
 
 from __future__ import annotations
 
-import math
 import re
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from heelstrike.arguments import positive
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import is_ours, kernel, within_bounds
 from heelstrike.errors import ControllerError
@@ -159,9 +159,7 @@ def own_period(name: str, controller: Controller, period: float | None) -> float
     """
     if period is None:
         return min(inside(controller).period or PERIOD, PERIOD)
-    if not 0.0 < period < math.inf:
-        raise ControllerError(f"the period of {name!r} must be a positive number (s), got {period}")
-    return period
+    return positive(f"the period of {name!r}", period, ControllerError, "s")
 
 
 class Around(Law):

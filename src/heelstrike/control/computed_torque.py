@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.arguments import check_fields
+from heelstrike.arguments import check_fields, positive
 from heelstrike.compiler.bundle import array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import check_gait, gains_of, must_be
@@ -99,8 +99,7 @@ class Encoder:
 
     def __post_init__(self) -> None:
         check_fields(self, ControllerError)
-        if not 0.0 < self.period < np.inf:
-            raise ControllerError(f"the encoder period must be positive, got {self.period}")
+        positive("the encoder period", self.period, ControllerError, "s")
         if not 0.0 <= self.resolution < np.inf:
             raise ControllerError(f"the encoder resolution must be ≥ 0, got {self.resolution}")
 

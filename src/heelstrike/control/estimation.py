@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import positive, takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.around import Around, Shown, Wrapper, copy, copy_contacts, own_period
@@ -296,8 +296,7 @@ class Estimated(Around):
         threshold: float = 0.05, period: float | None = None,
     ) -> None:  # fmt: skip
         for name, value in (("bandwidth", bandwidth), ("threshold", threshold)):
-            if not (math.isfinite(value) and value > 0.0):
-                raise ControllerError(f"the {name} of an estimator must be positive, got {value!r}")
+            positive(f"the {name} of an estimator", value, ControllerError)
         period = own_period(ESTIMATED.name, controller, period)
         kept = math.exp(-2.0 * math.pi * bandwidth * period)
         own = Parameters(

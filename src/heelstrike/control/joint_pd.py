@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import one_of
 from heelstrike.compiler.bundle import array, number
-from heelstrike.control.arguments import check_gait
+from heelstrike.control.arguments import check_gait, gains_of
 from heelstrike.control.computed_torque import pitch_of
 from heelstrike.control.followed_gait import FollowedGait, followed
 from heelstrike.errors import ControllerError
@@ -25,7 +25,7 @@ from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.controller.law import Law, controller, per_actuator
+from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance_clock import StanceClock, exchange_at_touchdown, has_landed
 
@@ -152,21 +152,13 @@ class JointPD(Law):
         check_gait(robot, gait)
         refuse_loops(robot, "springs and dampers about a gait", ControllerError, loops=False)
         pitch_of(robot)
-        try:
-            known = Feedforward(feedforward)
-        except ValueError:
-            names = ", ".join(f"{each.value!r}" for each in Feedforward)
-            raise ControllerError(
-                f"feedforward must be one of {names}, got {feedforward!r}"
-            ) from None
+        known = one_of(Feedforward, "feedforward", feedforward, ControllerError)
         if gait.point_feet:
             raise ControllerError(
                 "springs and dampers about a gait need flat feet; for a gait on point feet use "
                 "ComputedTorque"
             )
-        kp, kd = per_actuator("kp", kp, robot), per_actuator("kd", kd, robot)
-        if np.any(kp < 0.0) or np.any(kd < 0.0):
-            raise ControllerError(f"kp and kd must not be negative, got {kp} and {kd}")
+        kp, kd = gains_of("kp", kp, robot), gains_of("kd", kd, robot)
         parameters = Parameters(
             kp=kp,
             kd=kd,

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.arguments import gains_of, must_be, number_of
+from heelstrike.control.arguments import gains_of, must_be, number_of, positive
 from heelstrike.control.feasible import (
     GROUND_ROWS,
     JOINT_ROWS,
@@ -380,15 +380,14 @@ class SteppingConstraints(Law):
         must_be(StepFamily, "family", family)
         gait = family.gait
         robot = gait.robot
-        for name, value in (("response", response), ("trust", trust), ("friction", friction)):
+        for name, value in (("response", response), ("trust", trust)):
             number_of(name, value)
+        friction = positive("friction", friction)
         if not (0.0 <= response < np.inf and 0.0 <= trust <= 1.0):
             raise ControllerError(
                 "response must not be negative and trust lies from 0 to 1; got "
                 f"response={response!r}, trust={trust!r}"
             )
-        if not 0.0 < friction < np.inf:
-            raise ControllerError(f"friction must be positive, got {friction!r}")
         phase, constant = gait.on_both_feet()
         middle = np.stack([family.middle, family.middle])
         middle[:, 0, 0] -= constant
@@ -397,7 +396,7 @@ class SteppingConstraints(Law):
             kd=gains_of("kd", kd, robot),
             response=float(response),
             trust=float(trust),
-            bounds=_bounds(family, float(friction)),
+            bounds=_bounds(family, friction),
             steepest=family.slope,
             rate=family.rate,
             level=float(family.energy[0].sum()),

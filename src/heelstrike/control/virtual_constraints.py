@@ -253,8 +253,6 @@ class VirtualConstraints(Law):
         if finite_time is not None:
             positive("finite_time", finite_time)
         number_of("exponent", exponent)
-        if finite_time is not None and not 0.0 < finite_time < np.inf:
-            raise ControllerError(f"finite_time must be a positive time in s, got {finite_time!r}")
         if not 0.0 < exponent < 1.0:
             raise ControllerError(
                 f"the exponent of a finite-time law lies between 0 and 1, got {exponent!r}"

@@ -1,4 +1,4 @@
-"""Linear equations of motion under controls that are held over an interval."""
+"""Linear equations of motion over an interval, under controls that are held or that answer."""
 
 from __future__ import annotations
 
@@ -19,3 +19,10 @@ def over_an_interval(A: Floats, B: Floats, width: float) -> tuple[Floats, Floats
     still = np.zeros((controls, states + controls))
     grown = expm(width * np.vstack([np.hstack([A, B]), still]))[:states]
     return grown[:, :states], grown[:, states:]
+
+
+def under_gains(A: Floats, B: Floats, gain: Floats, width: float) -> Floats:
+    """Return what an interval makes of errors to which controls answer at once, by −gain times."""
+    from scipy.linalg import expm
+
+    return np.asarray(expm(width * (A - B @ gain)))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from heelstrike.arguments import takes
-from heelstrike.errors import GaitError, WriteError
+from heelstrike.errors import GaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Footing, Gait, Phase, fingerprint
 from heelstrike.gait.margins import Margins
@@ -49,10 +49,7 @@ _MARGINS = {"_".join([each.name, *each.metadata.values()]): each.name for each i
 
 def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
     """Write a gait to a JSON file, which appears whole or not at all."""
-    try:
-        write_whole(path, json_text("gait", VERSION, entries_of(gait)))
-    except WriteError as error:
-        raise GaitError(str(error)) from error
+    write_whole(path, json_text("gait", VERSION, entries_of(gait)), GaitError)
 
 
 def entries_of(gait: Gait) -> dict[str, Any]:

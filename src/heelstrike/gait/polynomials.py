@@ -141,6 +141,13 @@ class Instants:
     """(N,) Quadrature weights for a step of duration 1; zero for instants at which constraints
     hold."""
 
+    @classmethod
+    def in_every_piece(cls, pieces: int, share: Floats, weight: Floats | None = None) -> Instants:
+        """Return instants that are the same shares of each piece, whose weights there are given."""
+        weights = np.zeros(share.size) if weight is None else weight / pieces
+        places = np.repeat(np.arange(pieces), share.size)
+        return cls(pieces, places, np.tile(share, pieces), np.tile(weights, pieces))
+
     @property
     def phases(self) -> Floats:
         """Share of the step that has gone by, (N,)."""

@@ -100,13 +100,7 @@ def first_instants(request: Request) -> tuple[int, Instants]:
     """
     if request.stance.flat:
         return 3, _one_piece(request.intervals)
-    pieces, (nodes, weights) = request.intervals, gauss(POINTS)
-    return POINTS + 1, Instants(
-        pieces,
-        np.repeat(np.arange(pieces), nodes.size),
-        np.tile(nodes, pieces),
-        np.tile(weights, pieces) / pieces,
-    )
+    return POINTS + 1, Instants.in_every_piece(request.intervals, *gauss(POINTS))
 
 
 def coarse(program: Program) -> Program:
@@ -119,8 +113,7 @@ def coarse(program: Program) -> Program:
 
 def _one_piece(intervals: int) -> Instants:
     """Nodes of Gauss and Lobatto on one piece."""
-    nodes, weights = lobatto(intervals)
-    return Instants(1, np.zeros(nodes.size, np.int64), nodes, weights)
+    return Instants.in_every_piece(1, *lobatto(intervals))
 
 
 @dataclass(frozen=True)
@@ -182,7 +175,7 @@ class Program:
         _, usual = typical_step(self.request)
         self._usual = usual / pieces
         """Duration of a piece (s) with which velocities and accelerations are told."""
-        self._ends = Instants(pieces, np.arange(pieces), np.ones(pieces), np.zeros(pieces))
+        self._ends = Instants.in_every_piece(pieces, np.ones(1))
         sizes = [n * pieces, n * pieces, n * pieces * (self.degree - 1), 1, 1]
         self._places = [0, *np.cumsum(sizes).tolist()]
         self._gaps = n * (2 * pieces - 1)
@@ -486,8 +479,7 @@ class Program:
     def violations(self, unknowns: Floats) -> Floats:
         """Scaled distances of the constraints outside of their bounds; positive if too low."""
         values = np.array(self._blocks.value(unknowns)[1]).ravel()
-        missing = np.maximum(self._lower - values, 0.0) - np.maximum(values - self._upper, 0.0)
-        return missing[self._gaps :]
+        return outside(values, self._lower, self._upper)[self._gaps :]
 
     def polished(self, unknowns: Floats, *, within_limits: bool = True) -> Floats:
         """Satisfy the equations to rounding, by the least change of the unknowns.
@@ -511,6 +503,11 @@ class Program:
         """Largest violation of a constraint, or of a bound of the step."""
         beyond = np.abs(unknowns - self.in_bounds(unknowns)).max()
         return float(max(beyond, np.abs(self.violations(unknowns)).max()))
+
+
+def outside(values: Floats, lower: Floats, upper: Floats) -> Floats:
+    """Distances of values from their bounds; positive if too low, zero within."""
+    return np.asarray(np.maximum(lower - values, 0.0) - np.maximum(values - upper, 0.0))
 
 
 def is_no_worse(after: float, before: float) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.arguments import at_least, at_most
+from heelstrike.arguments import at_least, at_most, one_of
 from heelstrike.dynamics.queries.following import Drive, drive_of
 from heelstrike.errors import GaitError, InfeasibleGaitError, RobotError
 from heelstrike.gait.clearance import ClearanceProfile
@@ -322,11 +322,7 @@ def _profiles(
         both = (ClearanceProfile.PARABOLA, ClearanceProfile.SMOOTH)
         flat = start is not None and start.clearance_profile is ClearanceProfile.SMOOTH
         return both if impact and not flat else both[1:]
-    try:
-        return (ClearanceProfile(profile),)
-    except ValueError:
-        names = ", ".join(repr(known.value) for known in ClearanceProfile)
-        raise GaitError(f"clearance_profile must be one of {names}, got {profile!r}") from None
+    return (one_of(ClearanceProfile, "clearance_profile", profile, GaitError),)
 
 
 def _mirror_of(robot: Robot) -> Mirror:

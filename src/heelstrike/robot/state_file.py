@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from heelstrike.errors import RobotError, WriteError
+from heelstrike.errors import RobotError
 from heelstrike.json_checksum import json_text, reading_json, shown
 from heelstrike.robot.coordinates import checked
 from heelstrike.robot.state import State
@@ -34,10 +34,7 @@ def save_state(robot: Robot, state: State, path: str | os.PathLike[str]) -> Path
         _VECTORS[0]: state.q.tolist(),
         _VECTORS[1]: state.v.tolist(),
     }
-    try:
-        return write_whole(path, json_text("state", VERSION, entries))
-    except WriteError as error:
-        raise RobotError(str(error)) from error
+    return write_whole(path, json_text("state", VERSION, entries), RobotError)
 
 
 def load_state(robot: Robot, path: str | os.PathLike[str]) -> State:

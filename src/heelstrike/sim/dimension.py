@@ -57,7 +57,7 @@ class Shown(NamedTuple):
 
 
 class Dimension(ABC):
-    """The plane, or space."""
+    """The plane, or space; nothing has latches, brakes or an implicit scheme by itself."""
 
     ground: ClassVar[type]
     """Class of its ground, which makes one of numbers by `of_numbers`."""
@@ -113,9 +113,9 @@ class Dimension(ABC):
     def checked_state(self, robot: Any, state: Any) -> State:
         """Return a state of a robot, or refuse what is none."""
 
-    @abstractmethod
     def is_plain(self, robot: Any, ground: Any) -> bool:
         """Whether a robot and the numbers of a ground have none of ``sim.frame.PLAIN``."""
+        return False
 
     @abstractmethod
     def is_free(self, robot: Any) -> bool:
@@ -125,11 +125,13 @@ class Dimension(ABC):
     def height(self, robot: Any, state: State, ground: Any) -> float:
         """Height of the centre of mass above the ground (m)."""
 
-    @abstractmethod
     def held(
         self, robot: Any, state: State, ground: Any, latched: Any, braked: Any
     ) -> tuple[tuple[bool, ...], tuple[bool, ...]]:
         """Which latches and brakes hold as a simulation begins."""
+        _refuse_joints(robot, "latches", latched)
+        _refuse_joints(robot, "brakes", braked)
+        return (), ()
 
     @abstractmethod
     def check(self, way: Method, setting: Setting) -> None:
@@ -167,8 +169,9 @@ class Dimension(ABC):
     def commands_voltage(self, controller: Any, robot: Any) -> bool:
         """Return whether a controller commands voltages, or refuse one that cannot."""
 
-    @abstractmethod
-    def take_gains(self, robot: Any, law: Law | None, voltage: bool, memory: Any) -> None:
+    def take_gains(  # noqa: B027 - not every dimension has such a scheme
+        self, robot: Any, law: Law | None, voltage: bool, memory: Any
+    ) -> None:
         """Note which joint forces an implicit scheme takes at the end of a step."""
 
     def doubt_gains(  # noqa: B027 - in the plane they are not judged
@@ -188,42 +191,42 @@ class Dimension(ABC):
     def way_out(self, ground: Any) -> str:
         """Say what gets a state out of a ground."""
 
-    @abstractmethod
     def latched(self, robot: Any, memory: Any) -> tuple[str, ...]:
         """Joints that latches hold."""
+        return ()
 
-    @abstractmethod
     def latch(
         self, robot: Any, state: State, ground: Any, joints: Iterable[str | int], memory: Any
     ) -> None:
         """Let latches hold these joints and no others."""
+        _refuse_joints(robot, "latches", joints)
 
-    @abstractmethod
     def braked(self, robot: Any, memory: Any) -> tuple[str, ...]:
         """Joints whose brakes are on."""
+        return ()
 
-    @abstractmethod
     def brake(self, robot: Any, state: State, joints: Iterable[str | int], memory: Any) -> None:
         """Put the brakes of these joints on, and let the others go."""
+        _refuse_joints(robot, "brakes", joints)
 
-    @abstractmethod
     def still_latched(self, robot: Any, joints: Any, memory: Any) -> list[str]:
         """Which of these joints a latch holds now."""
+        _refuse_joints(robot, "latches", joints)
+        return []
 
-    @abstractmethod
     def would_brake(self, robot: Any, joints: Any, memory: Any) -> bool:
         """Whether the brakes of these joints, and no others, are not those that are on."""
+        _refuse_joints(robot, "brakes", joints)
+        return False
 
     @abstractmethod
     def moved(self, state: State, robot: Any, memory: Any) -> None:
         """See to what follows from a state that was set from outside."""
 
-    @abstractmethod
-    def check_fit(self, ground: Any, memory: Any) -> None:
+    def check_fit(self, ground: Any, memory: Any) -> None:  # noqa: B027 - there may be for any
         """Refuse a ground that a simulation which has begun has no memory for."""
 
-    @abstractmethod
-    def laid(self, memory: Any) -> None:
+    def laid(self, memory: Any) -> None:  # noqa: B027 - methods may remember that themselves
         """Forget what touches the ground, because another has been laid."""
 
     @abstractmethod
@@ -268,6 +271,16 @@ class Dimension(ABC):
             "steps": found["steps"],
             "saturations": found["saturations"],
         }
+
+
+def _refuse_joints(robot: Any, what: str, joints: Any) -> None:
+    """Refuse joints that latches or brakes are to hold."""
+    from heelstrike.sim.contacts.latches import several
+
+    if joints is not None and len(tuple(several(what, joints))) > 0:
+        raise SimulationError(
+            f"{what} are for robots in the plane; robot {robot.name!r} in space has none"
+        )
 
 
 def dimension_of(robot: Any) -> Dimension:

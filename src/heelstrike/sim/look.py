@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cache, cached_property
 from typing import Any
-from weakref import WeakKeyDictionary
 
 from numba import types
 
@@ -14,13 +13,17 @@ from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.dynamics.kernels import forward_kinematics
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.once_each import once_each
 from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.geometry import locate_contacts
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import Memory, Surface
 
-_MOLDS: WeakKeyDictionary[Robot, Mold[Contacts]] = WeakKeyDictionary()
+
+@once_each
+def _mold_of(robot: Robot) -> Mold[Contacts]:
+    return Mold(Contacts.allocate({**robot.model.extents, "components": 2}))
 
 
 class Look:
@@ -40,16 +43,9 @@ class Look:
         extents = self._robot.model.extents
         return Workspace.allocate(extents), Surface.allocate(extents, capacity=self._robot.nc)
 
-    @cached_property
-    def _mold(self) -> Mold[Contacts]:
-        if self._robot not in _MOLDS:
-            extents = {**self._robot.model.extents, "components": 2}
-            _MOLDS[self._robot] = Mold(Contacts.allocate(extents))
-        return _MOLDS[self._robot]
-
     def at_contacts(self, ground: Ground, memory: Memory) -> Contacts:
         """Return the contact points of the state now, with the forces of the step before."""
-        contacts = self._mold.cast()
+        contacts = _mold_of(self._robot).cast()
         _locate()(self._robot.model, ground.model(), memory, *self._scratch, contacts)
         return contacts
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.mold import Mold
@@ -21,6 +19,8 @@ from heelstrike.contact.workspace import (
 from heelstrike.dynamics.articulated import ArticulatedBodies
 from heelstrike.dynamics.loops import LoopRows
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.once_each import once_each
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.constraint import friction_of
 from heelstrike.sim.contacts.rows import (
@@ -39,9 +39,6 @@ from heelstrike.sim.contacts.writers import lay_out_ties
 from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.push import Push, Pushes, pushes_on
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 class CommonTally(Bundle):
@@ -278,13 +275,8 @@ class Memory(Bundle):
 
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
-    if robot not in _MOLDS:
-        _MOLDS[robot] = Mold(_laid_out(robot))
-    memory = _MOLDS[robot].cast()
+    memory = _mold_of(robot).cast()
     return memory.replaced(pushes=pushes_on(robot, pushes)) if pushes else memory
-
-
-_MOLDS: WeakKeyDictionary[Robot, Mold[Memory]] = WeakKeyDictionary()
 
 
 def _contacts_of(kind: int, rows: Rows, extents: dict[str, int]) -> Contacts:
@@ -294,7 +286,8 @@ def _contacts_of(kind: int, rows: Rows, extents: dict[str, int]) -> Contacts:
     return Contacts.allocate(extents, gap=gap, position=position, normal=normal)
 
 
-def _laid_out(robot: Robot) -> Memory:
+@once_each
+def _mold_of(robot: Robot) -> Mold[Memory]:
     nc, model = robot.nc, robot.model
     rows = lay_out_rows(robot)
     points = usual_points(robot)
@@ -348,4 +341,4 @@ def _laid_out(robot: Robot) -> Memory:
         memory.surface.friction[entry] = friction_of(constraint)
     memory.reaction.mode[rows.first[LOOP] :] = STICK
     memory.reported.resting[:] = -1
-    return memory
+    return Mold(memory)

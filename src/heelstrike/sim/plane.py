@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactWorkspace
 from heelstrike.dynamics.queries.momenta import center_of_mass
 from heelstrike.errors import SimulationError
+from heelstrike.once_each import once_each
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -110,11 +110,7 @@ class Plane(Dimension):
 
     def mold(self, setting: Setting) -> Mold[Memory]:
         """Return the mold of the memory of a simulation, with nothing to scribble on."""
-        robot = setting.robot
-        if robot not in _MOLDS:
-            nothing = contact_workspace(1, ready=False)
-            _MOLDS[robot] = Mold(allocate_memory(robot).replaced(solver=nothing))
-        return _MOLDS[robot]
+        return _mold_of(setting.robot)
 
     def with_scratch(self, memory: Memory, scratch: ContactWorkspace) -> Memory:
         """Return a memory that its solvers scribble beside."""
@@ -194,31 +190,25 @@ class Plane(Dimension):
         """Brakes hold where the robot is now."""
         memory.loops.brake_position[:] = state.q[robot.model.brake_joint]
 
-    def check_fit(self, ground: Ground, memory: Memory) -> None:
-        """There is memory for any ground."""
-
-    def laid(self, memory: Memory) -> None:
-        """Nothing: methods remember what touches in their own bundles."""
-
     def unsolved(self, now: str, memory: Memory) -> str:
         """Say that nothing could certify a contact problem, and what it is like."""
         residual = memory.assembly.answer.residual.tolist()
         return f"no contact solver could certify a solution at {now}; residuals {residual}"
 
 
-_MOLDS: WeakKeyDictionary[Robot, Mold[Memory]] = WeakKeyDictionary()
-
 PLANE = Plane()
 
 
+@once_each
+def _mold_of(robot: Robot) -> Mold[Memory]:
+    nothing = contact_workspace(1, ready=False)
+    return Mold(allocate_memory(robot).replaced(solver=nothing))
+
+
+@once_each
 def has_rare_rows(robot: Robot) -> bool:
     """Whether a robot has rows of other kinds than contact points and joint stops."""
-    if robot not in _RARE:
-        model = robot.model
-        dry = model.dry_friction.any() or np.isfinite(model.brake_limit).any()
-        joints = model.loops or model.couplings or model.latches or model.brakes
-        _RARE[robot] = bool(dry or joints or robot.constraints)
-    return _RARE[robot]
-
-
-_RARE: WeakKeyDictionary[Robot, bool] = WeakKeyDictionary()
+    model = robot.model
+    dry = model.dry_friction.any() or np.isfinite(model.brake_limit).any()
+    joints = model.loops or model.couplings or model.latches or model.brakes
+    return bool(dry or joints or robot.constraints)

@@ -20,6 +20,7 @@ from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.field_texts import dataclass
 from heelstrike.notebook import ShownInNotebooks
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
@@ -37,8 +38,6 @@ if TYPE_CHECKING:
     from heelstrike.sim.method import Method, UnknownMethod
     from heelstrike.sim.record.record import RowsAndEvents
     from heelstrike.view.notebook.cards import Film
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,16 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Required, TypedDict
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from heelstrike.arguments import one_of, positive
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.loops import loop_displacement
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.once_each import once_each
 from heelstrike.robot.loops import row_names
 from heelstrike.robot.model import SCALES, Model
 from heelstrike.robot.robot import Robot
@@ -103,8 +104,8 @@ def checked_setting(
     dimension = dimension_of(robot)
     ground = dimension.checked_ground(ground)
     state = dimension.checked_state(robot, state)
-    if control_period is not None and not 0.0 < control_period < np.inf:
-        raise SimulationError(f"control_period must be a positive number, got {control_period}")
+    if control_period is not None:
+        positive("control_period", control_period, SimulationError)
     if not (hasattr(record_every, "__index__") and 1 <= record_every <= MOST_EVERY):
         raise SimulationError(f"record_every must be a whole number ≥ 1, got {record_every!r}")
     if stop_when_fallen is None:
@@ -124,17 +125,8 @@ def checked_setting(
         held=held,
         braked=on,
         checked=checked,
-        on_error=checked_on_error(on_error),
+        on_error=one_of(OnError, "on_error", on_error, SimulationError),
     )
-
-
-def checked_on_error(on_error: OnError | str) -> OnError:
-    """Return what becomes of an error in a controller, or refuse what is no such thing."""
-    try:
-        return OnError(on_error)
-    except ValueError:
-        known = ", ".join(repr(each.value) for each in OnError)
-        raise SimulationError(f"on_error is one of {known}; got {on_error!r}") from None
 
 
 def checked_pushes(robot: AnyRobot, pushes: Sequence[Push] | Push) -> tuple[Push, ...]:
@@ -164,21 +156,17 @@ def _held_by(setting: Setting) -> str:
     return f", {held}" if held else ""
 
 
-_DIGESTS: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
-
-
+@once_each
 def model_digest(model: Model | SpatialModel) -> str:
     """Return what tells the numbers of a robot from those of others."""
-    if model not in _DIGESTS:
-        digest = hashlib.sha256()
-        for name, value in model.members().items():
-            number: Any = model.declared[name]
-            usual = name in SCALES and np.all(value == number.default)
-            if number.later and (np.size(value) == 0 or usual):
-                continue  # snapshots that are older than the number stay good
-            digest.update(f"{name} {np.shape(value)} ".encode() + np.asarray(value).tobytes())
-        _DIGESTS[model] = digest.hexdigest()[:16]
-    return _DIGESTS[model]
+    digest = hashlib.sha256()
+    for name, value in model.members().items():
+        number: Any = model.declared[name]
+        usual = name in SCALES and np.all(value == number.default)
+        if number.later and (np.size(value) == 0 or usual):
+            continue  # snapshots that are older than the number stay good
+        digest.update(f"{name} {np.shape(value)} ".encode() + np.asarray(value).tobytes())
+    return digest.hexdigest()[:16]
 
 
 def check_state(robot: Robot, state: State) -> None:

@@ -889,15 +889,19 @@ class Simulation:
         for numbers in (self._control, self._numbers.control):
             numbers.robot.ending = NO_ENDING
 
+    @property
+    def _bundles(self) -> dict[str, Bundle]:
+        """All that changes as it goes on, by how its names begin in snapshots."""
+        return {
+            "clock.": self._clock, "memory.": self._memory, "work.": self._work,
+            "control.": self._control,
+        }  # fmt: skip
+
     def _camera(self, memory: Any) -> Camera:
         """Return what takes images of all that changes as a simulation goes on."""
         of, camera = self._cameras
         if of[0] is not memory or of[1] is not self._control:
-            bundles = {
-                "clock.": self._clock, "memory.": memory, "work.": self._work,
-                "control.": self._control,
-            }  # fmt: skip
-            camera = Camera(bundles.items())
+            camera = Camera((self._bundles | {"memory.": memory}).items())
             self._cameras = (memory, self._control), camera
         return camera
 

@@ -233,7 +233,7 @@ def test_saved_and_read_back_unchanged(
         ({"repeat": "sometimes"}, "'mirrored', 'same', 'never'"),
         ({"repeat": "never", "speed": None}, "needs start, and may have end"),
         ({"speed": None}, "give the distance or the speed"),
-        ({"speed": -1.0}, "speed must be positive"),
+        ({"speed": -1.0}, "speed must be a positive number"),
         ({"duration": 0.4, "distance": 0.3}, "not all three"),
         ({"duration": 9.0}, "beyond that"),
         ({"friction": -0.1}, "friction must not be negative"),

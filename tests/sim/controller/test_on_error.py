@@ -257,9 +257,9 @@ def test_a_simulation_that_is_watched_warns_instead_of_raising() -> None:
 
 
 def test_a_word_that_is_none_is_refused() -> None:
-    with pytest.raises(hs.SimulationError, match="on_error is one of 'warn', 'stop', 'raise'"):
+    with pytest.raises(hs.SimulationError, match="on_error must be one of 'warn', 'stop', 'raise'"):
         run_of(faulty(), on_error="ignore")
-    with pytest.raises(hs.SimulationError, match="on_error is one of"):
+    with pytest.raises(hs.SimulationError, match="on_error must be one of"):
         batch_of(1, on_error="ignore")
 
 

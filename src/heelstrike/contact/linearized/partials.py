@@ -28,6 +28,7 @@ from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.recordings.recording import Program, is_structural
 from heelstrike.compiler.straight_line import play, straight_line_code
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import (
@@ -295,33 +296,21 @@ def find_partials_along(
     balance: Balance, partials: Partials, found: PartialsAlong,
 ) -> None:  # fmt: skip
     """Find partial derivatives at many instants."""
-    numbers = partials.lacking_by_numbers.shape[1]
     for i in range(found.q.shape[0]):
-        for j in range(model.nq):
-            balance.q[j] = found.q[i, j]
-        for j in range(model.nv):
-            balance.v[j] = found.v[i, j]
-            balance.acceleration[j] = found.acceleration[i, j]
-            balance.going[j] = found.acceleration[i, j]
-        for point in range(model.nc):
-            for k in range(2):
-                balance.push[point, k] = found.push[i, point, k]
+        copy_words(found.q[i], balance.q)
+        copy_words(found.v[i], balance.v)
+        copy_words(found.acceleration[i], balance.acceleration)
+        copy_words(found.acceleration[i], balance.going)
+        copy_words(found.push[i], balance.push)
         find_partials(model, program, dated, tree, loops, balance, partials)
-        for row in range(2 * model.nc):
-            found.along[i, row] = balance.along[row]
-            for j in range(model.nv):
-                found.rows[i, row, j] = balance.rows[row, j]
-                found.along_by_v[i, row, j] = partials.along_by_v[row, j]
-            for j in range(model.nq):
-                found.along_by_q[i, row, j] = partials.along_by_q[row, j]
-        for row in range(model.nv):
-            for j in range(model.nv):
-                found.matrix[i, row, j] = balance.matrix[row, j]
-                found.lacking_by_v[i, row, j] = partials.lacking_by_v[row, j]
-            for j in range(model.nq):
-                found.lacking_by_q[i, row, j] = partials.lacking_by_q[row, j]
-            for j in range(numbers):
-                found.lacking_by_numbers[i, row, j] = partials.lacking_by_numbers[row, j]
+        copy_words(balance.along, found.along[i])
+        copy_words(balance.rows, found.rows[i])
+        copy_words(balance.matrix, found.matrix[i])
+        copy_words(partials.along_by_q, found.along_by_q[i])
+        copy_words(partials.along_by_v, found.along_by_v[i])
+        copy_words(partials.lacking_by_q, found.lacking_by_q[i])
+        copy_words(partials.lacking_by_v, found.lacking_by_v[i])
+        copy_words(partials.lacking_by_numbers, found.lacking_by_numbers[i])
 
 
 class Differentiated:

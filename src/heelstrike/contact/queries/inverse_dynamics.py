@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import one_of, takes
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.force_distribution import ForceDistribution, distribute
 from heelstrike.contact.queries.kinematics import contact_kinematics
@@ -118,7 +118,7 @@ def contact_inverse_dynamics(
     >>> standing.feasible, bool(np.isclose(standing.contact_force[:, 0].sum(), robot.weight))
     (True, True)
     """
-    choice = _choice(distribution)
+    choice = one_of(ForceDistribution, "distribution", distribution, ContactProblemError)
     kinematics = contact_kinematics(robot, q, v, ground)
     touching = np.flatnonzero(kinematics.gap < STANDING_GAP)
     carrying = list(contact_indices(robot, touching if contacts is None else contacts))
@@ -207,13 +207,3 @@ def _friction_use(force: Floats, friction: Floats, tiny: float) -> Floats:
 
 def _where(condition: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[int]:
     return [int(i) for i in np.flatnonzero(condition)]
-
-
-def _choice(distribution: str | ForceDistribution) -> ForceDistribution:
-    try:
-        return ForceDistribution(distribution)
-    except ValueError:
-        names = ", ".join(repr(known.value) for known in ForceDistribution)
-        raise ContactProblemError(
-            f"distribution must be one of {names}, got {distribution!r}"
-        ) from None

@@ -40,7 +40,7 @@ def placed(robot: Robot, state: State, ground: Ground) -> State:
 def standing(robot: Robot, ground: Ground) -> State:
     """Stand a robot on the ground with its soles on it; see :meth:`Robot.standing`."""
     start = placed(robot, robot.reference_state(), ground)
-    start = closed(robot, start) if _has_loops(robot) else start
+    start = closed(robot, start) if robot.model.loops + robot.model.couplings > 0 else start
     sole = _soles(robot)
     lift = _lift(robot)
     held = {*_above(robot, lift), *(TRUNK if robot.floating else ())} - {lift}
@@ -98,10 +98,6 @@ def closed(robot: Robot, state: State, keep: Iterable[str | int] = ()) -> State:
             + (", or let more joints move." if kept else ".")
         )
     return State(q, v)
-
-
-def _has_loops(robot: Robot) -> bool:
-    return robot.model.loops + robot.model.couplings > 0
 
 
 def _least(robot: Robot, q: Floats, free: Integers, wanted: Floats) -> Floats:

@@ -14,8 +14,16 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
+from heelstrike.robot.model import Floats
 
 Triple = tuple[float, float, float]
+
+
+@kernel
+def entries_of(values: Floats, begin: int, end: int) -> Triple:
+    """Numbers of the rows of a block, zero for those that it does not have."""
+    second = values[begin + 1] if begin + 1 < end else 0.0
+    return values[begin], second, values[begin + 2] if begin + 2 < end else 0.0
 
 
 @kernel

@@ -13,8 +13,8 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.sets import CONE
-from heelstrike.contact.spatial.cones import project
-from heelstrike.contact.spatial.iterates import find_velocities, look
+from heelstrike.contact.spatial.cones import entries_of, project
+from heelstrike.contact.spatial.iterates import begin_at, find_velocities
 from heelstrike.contact.spatial.newton import RIDGE, iterate_newton
 from heelstrike.contact.spatial.proximal import NOTHING_YET, OUTER_STEPS, keep_aside
 from heelstrike.contact.spatial.workspace import (
@@ -82,14 +82,14 @@ def descend(
         for block in range(problem.count):
             row = first[block]
             size = first[block + 1] - row
-            n, s, t = y[row] - rate * iterate.u[row], 0.0, 0.0
-            if size > 1:
-                s = y[row + 1] - rate * iterate.u[row + 1]
-            if size > 2:
-                t = y[row + 2] - rate * iterate.u[row + 2]
-            found = project(
-                problem.set[block], problem.friction[block], scaled.bound[block], n, s, t
+            now, there = (
+                entries_of(y, row, first[block + 1]),
+                entries_of(iterate.u, row, first[block + 1]),
             )
+            found = project(
+                problem.set[block], problem.friction[block], scaled.bound[block],
+                now[0] - rate * there[0], now[1] - rate * there[1], now[2] - rate * there[2],
+            )  # fmt: skip
             for i in range(size):
                 change = found[i] - near[row + i]
                 back += (y[row + i] - found[i]) * change
@@ -132,9 +132,7 @@ def guess_slips(
         descend(problem, scaled, rate, anchor.path, iterate)
         for row in range(rows):
             scaled.offset[row] = anchor.offset[row]
-            iterate.x[row] = anchor.path[row]
-        iterate.least = NOTHING_YET
-        look(problem, scaled, iterate)
+        begin_at(problem, scaled, anchor.path, iterate)
         for block in range(problem.count):
             lacks = slip_speed(problem, block, iterate.u) - anchor.slip[block]
             anchor.slip[block] += SHARE_OF_THE_WAY * lacks
@@ -142,7 +140,4 @@ def guess_slips(
             problem, scaled, settings, OUTER_STEPS, RIDGE, False, tally, iterate, newton
         )  # fmt: skip
         least = keep_aside(rows, least, iterate, anchor)
-    for row in range(rows):
-        iterate.x[row] = anchor.center[row]
-    iterate.least = NOTHING_YET
-    look(problem, scaled, iterate)
+    begin_at(problem, scaled, anchor.center, iterate)

@@ -20,6 +20,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.spatial.cones import Triple
 from heelstrike.contact.spatial.workspace import Floats
+from heelstrike.dynamics.spatial.algebra import dot, less, sum_of, times, vector
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 
@@ -372,17 +373,21 @@ def _laid(boxes: tuple[Box, ...], normal: Floats, height: float) -> tuple[Floats
 
 
 @kernel
+def box_axis(ground: SpatialGroundModel, box: int, k: int) -> Triple:
+    """Axis of a box, of unit length, in the world."""
+    r = ground.rotation
+    return r[box, 3 * k], r[box, 3 * k + 1], r[box, 3 * k + 2]
+
+
+@kernel
 def distance_to_box(ground: SpatialGroundModel, box: int, point: Triple) -> tuple[float, Triple]:
     """Signed distance of a point to a box, and the direction away from it."""
-    x = point[0] - ground.center[box, 0]
-    y = point[1] - ground.center[box, 1]
-    z = point[2] - ground.center[box, 2]
-    r = ground.rotation
+    apart = less(point, vector(ground.center, box))
     deepest, face, side = -math.inf, 0, 1.0
     square = 0.0
     away = (0.0, 0.0, 0.0)
     for k in range(3):
-        own = r[box, 3 * k] * x + r[box, 3 * k + 1] * y + r[box, 3 * k + 2] * z
+        own = dot(box_axis(ground, box, k), apart)
         beyond = abs(own) - ground.half[box, k]
         far = -abs(own) - ground.half[box, k]
         upper = ground.exposed[box, k] > 0.0
@@ -395,16 +400,11 @@ def distance_to_box(ground: SpatialGroundModel, box: int, point: Triple) -> tupl
         if beyond > 0.0:
             square += beyond * beyond
             signed = beyond if own >= 0.0 else -beyond
-            away = (
-                away[0] + signed * r[box, 3 * k],
-                away[1] + signed * r[box, 3 * k + 1],
-                away[2] + signed * r[box, 3 * k + 2],
-            )
+            away = sum_of(away, times(box_axis(ground, box, k), signed))
     distance = math.sqrt(square)
     if distance > ON_THE_FACE:
         return distance, (away[0] / distance, away[1] / distance, away[2] / distance)
-    normal = (side * r[box, 3 * face], side * r[box, 3 * face + 1], side * r[box, 3 * face + 2])
-    return deepest, normal
+    return deepest, times(box_axis(ground, box, face), side)
 
 
 @kernel
@@ -422,13 +422,10 @@ def is_beside(ground: SpatialGroundModel, box: int, point: Triple) -> bool:
 
     Points on the top of a box do not stumble over the rim of the next one.
     """
-    x = point[0] - ground.center[box, 0]
-    y = point[1] - ground.center[box, 1]
-    z = point[2] - ground.center[box, 2]
-    r = ground.rotation
+    apart = less(point, vector(ground.center, box))
     shallow = 0
     for k in range(3):
-        own = r[box, 3 * k] * x + r[box, 3 * k + 1] * y + r[box, 3 * k + 2] * z
+        own = dot(box_axis(ground, box, k), apart)
         beyond = abs(own) - ground.half[box, k]
         seen = ground.exposed[box, k if own >= 0.0 else 3 + k] > 0.0
         if not seen and beyond > BESIDE:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.spatial.cones import natural_map
+from heelstrike.contact.spatial.cones import entries_of, natural_map
 from heelstrike.contact.spatial.workspace import (
     BlockProblem,
     Floats,
@@ -17,9 +17,14 @@ from heelstrike.contact.spatial.workspace import (
 @kernel
 def find_velocities(rows: int, scaled: ScaledBlocks, x: Floats, u: Floats) -> None:
     """Write ``u = matrix x + offset``; the matrix is symmetric."""
-    matrix, offset = scaled.matrix, scaled.offset
     for row in range(rows):
-        u[row] = offset[row]
+        u[row] = scaled.offset[row]
+    add_products(rows, scaled.matrix, x, u)
+
+
+@kernel
+def add_products(rows: int, matrix: Floats, x: Floats, u: Floats) -> None:
+    """Add ``matrix x`` to u; the matrix is symmetric."""
     for column in range(rows):
         own = x[column]
         if own != 0.0:
@@ -32,20 +37,11 @@ def block_value(
     problem: BlockProblem, scaled: ScaledBlocks, block: int, x: Floats, u: Floats
 ) -> float:
     """Natural map of a block of the scaled problem."""
-    begin = problem.first[block]
-    size = problem.first[block + 1] - begin
-    s = t = us = ut = 0.0
-    if size > 1:
-        s, us = x[begin + 1], u[begin + 1]
-    if size > 2:
-        t, ut = x[begin + 2], u[begin + 2]
+    begin, end = problem.first[block], problem.first[block + 1]
     return natural_map(
-        problem.set[block],
-        problem.friction[block],
-        scaled.bound[block],
-        (x[begin], s, t),
-        (u[begin], us, ut),
-    )
+        problem.set[block], problem.friction[block], scaled.bound[block],
+        entries_of(x, begin, end), entries_of(u, begin, end),
+    )  # fmt: skip
 
 
 @kernel
@@ -69,6 +65,17 @@ def look(problem: BlockProblem, scaled: ScaledBlocks, iterate: Iterate) -> None:
     find_velocities(problem.first[problem.count], scaled, iterate.x, iterate.u)
     iterate.worst, iterate.square = measure(problem, scaled, iterate.x, iterate.u)
     note_best(problem, iterate)
+
+
+@kernel
+def begin_at(
+    problem: BlockProblem, scaled: ScaledBlocks, impulses: Floats, iterate: Iterate
+) -> None:
+    """Go to some impulses, and forget what was the best so far."""
+    for row in range(problem.first[problem.count]):
+        iterate.x[row] = impulses[row]
+    iterate.least = math.inf
+    look(problem, scaled, iterate)
 
 
 @kernel

@@ -17,7 +17,7 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL
-from heelstrike.contact.spatial.iterates import look, measure
+from heelstrike.contact.spatial.iterates import add_products, look, measure
 from heelstrike.contact.spatial.modes import OPEN, SLIP, STICK
 from heelstrike.contact.spatial.workspace import (
     BlockProblem,
@@ -157,14 +157,9 @@ def list_unknowns(
 @kernel
 def apply_matrix(rows: int, scaled: ScaledBlocks, change: Floats, moved: Floats) -> None:
     """Write what a change of the impulses does to the velocities; the matrix is symmetric."""
-    matrix = scaled.matrix
     for row in range(rows):
         moved[row] = 0.0
-    for column in range(rows):
-        own = change[column]
-        if own != 0.0:
-            for row in range(rows):
-                moved[row] += matrix[column, row] * own
+    add_products(rows, scaled.matrix, change, moved)
 
 
 @kernel

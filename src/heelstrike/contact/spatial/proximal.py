@@ -10,7 +10,7 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.spatial.gauss_seidel import sweep
-from heelstrike.contact.spatial.iterates import look, return_to_best
+from heelstrike.contact.spatial.iterates import begin_at, look, return_to_best
 from heelstrike.contact.spatial.newton import RIDGE, iterate_newton
 from heelstrike.contact.spatial.workspace import (
     Anchor,
@@ -92,8 +92,5 @@ def approach(
         least = keep_aside(rows, least, iterate, anchor)
         for row in range(rows):
             iterate.x[row] = anchor.path[row]
-    for row in range(rows):
-        iterate.x[row] = anchor.center[row]
-    iterate.least = NOTHING_YET
-    look(problem, scaled, iterate)
+    begin_at(problem, scaled, anchor.center, iterate)
     return iterate.least <= settings.tolerance

@@ -13,7 +13,7 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL
-from heelstrike.contact.spatial.cones import project
+from heelstrike.contact.spatial.cones import entries_of, project
 from heelstrike.contact.spatial.iterates import find_velocities, look, return_to_best
 from heelstrike.contact.spatial.modes import OPEN, SLIP, STICK
 from heelstrike.contact.spatial.newton import apply_matrix
@@ -285,15 +285,11 @@ def bring_inside(problem: BlockProblem, scaled: ScaledBlocks, x: Floats) -> None
     for block in range(problem.count):
         begin = problem.first[block]
         size = problem.first[block + 1] - begin
-        n, s, t = project(
-            problem.set[block], INSIDE * problem.friction[block], scaled.bound[block], x[begin],
-            x[begin + 1] if size > 1 else 0.0, x[begin + 2] if size > 2 else 0.0,
-        )  # fmt: skip
-        x[begin] += BEYOND * (n - x[begin])
-        if size > 1:
-            x[begin + 1] += BEYOND * (s - x[begin + 1])
-        if size > 2:
-            x[begin + 2] += BEYOND * (t - x[begin + 2])
+        n, s, t = entries_of(x, begin, begin + size)
+        kind, friction = problem.set[block], INSIDE * problem.friction[block]
+        inside = project(kind, friction, scaled.bound[block], n, s, t)
+        for i in range(size):
+            x[begin + i] += BEYOND * (inside[i] - x[begin + i])
 
 
 @kernel

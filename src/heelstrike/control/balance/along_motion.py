@@ -23,7 +23,7 @@ from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance import shifted_feet
 from heelstrike.control.balance.shifted_feet import moved_footholds, shift_feet
-from heelstrike.control.balance.tasks import MOTOR_LEVEL, torque_range
+from heelstrike.control.balance.tasks import MOTOR_LEVEL, is_solved, torque_range
 from heelstrike.control.followed_motion import place_in_phase
 from heelstrike.control.motion_tracking import (
     PRICE_OF_FORCES,
@@ -31,9 +31,8 @@ from heelstrike.control.motion_tracking import (
     torque_needed,
     tracked,
 )
-from heelstrike.control.quadratic.dual_active_set import solve_or_relax
-from heelstrike.control.quadratic.program import SOLVED, Program
-from heelstrike.control.quadratic.tasks import clear
+from heelstrike.control.quadratic.program import Program
+from heelstrike.control.quadratic.tasks import add_row, clear
 from heelstrike.gait.motion.motion import Motion
 from heelstrike.gait.polynomials import motion_in_piece
 from heelstrike.robot.model import Floats, Integers
@@ -83,18 +82,6 @@ class Log(Bundle):
 
 
 @kernel
-def add_row(program: Program, bound: float, level: int) -> int:
-    """Add a row of zeros; return which it is."""
-    row = program.count
-    for i in range(program.x.shape[0]):
-        program.rows[row, i] = 0.0
-    program.bound[row] = bound
-    program.level[row] = level
-    program.count = row + 1
-    return row
-
-
-@kernel
 def add_wishes(count: int, robot: ControlledRobot, parameters: Parameters, memory: Memory) -> None:
     """Add what the motion wants of accelerations and forces."""
     program, n = memory.program, robot.nv
@@ -121,14 +108,14 @@ def add_equations(
     program, n, weight = memory.program, robot.nv, parameters.weight
     for f in range(robot.unactuated.shape[0]):
         j = robot.unactuated[f]
-        row = add_row(program, (memory.passive[j] - memory.bias[j]) / weight, MOTOR_LEVEL)
+        row = add_row((memory.passive[j] - memory.bias[j]) / weight, MOTOR_LEVEL, program)
         for i in range(n):
             program.rows[row, i] = memory.mass[j, i] / weight
         for k in range(count):
             program.rows[row, n + k] = -memory.jacobian[memory.held[k], j]
     for k in range(count):
         held = memory.held[k]
-        row = add_row(program, -memory.moved[held], REST_LEVEL)
+        row = add_row(-memory.moved[held], REST_LEVEL, program)
         for i in range(n):
             program.rows[row, i] = memory.jacobian[held, i]
     program.equalities = program.count
@@ -141,10 +128,10 @@ def add_ground(count: int, robot: ControlledRobot, parameters: Parameters, memor
     for k in range(count):
         point, tangent = memory.held[k] // 2, memory.held[k] % 2
         if tangent == 0:
-            program.rows[add_row(program, 0.0, PUSH_LEVEL), n + k] = 1.0
+            program.rows[add_row(0.0, PUSH_LEVEL, program), n + k] = 1.0
             continue
         for side in range(2):  # a link has one tangential force
-            row = add_row(program, 0.0, SLIDE_LEVEL)
+            row = add_row(0.0, SLIDE_LEVEL, program)
             program.rows[row, n + k] = 1.0 - 2.0 * side
             for other in range(count):
                 if (
@@ -169,7 +156,7 @@ def add_motors(
             limit = -most if side else least
             if limit == -inf:
                 continue
-            row = add_row(program, (limit - sign * rest) / parameters.weight, MOTOR_LEVEL)
+            row = add_row((limit - sign * rest) / parameters.weight, MOTOR_LEVEL, program)
             for i in range(n):
                 program.rows[row, i] = sign * memory.mass[j, i] / parameters.weight
             for k in range(count):
@@ -206,13 +193,9 @@ def keep_to_motion(
     add_equations(count, robot, parameters, memory)
     add_ground(count, robot, parameters, memory)
     add_motors(count, robot, state, parameters, memory)
-    solve_or_relax(program)
-    if program.relaxed > 0:
-        memory.relaxed += 1
-    if program.status != SOLVED:
-        memory.unsolved += 1
+    solved = is_solved(program, memory)
     log.relaxed, log.unsolved = program.relaxed, memory.unsolved
-    if program.status != SOLVED:
+    if not solved:
         return
     for i in range(robot.nv + count):
         memory.unknown[i] = program.x[i]

@@ -8,8 +8,6 @@ they contribute are the columns found here.
 
 from __future__ import annotations
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array
@@ -24,6 +22,7 @@ from heelstrike.dynamics.kernels import (
 )
 from heelstrike.dynamics.places import point_columns
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.once_each import once_each
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
@@ -84,21 +83,16 @@ def constrain_tree(
     find_forces(model, rest, kinematics, q, v, held, passive, on)
 
 
+@once_each
 def constrained_programs(robot: Robot) -> Integers:
     """Return the addresses of :func:`constrain_tree` on each foot, zero where there is none."""
-    if robot not in _PROGRAMS:
-        arguments = flat_foot_arguments(robot) | {
-            "rest": np.setdiff1d(np.arange(robot.nv), robot.model.actuator_joint),
-            "sole": np.zeros(2),
-            "on": Constrained.allocate(nv=robot.nv, nu=robot.nu),
-        }
-        unread = "on.mass", "on.force", "on.columns"
-        found = flat_foot_programs(robot, constrain_tree, arguments, unread)
-        _PROGRAMS[robot] = np.array(found, np.int64)
-    return _PROGRAMS[robot]
-
-
-_PROGRAMS: WeakKeyDictionary[Robot, Integers] = WeakKeyDictionary()
+    arguments = flat_foot_arguments(robot) | {
+        "rest": np.setdiff1d(np.arange(robot.nv), robot.model.actuator_joint),
+        "sole": np.zeros(2),
+        "on": Constrained.allocate(nv=robot.nv, nu=robot.nu),
+    }
+    unread = "on.mass", "on.force", "on.columns"
+    return np.array(flat_foot_programs(robot, constrain_tree, arguments, unread), np.int64)
 
 
 @kernel

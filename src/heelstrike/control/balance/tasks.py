@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from math import cos, inf, sin
+from typing import Any
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance.constrained import Constrained
 from heelstrike.control.balance.numbers import Memory, Parameters
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import SOLVED, Program
-from heelstrike.control.quadratic.tasks import add_task
+from heelstrike.control.quadratic.tasks import add_task, keep_row
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.motors import motor_torque
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
@@ -33,10 +34,7 @@ def add_wrench_row(
     row = program.count
     for i in range(program.x.shape[0]):
         program.rows[row, i] = x * on.wrench[0, i] + z * on.wrench[1, i] + moment * on.wrench[2, i]
-    program.bound[row] = -(x * on.load[0] + z * on.load[1] + moment * on.load[2])
-    program.level[row] = level
-    program.count = row + 1
-    return row
+    return keep_row(-(x * on.load[0] + z * on.load[1] + moment * on.load[2]), level, program)
 
 
 @kernel
@@ -85,9 +83,7 @@ def add_motors(
             row = program.count
             for i in range(robot.nu):
                 program.rows[row, i] = sign * on.torque[actuator, i]
-            program.bound[row] = limit - sign * on.hold[actuator]
-            program.level[row] = MOTOR_LEVEL
-            program.count = row + 1
+            keep_row(limit - sign * on.hold[actuator], MOTOR_LEVEL, program)
 
 
 @kernel
@@ -103,16 +99,23 @@ def add_pressure(
 
 
 @kernel
-def solve_torques(
-    robot: ControlledRobot, state: ControlState, memory: Memory, torque: Floats
-) -> None:
-    """Solve the programme; write the torques of its answer, or the last ones if it has none."""
-    on, program = memory.on, memory.program
+def is_solved(program: Program, memory: Any) -> bool:
+    """Solve a programme and count, in the memory of a law, whether it is relaxed or unsolved."""
     solve_or_relax(program)
     if program.relaxed > 0:
         memory.relaxed += 1
     if program.status != SOLVED:
         memory.unsolved += 1
+    return bool(program.status == SOLVED)
+
+
+@kernel
+def solve_torques(
+    robot: ControlledRobot, state: ControlState, memory: Memory, torque: Floats
+) -> None:
+    """Solve the programme; write the torques of its answer, or the last ones if it has none."""
+    on, program = memory.on, memory.program
+    if not is_solved(program, memory):
         return
     for j in range(robot.nu):
         total = on.hold[j]

@@ -28,7 +28,8 @@ from heelstrike.contact.linearized.slopes import both, contact_slopes, exchanged
 from heelstrike.contact.linearized.strikes import strikes
 from heelstrike.control.computed_torque import pitch_of
 from heelstrike.control.gait_lqr.riccati import over_all_steps, swept_back
-from heelstrike.control.zero_order_hold import over_an_interval
+from heelstrike.control.gait_lqr.table import in_the_middles
+from heelstrike.control.zero_order_hold import over_an_interval, under_gains
 from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.held import HeldRobot
 from heelstrike.gait.gait import Gait
@@ -163,8 +164,6 @@ class FlatOrbit:
 
         The torques follow at once, or are held over each interval.
         """
-        from scipy.linalg import expm
-
         width = self.gait.step_duration / len(gains)
         moved = np.eye(len(self.jump))
         for (A, B), gain in zip(self.between(len(gains)), gains, strict=True):
@@ -172,16 +171,13 @@ class FlatOrbit:
                 grown, pushed = over_an_interval(A, B, width)
                 moved = (grown - pushed @ gain) @ moved
             else:
-                moved = expm(width * (A - B @ gain)) @ moved
+                moved = under_gains(A, B, gain, width) @ moved
         return moved
 
     def between(self, count: int) -> list[tuple[Floats, Floats]]:
         """A and B in the middles of even intervals."""
-        from scipy.interpolate import CubicSpline
-
-        middles = (np.arange(count) + 0.5) * self.gait.step_duration / count
         A, B = (
-            CubicSpline(self.time, np.array(each))(middles)
+            in_the_middles(self.time, np.array(each), count)
             for each in zip(*self.linear, strict=True)
         )
         return list(zip(A, B, strict=True))

@@ -16,7 +16,7 @@ from heelstrike.control.arguments import check_gait, positive, weights_of
 from heelstrike.control.computed_torque import pitch_of
 from heelstrike.control.followed_gait import FollowedGait, followed
 from heelstrike.control.gait_lqr.flat import FINE, KEPT, FlatOrbit
-from heelstrike.control.gait_lqr.table import interpolated
+from heelstrike.control.gait_lqr.table import feed_back, interpolated
 from heelstrike.control.gait_lqr.transverse import multipliers_of
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Footing, Gait
@@ -91,18 +91,8 @@ def flat_gait_lqr(
         j, sign = (i, 1.0) if first else (parameters.actuator[i], parameters.actuator_sign[i])
         memory.away[i] = sign * memory.error[j]
         memory.away[n + i] = sign * memory.error[n + j] if landed else 0.0
-    last = parameters.torque.shape[0] - 1
-    place = min(max(phase / parameters.duration, 0.0), 1.0) * last
-    here = min(int(place), last - 1)
-    part = place - here
-    for i in range(n):
-        total = 0.0
-        for side in range(2):
-            asked = parameters.torque[here + side, i]
-            for j in range(2 * n):
-                asked += parameters.gains[here + side, i, j] * memory.away[j]
-            total += (part if side == 1 else 1.0 - part) * asked
-        memory.asked[i] = total
+    share = phase / parameters.duration
+    feed_back(share, parameters.torque, parameters.gains, memory.away, memory.asked)
     for i in range(n):
         if first:
             torque[i] = memory.asked[i]

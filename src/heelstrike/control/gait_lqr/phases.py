@@ -31,7 +31,8 @@ from heelstrike.control.followed_motion import (
     points_of_phase,
 )
 from heelstrike.control.gait_lqr.riccati import over_all_steps, swept_back
-from heelstrike.control.zero_order_hold import over_an_interval
+from heelstrike.control.gait_lqr.table import in_the_middles
+from heelstrike.control.zero_order_hold import over_an_interval, under_gains
 from heelstrike.dynamics import contact_jacobian, inverse_dynamics, passive_force
 from heelstrike.errors import ControllerError
 from heelstrike.gait.motion.motion import Motion, MotionPhase
@@ -103,11 +104,7 @@ class PhasedOrbit:
 
     def between(self, p: int) -> list[tuple[Floats, Floats]]:
         """A and B in the middles of even intervals of a phase."""
-        from scipy.interpolate import CubicSpline
-
-        duration, count = self.motion.phases[p].duration, self.intervals(p)
-        middles = (np.arange(count) + 0.5) * duration / count
-        A, B = (CubicSpline(self.times[p], each)(middles) for each in self.linear[p])
+        A, B = (in_the_middles(self.times[p], each, self.intervals(p)) for each in self.linear[p])
         return list(zip(A, B, strict=True))
 
     @cached_property
@@ -219,13 +216,11 @@ class PhasedOrbit:
 
     def over_a_cycle(self, gains: list[Floats]) -> Floats:
         """What the motion, its last touchdown included, makes of errors under gains."""
-        from scipy.linalg import expm
-
         moved = np.eye(2 * self.robot.nv)
         for p, phase in enumerate(self.motion.phases):
             width = phase.duration / self.intervals(p)
             for (A, B), gain in zip(self.between(p), gains[p], strict=True):
-                moved = expm(width * (A - B @ gain)) @ moved
+                moved = under_gains(A, B, gain, width) @ moved
             moved = self.jumps[p] @ moved
         return moved
 

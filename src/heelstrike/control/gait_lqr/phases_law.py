@@ -24,7 +24,7 @@ from heelstrike.control.followed_motion import (
     place_in_phase,
 )
 from heelstrike.control.gait_lqr.phases import PhasedOrbit
-from heelstrike.control.gait_lqr.table import interpolated
+from heelstrike.control.gait_lqr.table import feed_back, interpolated
 from heelstrike.control.gait_lqr.transverse import multipliers_of
 from heelstrike.errors import ControllerError
 from heelstrike.gait.motion.motion import Motion
@@ -135,19 +135,8 @@ def motion_lqr(
     landed = all_landed(t, state, contacts, robot, parameters, memory)
     find_errors(t, landed, state, parameters, memory)
     phase = memory.phase
-    last = parameters.torque.shape[1] - 1
     share = (t - memory.start) / parameters.duration[phase]
-    place = min(max(share, 0.0), 1.0) * last
-    here = min(int(place), last - 1)
-    part = place - here
-    for i in range(robot.nu):
-        total = 0.0
-        for side in range(2):
-            asked = parameters.torque[phase, here + side, i]
-            for j in range(memory.error.shape[0]):
-                asked += parameters.gains[phase, here + side, i, j] * memory.error[j]
-            total += (part if side == 1 else 1.0 - part) * asked
-        torque[i] = total
+    feed_back(share, parameters.torque[phase], parameters.gains[phase], memory.error, torque)
 
 
 class MotionLQR(Law):

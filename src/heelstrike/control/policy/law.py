@@ -15,7 +15,6 @@ from heelstrike.control.policy.reference import (
     Following,
     between,
     follow,
-    nothing_to_follow,
     spot,
     stride_at,
 )
@@ -339,8 +338,8 @@ def _weights(network: Network, speed: float) -> Weights:
         mean=network.mean, scale=1.0 / network.deviation,
         observation_limit=network.observation_limit, skipped=network.skipped,
         velocity_limit=network.velocity_limit, gear=network.gear,
-        following=nothing_to_follow(len(network.gear)) if reference is None
-        else reference.numbers(),
+        following=reference.numbers() if reference is not None
+        else Following.allocate(speeds=0, phases=0, numbers=0, nu=len(network.gear)),
         every=1 if reference is None else round(network.period / reference.period),
         period=network.period, speed=float(speed),
     )  # fmt: skip

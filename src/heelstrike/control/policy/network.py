@@ -36,6 +36,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.arguments import positive
 from heelstrike.array_file import read_arrays, write_arrays
 from heelstrike.control.policy.reference import OBSERVED, Reference
 from heelstrike.errors import ControllerError
@@ -165,8 +166,7 @@ class Network:
             )
         if self.deviation.shape != self.mean.shape or not (self.deviation > 0.0).all():
             raise ControllerError("deviation of a policy must be positive, as many as the mean")
-        if not 0.0 < self.period < np.inf:
-            raise ControllerError(f"the period of a policy must be positive, got {self.period}")
+        positive("the period of a policy", self.period, ControllerError, "s")
         if self.reference is not None:
             every = self.period / self.reference.period
             if self.reference.stiffness.size != self.gear.size or every != round(every, 6):

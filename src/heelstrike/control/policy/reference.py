@@ -100,11 +100,6 @@ class Following(Bundle):
     """speed, stride, motion, stiffness, damping: As of :class:`Reference`."""
 
 
-def nothing_to_follow(nu: int) -> Following:
-    """Return the numbers of no motion."""
-    return Following.allocate(speeds=0, phases=0, numbers=0, nu=nu)
-
-
 @kernel
 def spot(speeds: Floats, phases: int, speed: float, phase: float) -> Spot:
     """Find where in a table a speed and a phase (strides) are."""

@@ -18,12 +18,12 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import positive, takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import SOLVED, Program
-from heelstrike.control.quadratic.tasks import add_task, clear
+from heelstrike.control.quadratic.tasks import add_task, clear, keep_row, scratch_row
 from heelstrike.control.spatial.hold_posture import posture_of
 from heelstrike.control.spatial.soles import soles_in_space
 from heelstrike.dynamics.spatial.algebra import (
@@ -187,23 +187,6 @@ def place_soles(
             for i in range(3):
                 memory.jacobian[first + i, k] = moves[i]
                 memory.jacobian[first + 3 + i, k] = turns[i]
-
-
-@kernel
-def scratch_row(program: Program) -> int:
-    """Return a row of zeros behind those that count."""
-    row = program.count
-    for i in range(program.x.shape[0]):
-        program.rows[row, i] = 0.0
-    return row
-
-
-@kernel
-def keep_row(bound: float, level: int, program: Program) -> None:
-    """Let the row behind those that count be one of them."""
-    program.bound[program.count] = bound
-    program.level[program.count] = level
-    program.count += 1
 
 
 @kernel
@@ -460,8 +443,7 @@ class HoldBalance(Law):
         if not robot.floating:
             raise ControllerError(f"robot {robot.name!r} does not float: it cannot fall over")
         for name, value in (("friction", friction), ("joint_kp", joint_kp), ("joint_kd", joint_kd)):
-            if not 0.0 < value < np.inf:
-                raise ControllerError(f"{name} must be a positive number, got {value}")
+            positive(name, value, ControllerError)
         soles = soles_in_space(robot, whole)
         feet, nu = len(soles.link), robot.nu
         free = np.setdiff1d(np.arange(robot.nv), robot.model.actuator_velocity)

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, number
-from heelstrike.control.arguments import must_be
+from heelstrike.control.arguments import gains_of, must_be
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.robot import SpatialRobot
-from heelstrike.sim.controller.law import Law, controller, per_actuator
+from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.spatial.controlled import (
     SpatialControlledRobot,
     SpatialControlState,
@@ -109,9 +109,7 @@ class HoldPosture(Law):
         gravity: bool = True,
     ) -> None:
         must_be(SpatialRobot, "robot", robot)
-        stiff, damped = per_actuator("kp", kp, robot), per_actuator("kd", kd, robot)
-        if np.any(stiff < 0.0) or np.any(damped < 0.0):
-            raise ControllerError(f"kp and kd must not be negative, got {stiff} and {damped}")
+        stiff, damped = gains_of("kp", kp, robot), gains_of("kd", kd, robot)
         whole, places = posture_of(robot, posture)
         parameters = PostureGains(
             kp=stiff, kd=damped, posture=whole[places].copy(), weight=int(gravity)

@@ -13,6 +13,7 @@ from math import sqrt
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.spatial.algebra import (
     INERTIA,
+    Spatial,
     force_carried,
     momentum_of,
     plus,
@@ -27,6 +28,32 @@ from heelstrike.dynamics.spatial.rotations import quaternion_at
 from heelstrike.dynamics.spatial.workspace import SpatialWorkspace, TreeFactor
 from heelstrike.robot.model import Floats
 from heelstrike.robot.spatial.model import BALL, FREE, SpatialModel
+
+
+@kernel
+def force_on_link(work: SpatialWorkspace, i: int, acceleration: Spatial) -> Spatial:
+    """Force that a link needs for the part of its acceleration that velocities do not make."""
+    velocity = spatial(work.velocity, i)
+    whole = plus(acceleration, spatial(work.bias_acceleration, i))
+    carried = force_carried(velocity, momentum_of(work.inertia, i, velocity))
+    return plus(momentum_of(work.inertia, i, whole), carried)
+
+
+@kernel
+def gather_forces(
+    model: SpatialModel, work: SpatialWorkspace, acceleration: Floats, force: Floats
+) -> None:
+    """Generalised force of the forces on all links, each of which receives those beyond it.
+
+    And of what motors turn with their joints, at the joints' acceleration.
+    """
+    for i in range(model.nl - 1, -1, -1):
+        f = spatial(work.force, i)
+        for k in range(model.first_velocity[i], model.last_velocity[i] + 1):
+            force[k] = power(spatial(work.motion, k), f) + model.armature[k] * acceleration[k]
+        parent = model.parent[i]
+        if parent >= 0:
+            write(parent, plus(spatial(work.force, parent), f), work.force)
 
 
 @kernel
@@ -45,17 +72,8 @@ def inverse_dynamics(
         for k in range(first, model.last_velocity[i] + 1):
             a = plus(a, scaled(spatial(work.motion, k), acceleration[k]))
         write(i, a, work.acceleration)
-        velocity = spatial(work.velocity, i)
-        a = plus(a, spatial(work.bias_acceleration, i))
-        carried = force_carried(velocity, momentum_of(work.inertia, i, velocity))
-        write(i, plus(momentum_of(work.inertia, i, a), carried), work.force)
-    for i in range(model.nl - 1, -1, -1):
-        f = spatial(work.force, i)
-        for k in range(model.first_velocity[i], model.last_velocity[i] + 1):
-            force[k] = power(spatial(work.motion, k), f) + model.armature[k] * acceleration[k]
-        parent = model.parent[i]
-        if parent >= 0:
-            write(parent, plus(spatial(work.force, parent), f), work.force)
+        write(i, force_on_link(work, i, a), work.force)
+    gather_forces(model, work, acceleration, force)
 
 
 @kernel
@@ -64,17 +82,8 @@ def bias_force(model: SpatialModel, work: SpatialWorkspace, force: Floats) -> No
     gravity = model.gravity
     free_fall = (0.0, 0.0, 0.0, -gravity[0], -gravity[1], -gravity[2])
     for i in range(model.nl):
-        velocity = spatial(work.velocity, i)
-        a = plus(free_fall, spatial(work.bias_acceleration, i))
-        carried = force_carried(velocity, momentum_of(work.inertia, i, velocity))
-        write(i, plus(momentum_of(work.inertia, i, a), carried), work.force)
-    for i in range(model.nl - 1, -1, -1):
-        f = spatial(work.force, i)
-        for k in range(model.first_velocity[i], model.last_velocity[i] + 1):
-            force[k] = power(spatial(work.motion, k), f)
-        parent = model.parent[i]
-        if parent >= 0:
-            write(parent, plus(spatial(work.force, parent), f), work.force)
+        write(i, force_on_link(work, i, free_fall), work.force)
+    gather_forces(model, work, work.zero, force)
 
 
 @kernel

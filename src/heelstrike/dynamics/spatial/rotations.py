@@ -97,17 +97,10 @@ def write_matrix(i: int, value: Matrix, rows: Floats) -> None:
 @kernel
 def matrix_product(a: Matrix, b: Matrix) -> Matrix:
     """Product of two matrices."""
-    return (
-        a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
-        a[0] * b[1] + a[1] * b[4] + a[2] * b[7],
-        a[0] * b[2] + a[1] * b[5] + a[2] * b[8],
-        a[3] * b[0] + a[4] * b[3] + a[5] * b[6],
-        a[3] * b[1] + a[4] * b[4] + a[5] * b[7],
-        a[3] * b[2] + a[4] * b[5] + a[5] * b[8],
-        a[6] * b[0] + a[7] * b[3] + a[8] * b[6],
-        a[6] * b[1] + a[7] * b[4] + a[8] * b[7],
-        a[6] * b[2] + a[7] * b[5] + a[8] * b[8],
-    )
+    x = turned(a, (b[0], b[3], b[6]))
+    y = turned(a, (b[1], b[4], b[7]))
+    z = turned(a, (b[2], b[5], b[8]))
+    return x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]
 
 
 @kernel

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from heelstrike.gait.cart_table.preview import PreviewControl
+from heelstrike.gait.cart_table.preview import preview_control
 from heelstrike.robot.model import Floats
 
 PREVIEW = 1.6
@@ -60,8 +60,10 @@ def followed(
 
 def _previewed(times: Floats, wanted: Floats, height: float, gravity: float) -> Motion:
     period = float(times[1])
-    control = PreviewControl.of(height, gravity, period, round(PREVIEW / period))
-    states, jerks = control.repeated(wanted)
+    servo = preview_control(
+        height=height, gravity=gravity, period=period, horizon=round(PREVIEW / period)
+    )
+    states, jerks = servo.repeated(wanted)
 
     def motion(t: Floats) -> Floats:
         k = np.clip((t / period).astype(np.int64), 0, len(jerks) - 1)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from heelstrike.arguments import at_least, at_most, takes
+from heelstrike.arguments import at_least, at_most, one_of, positive, takes
 from heelstrike.dynamics import center_of_mass, leg_joints, link_poses
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.cart_table.center_of_mass import Planner, followed
@@ -117,11 +117,7 @@ def plan_motion(
     >>> [len(phase.contacts) for phase in walk.phases]
     [4, 2]
     """
-    try:
-        way = Planner(planner)
-    except ValueError:
-        names = ", ".join(repr(each.value) for each in Planner)
-        raise GaitError(f"planner must be one of {names}, got {planner!r}") from None
+    way = one_of(Planner, "planner", planner, GaitError)
     _check_numbers(step_length, step_duration, double_support, height, clearance, corrections)
     both = double_support * step_duration
     front, rear = (foot.name for foot in robot.feet) if len(robot.feet) == 2 else ("", "")
@@ -149,11 +145,10 @@ def _check_numbers(
     clearance: float, corrections: int,
 ) -> None:  # fmt: skip
     for name, value, unit in (
-        ("step_length", step_length, " (m)"), ("step_duration", step_duration, " (s)"),
-        ("height", 1.0 if height is None else height, " (m)"), ("clearance", clearance, " (m)"),
+        ("step_length", step_length, "m"), ("step_duration", step_duration, "s"),
+        ("height", 1.0 if height is None else height, "m"), ("clearance", clearance, "m"),
     ):  # fmt: skip
-        if np.ndim(value) or not (np.isfinite(value) and value > 0.0):
-            raise GaitError(f"{name} must be a positive number{unit}, got {value!r}")
+        positive(name, value, GaitError, unit)
     if not SHORTEST <= step_duration <= LONGEST:
         raise GaitError(
             f"step_duration must be from {SHORTEST:g} to {LONGEST:g} s, got {step_duration:g}"

@@ -12,7 +12,7 @@ import numpy as np
 
 from heelstrike.arguments import takes
 from heelstrike.dynamics.loops import count_rows
-from heelstrike.errors import GaitError, WriteError
+from heelstrike.errors import GaitError
 from heelstrike.gait.motion.motion import Motion, MotionPhase
 from heelstrike.gait.motion.request import Repeat
 from heelstrike.json_checksum import Entries, json_text, reading_json
@@ -71,10 +71,7 @@ def save_motion(motion: Motion, path: str | PathLike[str]) -> None:
             for phase in motion.phases
         ],
     }
-    try:
-        write_whole(path, json_text("motion", VERSION, entries))
-    except WriteError as error:
-        raise GaitError(str(error)) from error
+    write_whole(path, json_text("motion", VERSION, entries), GaitError)
 
 
 def _closing(closes_to: float) -> dict[str, Any]:

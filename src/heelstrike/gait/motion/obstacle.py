@@ -8,7 +8,7 @@ from typing import Any
 import casadi
 import numpy as np
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import positive, takes
 from heelstrike.errors import GaitError
 from heelstrike.gait.cost import Instant, OwnConstraint
 from heelstrike.robot.robot import Robot
@@ -61,10 +61,8 @@ def over_obstacle(
     >>> robot = hs.load_robot("bravo7")
     >>> hurdle = hs.over_obstacle(robot, place=0.15, height=0.1, half_width=0.02)
     """
-    sizes = {"height": height, "half_width": half_width, "edge": edge}
-    for name, value in sizes.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise GaitError(f"{name} of an obstacle must be positive (m), got {value!r}")
+    for name, value in {"height": height, "half_width": half_width, "edge": edge}.items():
+        positive(f"{name} of an obstacle", value, GaitError, "m")
     if not np.isfinite(place):
         raise GaitError(f"place of an obstacle must be a number (m), got {place!r}")
     if not robot.feet:

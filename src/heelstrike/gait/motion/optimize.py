@@ -11,7 +11,7 @@ import casadi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.arguments import are_numbers, shown, takes
+from heelstrike.arguments import are_numbers, one_of, positive, shown, takes
 from heelstrike.dynamics import (
     contact_positions,
     link_poses,
@@ -249,11 +249,7 @@ def checked_request(
         )
     if not robot.floating:
         raise GaitError(f"motion design needs a floating robot; robot {robot.name!r} is not one")
-    try:
-        goes_on = Repeat(repeat)
-    except ValueError:
-        names = ", ".join(repr(each.value) for each in Repeat)
-        raise GaitError(f"repeat must be one of {names}, got {repeat!r}") from None
+    goes_on = one_of(Repeat, "repeat", repeat, GaitError)
     if goes_on is Repeat.MIRRORED and robot.mirror is None:
         raise GaitError(
             f"robot {robot.name!r} has no mirror image; ask for a whole cycle, with repeat='same'"
@@ -261,7 +257,8 @@ def checked_request(
     if len(phases) == 0 or not all(isinstance(each, ContactPhase) for each in phases):
         raise GaitError("phases must be one ContactPhase or more, in their order")
     speed, duration = (
-        _positive(name, value) for name, value in (("speed", speed), ("duration", duration))
+        None if value is None else positive(name, value, GaitError)
+        for name, value in (("speed", speed), ("duration", duration))
     )
     for name in ("friction", "clearance", "force_margin", "landing_speed"):
         if not (np.isfinite(others[name]) and others[name] >= 0.0):
@@ -300,15 +297,6 @@ def checked_request(
     if goes_on is not Repeat.NEVER:
         _check_repetition(request)
     return request
-
-
-def _positive(name: str, value: Any) -> float | None:
-    """Return a number that was asked for, if it was."""
-    if value is None:
-        return None
-    if np.ndim(value) or not (np.isfinite(value) and value > 0.0):
-        raise GaitError(f"{name} must be positive, got {value}")
-    return float(value)
 
 
 def _check_repetition(request: MotionRequest) -> None:
@@ -817,10 +805,7 @@ def _fine(pieces: int, times: int = 1) -> Instants:
     """Instants at which limits are checked, or some times as many."""
     count = times * FINER * STAGES
     share = (np.arange(count) + 0.5) / count
-    return Instants(
-        pieces, np.repeat(np.arange(pieces), count), np.tile(share, pieces),
-        np.zeros(pieces * count),
-    )  # fmt: skip
+    return Instants.in_every_piece(pieces, share)
 
 
 def _rows_at(program: MotionProgram, unknowns: Floats, p: int, grid: Instants) -> Floats:

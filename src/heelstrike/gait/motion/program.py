@@ -18,7 +18,7 @@ from heelstrike.gait.motion.phases import Standing
 from heelstrike.gait.motion.request import MotionRequest, Repeat
 from heelstrike.gait.motion.rows import Kind
 from heelstrike.gait.polynomials import Instants, coefficients, gauss
-from heelstrike.gait.program import NEAR, SETTINGS, Ipopt, is_no_worse, satisfied
+from heelstrike.gait.program import NEAR, SETTINGS, Ipopt, is_no_worse, outside, satisfied
 from heelstrike.gait.rows import Row
 from heelstrike.robot.model import Floats
 
@@ -150,11 +150,7 @@ def phases_of(grid: Instants) -> Floats:
 
 def gauss_points(pieces: int, stages: int = STAGES) -> Instants:
     """Gauss points of all pieces of a phase."""
-    nodes, weights = gauss(stages)
-    return Instants(
-        pieces, np.repeat(np.arange(pieces), stages), np.tile(nodes, pieces),
-        np.tile(weights, pieces) / pieces,
-    )  # fmt: skip
+    return Instants.in_every_piece(pieces, *gauss(stages))
 
 
 def looked_at(pieces: int, *, jumps: bool = False) -> Instants:
@@ -162,19 +158,18 @@ def looked_at(pieces: int, *, jumps: bool = False) -> Instants:
 
     And where all the others begin, if there a constraint jumps.
     """
-    begun = np.arange(pieces if jumps else 1)
-    begin = Instants(pieces, begun, np.zeros(begun.size), np.zeros(begun.size))
+    begin = beginnings(pieces if jumps else 1)
     return gauss_points(pieces).joined(endings(pieces)).joined(begin)
 
 
 def beginnings(pieces: int) -> Instants:
     """The beginning of every piece."""
-    return Instants(pieces, np.arange(pieces), np.zeros(pieces), np.zeros(pieces))
+    return Instants.in_every_piece(pieces, np.zeros(1))
 
 
 def endings(pieces: int) -> Instants:
     """The end of every piece."""
-    return Instants(pieces, np.arange(pieces), np.ones(pieces), np.zeros(pieces))
+    return Instants.in_every_piece(pieces, np.ones(1))
 
 
 @dataclass(eq=False)
@@ -570,10 +565,7 @@ class MotionProgram:
 
     def violations(self, unknowns: Floats) -> Floats:
         """Scaled distances of the constraints outside of their bounds; positive if too low."""
-        values = np.array(self.value(unknowns)[1]).ravel()
-        missing: Floats = np.maximum(self._lower - values, 0.0)
-        missing -= np.maximum(values - self._upper, 0.0)
-        return missing
+        return outside(np.array(self.value(unknowns)[1]).ravel(), self._lower, self._upper)
 
     def polished(self, unknowns: Floats) -> Floats:
         """Satisfy the equations to rounding, by the least change of all that is not given.

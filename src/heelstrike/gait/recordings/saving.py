@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from heelstrike.errors import GaitError, WriteError
+from heelstrike.errors import GaitError
 from heelstrike.gait.recordings.lines import FEWEST, LARGEST_FILE
 from heelstrike.gait.recordings.table import FASTEST, SLOWEST
 from heelstrike.robot.model import Floats
@@ -146,7 +146,4 @@ def save_columns(
     table.writerow(["time [s]", *headings])
     for row in np.column_stack([time, values]).tolist():
         table.writerow([repr(number) for number in row])
-    try:
-        write_whole(path, text.getvalue())
-    except WriteError as error:
-        raise GaitError(str(error)) from error
+    write_whole(path, text.getvalue(), GaitError)

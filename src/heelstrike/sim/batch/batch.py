@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.arguments import are_numbers, refusal, takes
+from heelstrike.arguments import are_numbers, one_of, refusal, takes
 from heelstrike.compiler.bundle import Bundle, address_of_array
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
@@ -30,7 +30,7 @@ from heelstrike.sim.dimension import dimension_of
 from heelstrike.sim.frame import Outcome
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import Push
-from heelstrike.sim.setting import checked_on_error, checked_setting
+from heelstrike.sim.setting import checked_setting
 from heelstrike.sim.simulation import CAN_GO_ON, FAR, Simulation
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.time_stepping import TimeStepping
@@ -175,7 +175,8 @@ class Batch:
         way = way_of(robot, method)
         self._setup: dict[str, Any] = {
             "control_period": control_period, "record_every": NO_ROWS,
-            "stop_when_fallen": stop_when_fallen, "on_error": checked_on_error(on_error),
+            "stop_when_fallen": stop_when_fallen,
+            "on_error": one_of(OnError, "on_error", on_error, SimulationError),
         }  # fmt: skip
         plans, _ = planned(
             way, self._setup, robot=robot, controller=controller, state=state,

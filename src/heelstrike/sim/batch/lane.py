@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, address_of_array
+from heelstrike.compiler.bundle import address_of_array
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Integers
@@ -116,11 +116,8 @@ class Lane(Simulation):
 
         Pushes are left out: their number may differ from lane to lane.
         """
-        bundles: dict[str, Bundle] = {
-            "clock.": self._clock, "memory.": self._memory, "work.": self._work,
-            "control.": self._control,
-        }  # fmt: skip
-        named = [each for prefix, bundle in bundles.items() for each in bundle.storage(prefix)]
+        bundles = self._bundles.items()
+        named = [each for prefix, bundle in bundles for each in bundle.storage(prefix)]
         return [
             (name, array)
             for name, array in named

@@ -7,11 +7,11 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.arguments import are_numbers, refusal
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.errors import ControllerError, RobotError, SimulationError
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
@@ -26,8 +26,6 @@ from heelstrike.sim.push import Push
 from heelstrike.sim.setting import Setting, checked_setting
 from heelstrike.sim.simulation import has_warned
 from heelstrike.sim.snapshot import Snapshot
-
-Floats = NDArray[np.float64]
 
 Joints = str | int | Iterable[str | int]
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.arguments import takes
+from heelstrike.arguments import one_of, takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
@@ -37,7 +37,6 @@ from heelstrike.sim.method import Method
 from heelstrike.sim.push import Push
 from heelstrike.sim.record.size import check_runs
 from heelstrike.sim.run import Timing
-from heelstrike.sim.setting import checked_on_error
 from heelstrike.sim.simulation import check_duration
 from heelstrike.sim.snapshot import Snapshot
 
@@ -154,7 +153,7 @@ def simulate_batch(
     begin = perf_counter()
     if record_every is not None and record_every < 1:
         raise SimulationError(f"record_every must be at least 1 or None, got {record_every}")
-    on_error = checked_on_error(on_error)
+    on_error = one_of(OnError, "on_error", on_error, SimulationError)
     workers = (os.cpu_count() or 1) if threads is None else threads
     if workers < 1:
         raise SimulationError(f"threads must be at least 1, got {threads}")

@@ -13,7 +13,7 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.arguments import refusal, shown
+from heelstrike.arguments import are_numbers, positive, refusal, shown
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.bundle_type import bundle_at
 from heelstrike.compiler.compilation import (
@@ -41,11 +41,6 @@ CONTROLLER_TYPE = types.FunctionType(CONTROLLER_SIGNATURE)
 
 controller_in = kept_value(CONTROLLER_TYPE)
 """``controller_in(words)``: what :attr:`ControllerFunction.words` keeps."""
-
-REAL = "biuf"
-"""Kinds of arrays of real numbers."""
-
-REAL_NUMBER = (int, float, np.integer, np.floating)
 
 
 class ControllerFunction:
@@ -310,11 +305,7 @@ def controller(
 
 def per_actuator(name: str, value: ArrayLike, robot: Robot | SpatialRobot) -> NDArray[np.float64]:
     """Return one number for each actuator, (nu,), of one for all or for each."""
-    try:
-        gains = np.asarray(value)
-    except ValueError:  # rows of different lengths
-        gains = np.asarray(None)
-    gains = gains.astype(np.float64) if gains.dtype.kind in REAL else np.full(1, np.nan)
+    gains = np.array(value, dtype=np.float64) if are_numbers(value) else np.full(1, np.nan)
     if gains.ndim > 1 or gains.size not in (1, robot.nu) or not np.all(np.isfinite(gains)):
         raise ControllerError(
             f"{name} must be one finite number or {robot.nu} (one an actuator), got {value!r}"
@@ -373,10 +364,8 @@ class Law:
         self.memory = dict(memory or {})
         strange = self.memory.keys() - function.memory.declared - function.memory.extent_names
         strange -= function.log.extent_names
-        if period is not None and not (isinstance(period, REAL_NUMBER) and 0.0 < period < np.inf):
-            raise ControllerError(
-                f"the period of a controller must be a positive number of seconds, got {period!r}"
-            )
+        if period is not None:
+            positive("the period of a controller", period, ControllerError, "s")
         if strange:
             raise ControllerError(
                 f"the memory of controller {function.name!r} has no {', '.join(sorted(strange))}"
@@ -431,18 +420,16 @@ class Law:
         extents = extents_of(robot)
         try:
             self.parameters.check(extents)
-            begin = {k: v for k, v in self.memory.items() if self._is_of(self.function.memory, k)}
-            memory = self.function.memory.settable().allocate(extents, **begin)
+            kind = self.function.memory
+            known = kind.declared.keys() | kind.extent_names
+            begin = {name: each for name, each in self.memory.items() if name in known}
+            memory = kind.settable().allocate(extents, **begin)
             memory.check(extents)
         except TypeError as error:
             raise ControllerError(
                 f"controller {self.function.name!r} does not fit robot {robot.name!r}: {error}"
             ) from error
         return type(self.parameters).settable()(**self.parameters.members()), memory
-
-    @staticmethod
-    def _is_of(bundle: type[Bundle], name: str) -> bool:
-        return name in bundle.declared or name in bundle.extent_names
 
     def new_log(self, robot: Any) -> Bundle:
         """Return a log to begin with, all zeros.

@@ -6,7 +6,6 @@ All positions, velocities and Jacobians are in world axes: x forward, z up, rota
 from __future__ import annotations
 
 from typing import NoReturn
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -41,6 +40,7 @@ from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.planar import momentum_of, power, spatial
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError
+from heelstrike.once_each import once_each
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import sole
@@ -413,12 +413,7 @@ def _end_run(ending: int) -> NoReturn:
 
 def robot_view(robot: Robot) -> ControlledRobot:
     """Make the view of a robot that a compiled law has."""
-    if robot not in _MOLDS:
-        _MOLDS[robot] = Mold(_laid_out(robot))
-    return _MOLDS[robot].cast()
-
-
-_MOLDS: WeakKeyDictionary[Robot, Mold[ControlledRobot]] = WeakKeyDictionary()
+    return _mold_of(robot).cast()
 
 
 def _flat_foot(robot: Robot) -> Integers:
@@ -428,7 +423,8 @@ def _flat_foot(robot: Robot) -> Integers:
     return np.array(programs, np.int64)
 
 
-def _laid_out(robot: Robot) -> ControlledRobot:
+@once_each
+def _mold_of(robot: Robot) -> Mold[ControlledRobot]:
     driven = set(robot.model.actuator_joint.tolist())
     legs = leg_joints(robot)
     view = ControlledRobot.allocate(
@@ -450,4 +446,4 @@ def _laid_out(robot: Robot) -> ControlledRobot:
         view.leg_joint[index, : len(legs[index])] = legs[index]
     view.unactuated[:] = [j for j in range(robot.nv) if j not in driven]
     view.flat_hold[:] = flat_foot_holds(robot)
-    return view
+    return Mold(view)

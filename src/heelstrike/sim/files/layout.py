@@ -101,9 +101,10 @@ class Layout(ABC):
     ) -> Any:
         """Make the ground of a file, perhaps with a shape of a known class."""
 
-    @abstractmethod
     def held(self, robot: Any, stored: Stored, known: Mapping[str, type]) -> Any:
         """Return a robot with the constraints of its run, of known classes."""
+        del stored, known
+        return robot
 
     @abstractmethod
     def places(self, kind: EventKind, robot: Any) -> tuple[str, int, int]:

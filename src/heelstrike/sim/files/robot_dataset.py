@@ -13,7 +13,7 @@ from heelstrike.robot.model import NUMBERS, SCALES, Model, bounds
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
-from heelstrike.sim.files.tree_variables import TreeVariables
+from heelstrike.sim.files.tree_variables import Bodies, TreeVariables
 from heelstrike.sim.files.variables import DamageError, Stored, Variable
 
 if TYPE_CHECKING:
@@ -34,12 +34,7 @@ _MIRROR = {
     "mirror_contact": Variable(("contact",), kind=int),
     "mirror_foot": Variable(("foot",), kind=int),
 }
-_OUTLINES = {
-    "outline_link": Variable(("outline",), kind=int),
-    "outline_radius": Variable(("outline",), "m"),
-    "outline_corners": Variable(("outline",), kind=int),
-    "outline_corner": Variable(("corner", "xz"), "m"),
-}
+_OUTLINES = Bodies("outline", "xz", Outline)
 
 
 def robot_to_dataset(robot: Robot) -> xarray.Dataset:
@@ -48,14 +43,9 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
     if robot.mirror is not None:
         values |= {name: getattr(robot.mirror, name.removeprefix("mirror_")) for name in _MIRROR}
     if robot.outlines:
-        values |= {
-            "outline_link": [each.link for each in robot.outlines],
-            "outline_radius": [each.radius for each in robot.outlines],
-            "outline_corners": [len(each.corners) for each in robot.outlines],
-            "outline_corner": np.concatenate([each.corners for each in robot.outlines]),
-        }
+        values |= _OUTLINES.values(robot.outlines, 2)
     attributes = {"floating": int(robot.floating), "symmetric": int(robot.mirror is not None)}
-    return _TREE.to_dataset(robot, _OUTLINES | _MIRROR, values, attributes)
+    return _TREE.to_dataset(robot, _OUTLINES.variables | _MIRROR, values, attributes)
 
 
 def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
@@ -84,18 +74,10 @@ def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
         model=model,
         mirror=mirror,
         floating=bool(stored.count("floating")),
-        outlines=_outlines(stored.arrays(_OUTLINES, sizes)) if "outline_link" in contents else (),
+        outlines=_OUTLINES.stored(stored, sizes) if "outline_link" in contents else (),
     )
     _check(robot)
     return robot
-
-
-def _outlines(arrays: Mapping[str, NDArray[Any]]) -> tuple[Outline, ...]:
-    link, radius, corners, corner = arrays.values()
-    if np.any(corners < 1) or corners.sum() != len(corner) or np.any(radius < 0.0):
-        raise DamageError("outlines must have corners, and radii that are not negative")
-    parts = np.split(corner, np.cumsum(corners)[:-1])
-    return tuple(map(Outline, link.tolist(), parts, radius.tolist()))
 
 
 def _check(robot: Robot) -> None:

@@ -22,7 +22,7 @@ from heelstrike.robot.spatial.solids import Solid
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.files.layout import SPATIAL, Layout
 from heelstrike.sim.files.logs import Extents
-from heelstrike.sim.files.tree_variables import TreeVariables
+from heelstrike.sim.files.tree_variables import Bodies, TreeVariables
 from heelstrike.sim.files.variables import DamageError, Stored, Variable
 from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.sim.spatial.space import SPACE, SpatialLook
@@ -43,12 +43,7 @@ _DIMS: Extents = {
 """Dimensions of the robot's part of a file: every link has a joint."""
 _SIZES = {"axis": 3, "quaternion": 4, "tensor": 6}
 _TREE = TreeVariables(SPATIAL_NUMBERS, _DIMS, FOLLOWING)
-_SOLIDS = {
-    "solid_link": Variable(("solid",), kind=int),
-    "solid_radius": Variable(("solid",), "m"),
-    "solid_corners": Variable(("solid",), kind=int),
-    "solid_corner": Variable(("corner", "axis"), "m"),
-}
+_SOLIDS = Bodies("solid", "axis", Solid)
 
 
 MANY_POINTS = 64
@@ -125,14 +120,6 @@ class _Space(Layout):
         scalars = {name: np.array(stored.number(f"ground_{name}")) for name in SCALARS}
         return SpatialGround.of_numbers(numbers | scalars)
 
-    def held(
-        self,
-        robot: SpatialRobot,
-        stored: Stored,
-        known: Mapping[str, type],
-    ) -> SpatialRobot:
-        return robot
-
     def places(self, kind: EventKind, robot: SpatialRobot) -> tuple[str, int, int]:
         if kind in (EventKind.UNCERTIFIED, EventKind.ENERGY_GAIN):
             return "place", -1, 1
@@ -160,22 +147,14 @@ class _Space(Layout):
         return kind in (BALL, HINGE)
 
     def robot_to_dataset(self, robot: SpatialRobot) -> xarray.Dataset:
-        solids = robot.solids
-        corners = [each.corners for each in solids]
-        values = {
-            "solid_link": [each.link for each in solids],
-            "solid_radius": [each.radius for each in solids],
-            "solid_corners": [len(each) for each in corners],
-            "solid_corner": np.concatenate([np.zeros((0, 3)), *corners]),
-        }
-        return _TREE.to_dataset(robot, _SOLIDS, values, {})
+        return _TREE.to_dataset(robot, _SOLIDS.variables, _SOLIDS.values(robot.solids, 3), {})
 
     def stored_robot(self, contents: Mapping[str, NDArray[Any]]) -> SpatialRobot:
         stored, sizes = Stored(contents), _SIZES.copy()
         numbers = stored.arrays(_TREE.numbers, sizes)
         model = _model(numbers, stored.count("pivot"), sizes)
         parts = _TREE.parts(stored, sizes)
-        solids = _solids(stored.arrays(_SOLIDS, sizes))
+        solids = _SOLIDS.stored(stored, sizes)
         links = [*(foot.link for foot in parts["feet"]), *(solid.link for solid in solids)]
         if any(not 0 <= link < model.nl for link in links):
             raise DamageError("a foot or a solid points outside the robot")
@@ -207,14 +186,6 @@ def _model(numbers: dict[str, Any], pivot: int, sizes: Mapping[str, int]) -> Spa
         if np.any(values >= most):
             raise DamageError(f"{name} points outside the robot")
     return SpatialModel.made(**numbers, pivot=pivot)
-
-
-def _solids(arrays: Mapping[str, NDArray[Any]]) -> tuple[Solid, ...]:
-    link, radius, corners, corner = arrays.values()
-    if np.any(corners < 1) or corners.sum() != len(corner) or np.any(radius < 0.0):
-        raise DamageError("solids must have corners, and radii that are not negative")
-    parts = np.split(corner, np.cumsum(corners)[:-1])
-    return tuple(map(Solid, link.tolist(), parts, radius.tolist())) if len(link) else ()
 
 
 IN_SPACE = _Space()

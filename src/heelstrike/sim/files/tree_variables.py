@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -130,3 +130,44 @@ def _feet_of(stored: Stored, sizes: dict[str, int]) -> tuple[Foot, ...]:
             zip(foot_name.tolist(), foot_link.tolist(), strict=True)
         )
     )
+
+
+class Bodies:
+    """Convex bodies on links, such as outlines and solids, as variables of a file.
+
+    Parameters
+    ----------
+    name : str
+        What one of them is called.
+    along : str
+        Dimension of the file along which the coordinates of a corner are.
+    kind : type
+        Their class, of link, corners and radius.
+    """
+
+    def __init__(self, name: str, along: str, kind: Callable[..., Any]) -> None:
+        self._name, self._kind = name, kind
+        self.variables = {
+            f"{name}_link": Variable((name,), kind=int),
+            f"{name}_radius": Variable((name,), "m"),
+            f"{name}_corners": Variable((name,), kind=int),
+            f"{name}_corner": Variable(("corner", along), "m"),
+        }
+
+    def values(self, bodies: Sequence[Any], axes: int) -> dict[str, Any]:
+        """Return bodies in a space of so many axes as values of the variables."""
+        columns = (
+            [each.link for each in bodies],
+            [each.radius for each in bodies],
+            [len(each.corners) for each in bodies],
+            np.concatenate([np.zeros((0, axes)), *(each.corners for each in bodies)]),
+        )
+        return dict(zip(self.variables, columns, strict=True))
+
+    def stored(self, stored: Stored, sizes: dict[str, int]) -> tuple[Any, ...]:
+        """Make the bodies of a file."""
+        link, radius, corners, corner = stored.arrays(self.variables, sizes).values()
+        if np.any(corners < 1) or corners.sum() != len(corner) or np.any(radius < 0.0):
+            raise DamageError(f"{self._name}s must have corners, and radii that are not negative")
+        parts = np.split(corner, np.cumsum(corners)[:-1])[: len(link)]  # of nothing one is left
+        return tuple(map(self._kind, link.tolist(), parts, radius.tolist()))

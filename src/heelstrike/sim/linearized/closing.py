@@ -15,17 +15,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.contact.linearized.partials import find_partials
 from heelstrike.dynamics.queries.linearization import solved
-from heelstrike.robot.model import Model
+from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.loops import TAKES_HOLD
 from heelstrike.sim.linearized.time_step import StepSlopes
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.time_stepping.method import MOREAU_JEAN, PAPER_EXPLICIT, Stepping
-
-Floats = NDArray[np.float64]
 
 
 def close_positions(model: Model, work: Stepping, memory: Memory, slopes: StepSlopes) -> None:

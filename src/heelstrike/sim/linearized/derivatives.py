@@ -13,6 +13,7 @@ from heelstrike.arguments import takes
 from heelstrike.contact.linearized.partials import FRICTION
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.compliant.method import Compliant
 from heelstrike.sim.contacts.loops import TAKES_HOLD
@@ -31,8 +32,6 @@ from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.time_stepping.method import TimeStepping
 from heelstrike.sim.whole_run import whole
-
-Floats = NDArray[np.float64]
 
 NOTHING: Mapping[str, ArrayLike] = MappingProxyType({})
 
@@ -372,12 +371,8 @@ class _TimeSteps:
         found: tuple[ModeChange, ...] = ()
         while simulation.time < end - AT_ONCE * step:
             if self._law is not None and is_due(simulation._clock):
-                instant = self._law.now()
-                self._law.check_call(instant)
-                asked = instant.torque()
-                held = instant.gains() @ change[:size]
                 own = [size + column for column in inputs.of_parameters()]
-                held[:, own] += instant.by_parameters(inputs.parameters)
+                asked, held = self._law.at_call(change, own, inputs.parameters)
             slopes.q[:], slopes.v[:] = simulation.state.q, simulation.state.v
             free = simulation._memory.loops.braked < TAKES_HOLD
             _one_step(simulation)
@@ -494,12 +489,8 @@ class _Yields:
         if simulation._control.continuous:
             law.check_memory()
         elif is_due(simulation._clock):
-            instant = law.now()
-            law.check_call(instant)
-            asked = instant.torque()
-            held = instant.gains() @ change[: len(instant.state.vector)]
             own = [self._yielding.size + column for column in self._inputs.of_parameters()]
-            held += instant.by_parameters(self._inputs.parameters) @ change[own]
+            asked, held = law.at_call(change, own, self._inputs.parameters)
         return held, asked
 
 

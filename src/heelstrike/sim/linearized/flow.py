@@ -6,18 +6,16 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from heelstrike.contact.linearized.motion import ActiveContacts, linearize_contact
 from heelstrike.errors import SimulationError
+from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Controller
-from heelstrike.sim.linearized.collocation import collocation
+from heelstrike.sim.linearized.collocation import collocation, stage_equations
 from heelstrike.sim.linearized.inputs import NONE, TORQUE, Inputs
 from heelstrike.sim.linearized.law import AskedAlong
 from heelstrike.sim.linearized.pushed import pushed, switches
 from heelstrike.sim.simulation import Simulation
-
-Floats = NDArray[np.float64]
 
 PANEL, ALONE = 0.005, 0.05
 """Longest stretch of time (s) that is taken at once under a law, as gaits are smooth by pieces
@@ -114,10 +112,7 @@ class Variation:
                 self._simulation.advance(start + span * NODES[0])
                 self._law.check_memory()
             slopes = [self._slope(start + span * node, active) for node in NODES]
-            system = np.eye(STAGES * size)
-            for i, j in np.ndindex(STAGES, STAGES):
-                block = span * MATRIX[i, j] * slopes[i][:, :size]
-                system[i * size : (i + 1) * size, j * size : (j + 1) * size] -= block
+            system = stage_equations(span * MATRIX, [slope[:, :size] for slope in slopes])
             rates = np.linalg.solve(system, np.vstack([slope @ error for slope in slopes]))
             stages = rates.reshape(STAGES, size, error.shape[1])
             error[:size] += span * np.tensordot(WEIGHTS, stages, axes=1)

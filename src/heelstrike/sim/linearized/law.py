@@ -205,6 +205,19 @@ class AskedAlong:
             first, self._first = self._first, None
             self.check_call(first)
 
+    def at_call(
+        self, change: Floats, rows: Sequence[int], parameters: Sequence[str]
+    ) -> tuple[Floats, Floats]:
+        """Return what it asks for in a call now, (nu,), and what errors do to that, (nu, k).
+
+        Columns of `change` are errors: its first rows those of the state (q, v), others, of which
+        `rows` names those of the law's parameters, of inputs.
+        """
+        instant = self.now()
+        self.check_call(instant)
+        asked, held = instant.torque(), instant.gains() @ change[: len(instant.state.vector)]
+        return asked, held + instant.by_parameters(parameters) @ change[rows]
+
     def check_call(self, instant: Instant) -> None:
         """Refuse a law that acts on what it keeps of the state in a call."""
         self._check_forces(instant)

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.dynamics.kernels import forward_kinematics
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.push import Push, add_push_slopes, add_pushes, pushes_on, switch_at
-
-Floats = NDArray[np.float64]
 
 
 class Pushed(TypedDict, total=False):

@@ -12,7 +12,6 @@ from functools import cached_property
 from itertools import pairwise, permutations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.contact.linearized.motion import (
     ActiveContacts,
@@ -23,14 +22,13 @@ from heelstrike.contact.linearized.slopes import ContactSlopes, contact_slopes
 from heelstrike.contact.linearized.strikes import Strike, strikes
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.linearized.flow import Variation
 from heelstrike.sim.linearized.inputs import Inputs
 from heelstrike.sim.linearized.pushed import pushed
 from heelstrike.sim.run import Event, Run
-
-Floats = NDArray[np.float64]
 
 SAME_INSTANT = 1e-11
 """Rows of a run within this time (s) of an event belong to it."""

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.linearized.partials import (
     Balance,
     Partials,
@@ -164,9 +165,7 @@ def differentiate_step(
         bounces = bounces or surface.restitution[assembly.candidate[place]] > 0.0
     if bounces:
         evaluate(model, slopes.v, slopes)
-        for row in range(slopes.bounce_by_q.shape[0]):
-            for j in range(model.nq):
-                slopes.bounce_by_q[row, j] = slopes.partials.along_by_q[row, j]
+        copy_words(slopes.partials.along_by_q, slopes.bounce_by_q)
     linearised, pushed = is_linearised(scheme), pushes.link.shape[0] > 0
     if impact.happens == 1:
         differentiate_problem(
@@ -199,25 +198,20 @@ def find_pushes(
 @kernel
 def pose_balance(q: Floats, v: Floats, added: Floats, normal: Floats, balance: Balance) -> None:
     """Write what all equations of a step have in common."""
-    for j in range(q.shape[0]):
-        balance.q[j] = q[j]
-    for j in range(v.shape[0]):
-        balance.v[j] = v[j]
-        balance.added[j] = added[j]
-    for contact in range(normal.shape[0]):
-        for k in range(2):
-            balance.normal[contact, k] = normal[contact, k]
+    copy_words(q, balance.q)
+    copy_words(v, balance.v)
+    copy_words(added, balance.added)
+    copy_words(normal, balance.normal)
 
 
 @kernel
 def evaluate(model: Model, going: Floats, slopes: StepSlopes) -> None:
     """Find the partial derivatives, with the points going at a velocity."""
-    balance = slopes.balance
-    for j in range(model.nv):
-        balance.going[j] = going[j]
+    copy_words(going, slopes.balance.going)
     find_partials(
-        model, slopes.program, slopes.dated, slopes.tree, slopes.loops, balance, slopes.partials
-    )
+        model, slopes.program, slopes.dated, slopes.tree, slopes.loops, slopes.balance,
+        slopes.partials,
+    )  # fmt: skip
 
 
 @kernel

@@ -26,22 +26,20 @@ from heelstrike.contact.linearized.slopes import plane
 from heelstrike.dynamics.queries.linearization import solved
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Model
+from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.compliant.corners import Corners
 from heelstrike.sim.compliant.dynamics import HELD, Laws, Rates, evaluate
 from heelstrike.sim.compliant.law import FrictionForces
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.controller.law import controller_in
-from heelstrike.sim.linearized.collocation import collocation
+from heelstrike.sim.linearized.collocation import collocation, stage_equations
 from heelstrike.sim.linearized.inputs import TORQUE, Inputs
 from heelstrike.sim.linearized.law import AskedAlong
 from heelstrike.sim.linearized.time_step import find_pushes
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import share_over_step
 from heelstrike.sim.simulation import Simulation
-
-Floats = NDArray[np.float64]
 
 STAGES = 4
 """Nodes of a step, the last its end: collocation of order 7."""
@@ -368,10 +366,7 @@ class Yielding:
                 for node, at in zip(NODES, stage @ rates, strict=True)
             ]
             lacking = rates - [each.rate for each in looks]
-            system = np.eye(STAGES * size)
-            for i, j in np.ndindex(STAGES, STAGES):
-                block = stage[i, j] * looks[i].slope[:, :size]
-                system[i * size : (i + 1) * size, j * size : (j + 1) * size] -= block
+            system = stage_equations(stage, [each.slope[:, :size] for each in looks])
             moved = np.linalg.solve(system, lacking.ravel()).reshape(rates.shape)
             if not np.all(np.isfinite(moved)):
                 return None

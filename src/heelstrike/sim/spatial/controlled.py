@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from heelstrike.dynamics.spatial.equations import (
 )
 from heelstrike.dynamics.spatial.kinematics import forward_kinematics, link_velocities
 from heelstrike.dynamics.spatial.workspace import SpatialWorkspace
+from heelstrike.once_each import once_each
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import HINGE, SLIDE, SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot
@@ -188,6 +188,7 @@ SEEN: dict[str, Any] = {
 """What laws are shown in space."""
 
 
+@once_each
 def words_in_space(function: ControllerFunction) -> Integers:
     """Words by which the loop finds the machine code of a law, made for robots in space.
 
@@ -196,12 +197,7 @@ def words_in_space(function: ControllerFunction) -> Integers:
     ControllerError
         If it cannot be compiled.
     """
-    if function not in _WORDS:
-        _WORDS[function] = machine_code_of(function, SEEN)
-    return _WORDS[function]
-
-
-_WORDS: WeakKeyDictionary[ControllerFunction, Integers] = WeakKeyDictionary()
+    return machine_code_of(function, SEEN)
 
 
 def view_of(robot: SpatialRobot) -> SpatialControlledRobot:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -22,7 +22,6 @@ from heelstrike.robot.spatial.robot import SpatialRobot, checked_state, quaterni
 from heelstrike.robot.state import State
 from heelstrike.robot.warning import warn
 from heelstrike.sim.batch.result import SpatialBatchResult
-from heelstrike.sim.contacts.latches import several
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law
 from heelstrike.sim.dimension import Dimension, Shown
@@ -96,11 +95,6 @@ class Space(Dimension):
         """Return a state of a robot with quaternions of length one, or refuse what is none."""
         return checked_state(robot, state)
 
-    def is_plain(self, robot: SpatialRobot, ground: Any) -> bool:
-        """There is one loop for all."""
-        del robot, ground
-        return False
-
     def is_free(self, robot: SpatialRobot) -> bool:
         """Whether any finite numbers are a state: quaternions are of length one."""
         return not quaternion_places(robot.model)
@@ -109,14 +103,6 @@ class Space(Dimension):
         """Height of the centre of mass above the plane of the ground, along its normal (m)."""
         center = spatial.center_of_mass(robot, state.q)
         return float(np.dot(ground.model().normal, center) - ground.model().height)
-
-    def held(
-        self, robot: SpatialRobot, state: State, ground: SpatialGround, latched: Any, braked: Any
-    ) -> tuple[tuple[bool, ...], tuple[bool, ...]]:
-        """No latch and no brake."""
-        refuse_joints(robot, "latches", latched)
-        refuse_joints(robot, "brakes", braked)
-        return (), ()
 
     def check(self, way: Method, setting: Setting) -> None:
         """Refuse what cannot be simulated."""
@@ -172,11 +158,6 @@ class Space(Dimension):
             )
         return False
 
-    def take_gains(
-        self, robot: SpatialRobot, law: Law | None, voltage: bool, memory: SpatialMemory
-    ) -> None:
-        """No scheme of space takes forces at the end of a step."""
-
     def doubt_gains(
         self, robot: SpatialRobot, law: Law | None, memory: SpatialMemory, step: float, steps: int
     ) -> None:
@@ -200,38 +181,6 @@ class Space(Dimension):
         """Say what gets a state out of a ground."""
         beside = ", or move it away from the box that it is in" if has_walls(ground) else ""
         return f"raise the robot{beside}"
-
-    def latched(self, robot: SpatialRobot, memory: SpatialMemory) -> tuple[str, ...]:
-        """No joint is held by a latch."""
-        return ()
-
-    def latch(
-        self, robot: SpatialRobot, state: State, ground: SpatialGround,
-        joints: Iterable[str | int], memory: SpatialMemory,
-    ) -> None:  # fmt: skip
-        """Refuse latches."""
-        refuse_joints(robot, "latches", joints)
-
-    def braked(self, robot: SpatialRobot, memory: SpatialMemory) -> tuple[str, ...]:
-        """No joint has a brake."""
-        return ()
-
-    def brake(
-        self, robot: SpatialRobot, state: State, joints: Iterable[str | int],
-        memory: SpatialMemory,
-    ) -> None:  # fmt: skip
-        """Refuse brakes."""
-        refuse_joints(robot, "brakes", joints)
-
-    def still_latched(self, robot: SpatialRobot, joints: Any, memory: SpatialMemory) -> list[str]:
-        """No joint is held by a latch."""
-        refuse_joints(robot, "latches", joints)
-        return []
-
-    def would_brake(self, robot: SpatialRobot, joints: Any, memory: SpatialMemory) -> bool:
-        """No joint has a brake."""
-        refuse_joints(robot, "brakes", joints)
-        return False
 
     def moved(self, state: State, robot: SpatialRobot, memory: SpatialMemory) -> None:
         """Nothing touches what it touched before."""
@@ -266,14 +215,6 @@ class Space(Dimension):
 def has_walls(ground: SpatialGround) -> bool:
     """Whether contact points may meet other faces of a ground than the one below them."""
     return len(ground.boxes) > 0
-
-
-def refuse_joints(robot: SpatialRobot, what: str, joints: Any) -> None:
-    """Refuse joints that latches or brakes are to hold."""
-    if joints is not None and len(tuple(several(what, joints))) > 0:
-        raise SimulationError(
-            f"{what} are for robots in the plane; robot {robot.name!r} in space has none"
-        )
 
 
 class SpatialLook:

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from xml.etree import ElementTree
 
-from heelstrike.errors import RobotError, WriteError
+from heelstrike.errors import RobotError
 from heelstrike.robot.files.saving.mjcf import mjcf
 from heelstrike.robot.files.saving.sdf import sdf
 from heelstrike.robot.files.saving.urdf import urdf
@@ -34,7 +34,4 @@ def save_robot(robot: Robot, path: str | os.PathLike[str]) -> Path:
         raise RobotError(
             f"{file}: a name of robot {robot.name!r} has a character that XML cannot hold."
         ) from None
-    try:
-        return write_whole(file, text)
-    except WriteError as error:
-        raise RobotError(str(error)) from error
+    return write_whole(file, text, RobotError)
