@@ -126,16 +126,17 @@ def leave_if_possible(
 
     `mode` are those of the candidates, `owner` of what each entry of the table is.
     """
-    free, delassus = problem.free, problem.delassus
+    free, delassus, first = problem.free, problem.delassus, problem.first
     several = False
     apart = True
     for place in range(count):
-        contact, row = candidate[place], 2 * place
+        contact, row = candidate[place], first[place]
         if problem.set[place] == INTERVAL:
             continue
         apart = apart and free[row] >= 0.0
         ratio = -slide[contact] * friction[contact]
-        if delassus[row, row] + ratio * delassus[row, row + 1] <= 0.0:
+        across = delassus[row, first[place + 1] - 1]
+        if delassus[row, row] + ratio * across <= 0.0:
             # Pressing it harder would push it into the ground: there are other solutions.
             several = True
             log_event(time, PAINLEVE, owner[contact], 0.0, 0.0, record.told)

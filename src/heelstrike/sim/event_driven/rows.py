@@ -28,7 +28,7 @@ from heelstrike.sim.event_driven.continuous_extension import (
 from heelstrike.sim.event_driven.dormand_prince import interpolate
 from heelstrike.sim.event_driven.location import EVENT_TIME, TOGETHER
 from heelstrike.sim.event_driven.phase import Integration, Motion, Output, Phase, Samples, Step
-from heelstrike.sim.event_driven.smooth.candidates import slides
+from heelstrike.sim.event_driven.smooth.candidates import slides, tell_parts
 from heelstrike.sim.event_driven.smooth.corners import record_corner
 from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate
 from heelstrike.sim.event_driven.smooth.gaps import gap_velocity
@@ -91,8 +91,9 @@ def show_who_carries(
             return
     for place in range(count):
         contact = assembly.candidate[place]
-        for k in range(2):
-            assembly.answer.impulse[2 * place + k] = force[contact, k]
+        row, end = assembly.problem.first[place], assembly.problem.first[place + 1]
+        for k in range(end - row):
+            assembly.answer.impulse[row + k] = force[contact, k]
 
 
 @kernel
@@ -124,11 +125,11 @@ def write_right(
     evaluate(scene, time, trial, control, memory, phase, output.slope)
     for k in range(3):
         residual[k] = 0.0
-    count, loop_rows = phase.forces.count, rows_of(loops)
+    count, loop_rows, first = phase.forces.count, rows_of(loops), assembly.problem.first
     if not lawful:
         count = 0
         for place in range(loop_rows):
-            impulse[2 * place] = 0.0
+            impulse[first[place]] = 0.0
     elif count + loop_rows > 0:
         solve_contacts(count, True, model, memory, phase)
         note_residual(residual, memory.tally)
@@ -137,13 +138,8 @@ def write_right(
                 count, memory.surface.friction, modes.slide, phase.watch.value, force, assembly
             )
     if loop_rows > 0:
-        first = assembly.problem.first
         note_loops(rows, count + loop_rows, 1.0, first, impulse, loops)
-    for contact in range(modes.watched):
-        force[contact, 0], force[contact, 1] = 0.0, 0.0
-    for place in range(count):
-        contact = assembly.candidate[place]
-        force[contact, 0], force[contact, 1] = impulse[2 * place], impulse[2 * place + 1]
+    tell_parts(count, modes.watched, assembly, impulse, force)
     row = record.rows
     note_row(time, memory, record)
     stop_torque, friction_torque = record.stop_torque[row], record.friction_torque[row]
