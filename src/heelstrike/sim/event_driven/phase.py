@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
+from heelstrike.contact.workspace import ContactAnswer
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.rows import contact_components, most_rows
@@ -148,11 +149,8 @@ class SaddlePoint(Bundle):
     bias: Floats = array("rows")
     """Known force of the state that was evaluated last, and acceleration of the rows of the
     candidates without any of the coordinates."""
-    mode: Integers = array("capacity", of=int)
-    impulse: Floats = array("rows")
-    velocity: Floats = array("rows")
-    residual: Floats = array(3)
-    """An answer of the contact solvers that is kept while a better one is looked for."""
+    answer: ContactAnswer = part(ContactAnswer)
+    """That of the contact solvers, kept while a better one is looked for."""
     needed: int = cell(int)
     used: int = cell(int)
     """needed, used: Whether the last evaluation took these equations; whether the answer of the

@@ -370,9 +370,7 @@ def solve_by_saddle_point(
 
 
 @kernel
-def copy_answer(
-    total: int, rows: int, source: ContactAnswer | SaddlePoint, target: ContactAnswer | SaddlePoint
-) -> None:
+def copy_answer(total: int, rows: int, source: ContactAnswer, target: ContactAnswer) -> None:
     """Copy an answer of the contact solvers to where it is kept, or back."""
     for place in range(total):
         target.mode[place] = source.mode[place]
@@ -409,7 +407,7 @@ def solve_once_more(
     """
     answer, total = assembly.answer, assembly.problem.count
     rows = assembly.problem.first[total]
-    copy_answer(total, rows, answer, saddle)
+    copy_answer(total, rows, answer, saddle.answer)
     for attempt in range(1 if solved or accelerations else 2):
         if attempt == 1:
             guess_modes(total, saddle.bias, assembly)
@@ -420,7 +418,7 @@ def solve_once_more(
                 tally.failures -= 1
                 tally.fallbacks += 1
             return True
-    copy_answer(total, rows, saddle, answer)
+    copy_answer(total, rows, saddle.answer, answer)
     return False
 
 
