@@ -21,6 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.contact.workspace import ContactProblem
@@ -57,7 +58,6 @@ from heelstrike.sim.event_driven.smooth.candidates import (
 )
 from heelstrike.sim.event_driven.smooth.corners import IMPACT, report_joints, report_points
 from heelstrike.sim.event_driven.smooth.dynamics import (
-    copy_state,
     evaluate,
     observe_rows,
     solve_constraints,
@@ -323,7 +323,7 @@ def solve_bridge(
         note_residual(assembly.answer.residual, memory.tally)
         if status != SOLVED or made_energy(total, assembly, added):
             return False
-        copy_state(bridge.free_end, end)
+        copy_words(bridge.free_end, end)
         size = assembly.problem.first[total]
         add_impulse(model, size, impulse, directions, equations, end[model.nq :])
         move_on(model, length, begin, end)
@@ -377,7 +377,7 @@ def find_impulses(
     free_loops(total, loops, free_end[model.nq :], 0.5 * length, assembly)
     for place in range(count, total):
         bridge.added[place] = 0.0
-    copy_state(free_end, end)
+    copy_words(free_end, end)
     move_on(model, length, begin, end)
     if total > 0:
         assemble_delassus(model, total, equations, directions, assembly.problem)
@@ -394,7 +394,7 @@ def find_impulses(
     finite = True
     for i in range(model.nv):
         finite = finite and np.isfinite(end[i])
-    copy_state(begin, after)
+    copy_words(begin, after)
     if total > 0:
         moved = after[model.nq :]
         add_impulse(model, first[total], assembly.answer.impulse, directions, equations, moved)
@@ -408,12 +408,12 @@ def end_of_parts(
 ) -> None:  # fmt: skip
     """Write where so many bridges end that take some time together; where they begin without."""
     begin, here, found = work.step.begin, work.bridge.here, True
-    copy_state(begin, here)
+    copy_words(begin, here)
     for _ in range(parts):
         found = found and find_impulses(scene, length / parts, bouncing, control, memory, work)
-        copy_state(work.bridge.end, begin)
-    copy_state(begin if found else here, end)
-    copy_state(here, begin)
+        copy_words(work.bridge.end, begin)
+    copy_words(begin if found else here, end)
+    copy_words(here, begin)
 
 
 @kernel
@@ -513,7 +513,7 @@ def cross_bridge(
     for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
         friction_torque[rows.owner[dry]] = impact.impulse[dry, 1] / series.length
     share_friction(model, modes.breakaway, friction_torque, record.brake_torque[row])
-    copy_state(bridge.end, begin)
+    copy_words(bridge.end, begin)
     for point in range(model.nc):
         impact.meets[point] = 0
     adopt_end(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.robot.model import Floats, Integers, Model
@@ -26,7 +27,7 @@ from heelstrike.sim.event_driven.smooth.corners import (
     report_joints,
     report_points,
 )
-from heelstrike.sim.event_driven.smooth.dynamics import copy_state, list_closed
+from heelstrike.sim.event_driven.smooth.dynamics import list_closed
 from heelstrike.sim.event_driven.smooth.faces import locate
 from heelstrike.sim.event_driven.smooth.gaps import (
     free_gap_acceleration,
@@ -226,7 +227,7 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
 @kernel
 def restore(before: Floats, reported: Reported, rows: Rows, modes: Modes, begin: Floats) -> None:
     """Go back to the state and the modes before an impact."""
-    copy_state(before, begin)
+    copy_words(before, begin)
     for contact in range(modes.watched):
         if rows.kind[contact] != DRY_JOINT:
             modes.closed[contact] = reported.closed[contact]
@@ -242,7 +243,7 @@ def strike(model: Model, ground: GroundModel, memory: Memory, work: Motion, reco
     modes, impact, bounces = work.phase.modes, work.impact, work.bounces
     rows, hit, reported = memory.rows, impact.hit, memory.reported
     state, before, time = work.step.begin, impact.before, work.step.time
-    copy_state(state, before)
+    copy_words(state, before)
     made = through = 0.0
     for attempt in range(2):
         solved, made, through = collide(model, 0.0, memory, work)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.brakes import share_friction
@@ -30,7 +31,7 @@ from heelstrike.sim.event_driven.location import EVENT_TIME, TOGETHER
 from heelstrike.sim.event_driven.phase import Integration, Motion, Output, Phase, Samples, Step
 from heelstrike.sim.event_driven.smooth.candidates import slides, tell_parts
 from heelstrike.sim.event_driven.smooth.corners import record_corner
-from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate
+from heelstrike.sim.event_driven.smooth.dynamics import evaluate
 from heelstrike.sim.event_driven.smooth.gaps import gap_velocity
 from heelstrike.sim.event_driven.smooth.projection import (
     INTERPOLATED,
@@ -65,13 +66,13 @@ def put_right(
 
     Returns whether the error of the dense output explains how far it is moved. If not it stays.
     """
-    copy_state(state, trial)
+    copy_words(state, trial)
     _, strayed, fastest = project(
         model, ground, equations, rows, surface, assembly, loops, phase, trial
     )
     if explained(state, trial, INTERPOLATED, step.relative, step.absolute):
         return True
-    copy_state(state, trial)
+    copy_words(state, trial)
     return is_in_place(strayed, fastest)
 
 
@@ -264,7 +265,7 @@ def write_rows_within(meets: Integers, output: Output, record: Record, within: I
                 is_extended = True
             interpolate_corrected(part, step.begin, step.dense, step.extension.correction, state)
         else:  # the end has been put on its constraints, and on the event
-            copy_state(step.end, state)
+            copy_words(step.end, state)
         fits = put_right(
             state, scene.model, scene.ground, step, memory.equations, memory.rows, memory.surface,
             memory.assembly, memory.loops, phase, output.state,

@@ -55,13 +55,6 @@ from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Surface
 
 
 @kernel
-def copy_state(source: Floats, state: Floats) -> None:
-    """Copy a state (q, v)."""
-    for i in range(source.shape[0]):
-        state[i] = source[i]
-
-
-@kernel
 def list_closed(
     rows: Rows, modes: Modes, candidate: Integers, first: Integers, bound: Floats
 ) -> int:

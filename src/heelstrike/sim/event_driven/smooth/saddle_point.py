@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.modes import (
     OPEN,
     SLIDING_BACKWARD,
@@ -370,15 +371,12 @@ def solve_by_saddle_point(
 
 
 @kernel
-def copy_answer(total: int, rows: int, source: ContactAnswer, target: ContactAnswer) -> None:
+def copy_answer(source: ContactAnswer, target: ContactAnswer) -> None:
     """Copy an answer of the contact solvers to where it is kept, or back."""
-    for place in range(total):
-        target.mode[place] = source.mode[place]
-    for row in range(rows):
-        target.impulse[row] = source.impulse[row]
-        target.velocity[row] = source.velocity[row]
-    for i in range(3):
-        target.residual[i] = source.residual[i]
+    copy_words(source.mode, target.mode)
+    copy_words(source.impulse, target.impulse)
+    copy_words(source.velocity, target.velocity)
+    copy_words(source.residual, target.residual)
 
 
 @kernel
@@ -407,7 +405,7 @@ def solve_once_more(
     """
     answer, total = assembly.answer, assembly.problem.count
     rows = assembly.problem.first[total]
-    copy_answer(total, rows, answer, saddle.answer)
+    copy_answer(answer, saddle.answer)
     for attempt in range(1 if solved or accelerations else 2):
         if attempt == 1:
             guess_modes(total, saddle.bias, assembly)
@@ -418,7 +416,7 @@ def solve_once_more(
                 tally.failures -= 1
                 tally.fallbacks += 1
             return True
-    copy_answer(total, rows, saddle.answer, answer)
+    copy_answer(saddle.answer, answer)
     return False
 
 
