@@ -15,6 +15,7 @@ from typing import Any, get_type_hints
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.compilation import Kernel
 from heelstrike.compiler.straight_line import play
+from heelstrike.compiler.words import copy_words
 from heelstrike.robot.model import Model
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.contacts.straight_line import KERNELS
@@ -151,8 +152,9 @@ class _Reading(ast.NodeVisitor):
             values = [value for value in node.args if not self._is_bundle(value)]
         else:
             values = [node.func, *node.args]
-            if isinstance(node.func, ast.Name) and node.func.id in self.stands_for:
-                # A function that was handed over: a controller, which writes its last argument.
+            handed = isinstance(node.func, ast.Name) and node.func.id in self.stands_for
+            if handed or called is copy_words:
+                # A function that was handed over, such as a controller, writes its last argument.
                 self._write_to(self.paths(node.args[-1]))
         for value in values:
             self.visit(value)

@@ -999,7 +999,7 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
                 gap, restitution, assembly.directions, impact.bounce, listing,
             )  # fmt: skip
         first = note_group(SECOND_FACE, first, count, assembly)
-        count = append_loops(count, 1, loops, assembly)
+        count = append_loops(count, loops, assembly)
         note_group(LOOP, first, count, assembly)
         free_loops(count, loops, next_v, 0.5 * step, assembly)
         if at_once:
