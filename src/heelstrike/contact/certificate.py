@@ -23,8 +23,9 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
+from heelstrike.contact.cone_certificate import EFFORT, FASTEST, LEAST, UNIT
 from heelstrike.contact.modes import Solver, SolveStatus
-from heelstrike.contact.sets import INTERVAL, LINE, is_empty, room, row_of
+from heelstrike.contact.sets import CONE, INTERVAL, LINE, is_empty, room, row_of
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -113,18 +114,23 @@ def certify(
     count = problem.count
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
     root, slope = scaling.root, scaling.slope
-    at_once = weigh_at_once(problem, settings, impulse, velocity, scaling)
+    at_once = certify_at_once(problem, settings, scaling, answer)
     if not at_once:
         weigh(problem, settings, impulse, scaling)
     unit = scaling.unit
+    answer.rest = REST_TOLERANCE * unit * (1.0 + scaling.effort)
     rounding = (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + scaling.effort)
     sharply = rounding > VISIBLE
+    if at_once and rounding <= VISIBLE:
+        scaling.rounding = rounding
+        return max(residual[0], max(residual[1], residual[2])) + rounding
+    scaling.size[FASTEST] = math.inf  # nobody has looked
     if sharply:
         rounding = sum_velocities_sharply(problem, impulse, scaling, velocity)
+        answer.rest = REST_TOLERANCE * unit * (1.0 + scaling.effort)
     elif not at_once:
         sum_velocities(problem, impulse, velocity)
     scaling.rounding = rounding
-    answer.rest = REST_TOLERANCE * unit * (1.0 + scaling.effort)
     inverse = 1.0 / unit if unit > 0.0 else 0.0
     complementarity = cone = non_penetration = 0.0
     first, end = problem.first, 0
@@ -224,22 +230,32 @@ def note_size(unit: float, effort: float, scaling: Scaling) -> None:
 
 
 @kernel
-def weigh_at_once(
-    problem: ContactProblem, settings: Settings, impulse: Floats, velocity: Floats, scaling: Scaling
+def certify_at_once(
+    problem: ContactProblem, settings: Settings, scaling: Scaling, answer: ContactAnswer
 ) -> bool:
-    """Do what :func:`weigh` and :func:`sum_velocities` do by a program; return success.
+    """Weigh the rows, sum their velocities and find the residuals by a program; return success.
 
-    There is one where few rows fill their matrix and each of them is moved by something.
+    There is one where few contacts, all of them cones, fill their matrix. Each row has to be moved
+    by something, and none may be prescribed to slide.
     """
-    rows, delassus, size = row_of(problem.count, problem.first), problem.delassus, scaling.size
-    if rows >= scaling.programs.shape[0] or delassus.shape[1] != rows or settings.skewed != 0:
+    count, delassus, size = problem.count, problem.delassus, scaling.size
+    if count >= scaling.programs.shape[0] or delassus.shape[1] != 2 * count:
         return False
-    program, free, root = scaling.programs[rows], problem.free, scaling.root
-    if program == 0:
+    plain = settings.skewed == 0 and scaling.programs[count] != 0
+    for contact in range(count):
+        plain = plain and problem.set[contact] == CONE and scaling.slope[contact] == 0.0
+    if not plain:
         return False
-    play(program, (delassus, free, impulse, root, velocity, size))
-    note_size(max(settings.floor, size[0]), size[1], scaling)
-    return bool(size[2] > 0.0)
+    size[UNIT] = settings.floor
+    play(
+        scaling.programs[count],
+        (
+            delassus, problem.free, problem.friction, answer.impulse, scaling.root,
+            answer.velocity, answer.residual, size,
+        ),
+    )  # fmt: skip
+    note_size(size[UNIT], size[EFFORT], scaling)
+    return bool(size[LEAST] > 0.0)
 
 
 @rare_kernel

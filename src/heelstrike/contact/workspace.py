@@ -107,10 +107,11 @@ class Scaling(Bundle):
     """The velocities that cancel, in units of the data's."""
     rounding: float = cell(float)
     """What rounding may hide from it."""
-    size: Floats = array(3)
-    """Scratch of the programs."""
-    programs: Integers = array("weighed", of=int, address=True)
-    """Addresses of the programs that weigh few rows, by their number; zero where there is none."""
+    size: Floats = array(4)
+    """What the programs measure with; see :mod:`heelstrike.contact.cone_certificate`."""
+    programs: Integers = array("cones", of=int, address=True)
+    """Addresses of the programs that certify few cones, by their number; zero where there is
+    none."""
 
 
 class StickingRows(Bundle):
@@ -141,6 +142,11 @@ class StickingRows(Bundle):
     """Solution in the order of the elimination; diagonals; edges of cones."""
     programs: Integers = array("sizes", of=int, address=True)
     """Addresses of the programs that solve small systems, by size; zero where there is none."""
+    margin: Floats = array(1)
+    """The least that a pivot has above what makes it good."""
+    standing: Integers = array("codes", of=int, address=True)
+    """Addresses of the programs for contacts that all stick, by their code; zero where there is
+    none."""
 
 
 class ReducedProblem(Bundle):

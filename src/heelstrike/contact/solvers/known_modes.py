@@ -13,9 +13,11 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.certificate import REST_TOLERANCE, certify
+from heelstrike.contact.cone_certificate import FASTEST
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.sets import EVERY_ROW, INTERVAL, LINE, projected, row_of
 from heelstrike.contact.solvers.elimination import POOR_PIVOT
+from heelstrike.contact.solvers.standing import EARLY_PIVOT, SHARED_ROW, code_of
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -27,12 +29,6 @@ from heelstrike.contact.workspace import (
 )
 from heelstrike.dynamics.dense import solve_positive
 from heelstrike.tolerances import NO_PIVOT
-
-SHARED_ROW = 1e-14
-"""Two rows are one if the inverse mass along their difference is less than this, relative."""
-
-EARLY_PIVOT = 1e-2
-"""Pivots that keep more than this of their diagonal are good."""
 
 COSTLY_PIVOT = 1e-5
 """Pivots that keep less than this of their diagonal leave no clean answer: rounding of the numbers,
@@ -484,6 +480,59 @@ def name_by_velocity(
 
 
 @dissolved_kernel
+def stand(
+    problem: ContactProblem, settings: Settings, rows: StickingRows, scaling: Scaling,
+    answer: ContactAnswer,
+) -> bool:  # fmt: skip
+    """Solve the contact problem at once if few contacts make it, and all stick; return success.
+
+    None pulls or slides in the answer. After a failure the modes are what they were.
+    """
+    code = code_of(problem, answer.mode)
+    program = rows.standing[code]
+    if program == 0:
+        return False
+    play(
+        program,
+        (
+            rows.row, rows.equation, rows.order, problem.delassus, problem.free, rows.lower_half,
+            rows.x, rows.pivot, rows.margin, answer.impulse,
+        ),
+    )  # fmt: skip
+    if not rows.margin[0] > 0.0 and not share_standing(code, problem, rows, answer.impulse):
+        return False
+    worst = certify(problem, settings, scaling, answer)
+    still = answer.residual[1] == 0.0 and scaling.size[FASTEST] <= answer.rest
+    return still and worst <= min(settings.tolerance, AS_GOOD)
+
+
+@kernel
+def share_standing(code: int, problem: ContactProblem, rows: StickingRows, impulse: Floats) -> bool:
+    """Share impulses to the least norm where rows depend on others, as under straight legs.
+
+    False is returned where it is not clear whether one does.
+    """
+    delassus, x, sharers, size = problem.delassus, rows.x, rows.sharers, 0
+    for row in range(2 * problem.count):
+        shared = row % 2 == 1 and (code >> (problem.count - 1 - row // 2)) & 1 == 1 and row > 1
+        if shared:
+            rows.equation[row] = rows.equation[row - 2]
+            sharers[rows.equation[row]] += 1.0
+            continue
+        pivot, diagonal = rows.pivot[size], delassus[row, row]
+        if not pivot > EARLY_PIVOT * diagonal and not abs(pivot) <= NO_PIVOT * diagonal:
+            return False
+        rows.equation[row] = size
+        sharers[size] = 1.0
+        size += 1
+    leave_out_idle(size, rows)
+    for row in range(2 * problem.count):
+        place = row_of(row, rows.equation)
+        impulse[row] = x[place] / sharers[place]
+    return True
+
+
+@dissolved_kernel
 def repeat(
     problem: ContactProblem,
     settings: Settings,
@@ -496,6 +545,8 @@ def repeat(
     After a success the answer is the one of least norm, certified as :data:`AS_GOOD`. Of contacts
     that pull or press although they should not, the modes are changed.
     """
+    if stand(problem, settings, rows, scaling, answer):
+        return True
     drifts = False
     for attempt in range(TRIES):
         size, slips = list_equations(attempt == 0, problem, answer.mode, rows)

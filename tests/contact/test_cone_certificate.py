@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from heelstrike.contact import solve_contact
-from heelstrike.contact.certificate import certify, weigh_at_once
+from heelstrike.contact.certificate import certify, certify_at_once
+from heelstrike.contact.cone_certificate import MOST_CONES
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.contact.solvers.certified_solve import contact_workspace
-from heelstrike.contact.weighing import MOST_ROWS
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -56,7 +56,7 @@ def certified(work: ContactWorkspace, problem: ContactProblem, impulse: Any) -> 
 
 @pytest.mark.parametrize("room", [0, 3])
 @pytest.mark.parametrize("stop", [False, True])
-@pytest.mark.parametrize("contacts", range(1, MOST_ROWS // 2 + 2))
+@pytest.mark.parametrize("contacts", range(1, MOST_CONES + 2))
 @pytest.mark.parametrize(
     "change", [lambda p, w: None, lambda p, w: setattr(w.settings, "floor", 9)]
 )
@@ -74,9 +74,9 @@ def test_it_says_what_loops_say(
             work = contact_workspace(contacts + room, symmetric=symmetric)
             change(problem, work)
             said.append(certified(work, problem, impulse))
-            velocity = np.zeros(2 * (contacts + room))
-            at_once = weigh_at_once(problem, work.settings, impulse, velocity, work.scaling)
-            assert at_once == (symmetric and rows <= MOST_ROWS and len(problem.delassus) == rows)
+            answer = ContactAnswer.allocate(capacity=contacts + room)
+            at_once = certify_at_once(problem, work.settings, work.scaling, answer)
+            assert at_once == (symmetric and contacts <= MOST_CONES and room == 0 and not stop)
         size = float(np.abs(impulse).max()) * 10.0
         for place, (one, other) in enumerate(zip(*said, strict=True)):
             # What is left of sums that cancel is as exact as their terms, all else as it is itself.
@@ -88,8 +88,7 @@ def test_rows_that_nothing_moves_are_left_to_loops() -> None:
     work = contact_workspace(1)
     problem = contact_problem(1, count=1, delassus=np.diag([2.0, 0.0]), free=np.array([-1.0, 0.0]))
     answer = ContactAnswer.allocate(capacity=1, impulse=np.array([0.5, 0.0]))
-    velocity = np.zeros(2)
-    assert not weigh_at_once(problem, work.settings, answer.impulse, velocity, work.scaling)
+    assert not certify_at_once(problem, work.settings, work.scaling, answer)
     assert certify(problem, work.settings, work.scaling, answer) < 1e-14
     assert work.scaling.unit == pytest.approx(np.sqrt(0.5), rel=1e-15)
 
