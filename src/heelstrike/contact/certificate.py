@@ -251,7 +251,7 @@ def certify_at_once(
         scaling.programs[count],
         (
             delassus, problem.free, problem.friction, answer.impulse, scaling.root,
-            answer.velocity, answer.residual, size,
+            answer.velocity, answer.residual, size, scaling.tree,
         ),
     )  # fmt: skip
     note_size(size[UNIT], size[EFFORT], scaling)

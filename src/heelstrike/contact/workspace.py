@@ -109,6 +109,8 @@ class Scaling(Bundle):
     """What rounding may hide from it."""
     size: Floats = array(4)
     """What the programs measure with; see :mod:`heelstrike.contact.cone_certificate`."""
+    tree: Floats = array(7, 32)
+    """Their scratch."""
     programs: Integers = array("cones", of=int, address=True)
     """Addresses of the programs that certify few cones, by their number; zero where there is
     none."""

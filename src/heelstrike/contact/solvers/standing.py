@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
-from heelstrike.compiler.recordings.recording import Program
+from heelstrike.compiler.recordings.recording import Program, smaller
 from heelstrike.compiler.straight_line import straight_line_code
-from heelstrike.contact.cone_certificate import smaller
 from heelstrike.contact.modes import STICK
 from heelstrike.contact.sets import CONE
 from heelstrike.contact.solvers.elimination import eliminate

@@ -48,7 +48,7 @@ KERNELS: tuple[Callable[..., None], ...] = (
     locate_points,
 )
 
-SIDE_BY_SIDE = (point_delassus,)
+SIDE_BY_SIDE = (point_delassus, point_velocities, locate_points)
 """Those that do the same with many numbers."""
 
 MOST_COORDINATES = 12
