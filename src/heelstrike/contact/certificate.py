@@ -20,12 +20,12 @@ from dataclasses import field
 
 import numpy as np
 
-from heelstrike.compiler.compilation import kernel, rare_kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.cone_certificate import EFFORT, FASTEST, LEAST, UNIT
 from heelstrike.contact.modes import Solver, SolveStatus
-from heelstrike.contact.sets import CONE, INTERVAL, LINE, is_empty, room, row_of
+from heelstrike.contact.sets import INTERVAL, LINE, is_empty, room, row_of
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -114,23 +114,21 @@ def certify(
     count = problem.count
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
     root, slope = scaling.root, scaling.slope
-    at_once = certify_at_once(problem, settings, scaling, answer)
-    if not at_once:
-        weigh(problem, settings, impulse, scaling)
+    if has_program(problem, settings, scaling):
+        worst = certify_at_once(problem, settings, scaling, answer)
+        if worst < math.inf:
+            return worst
+    scaling.size[FASTEST] = math.inf  # nobody looks
+    weigh(problem, settings, impulse, scaling)
     unit = scaling.unit
-    answer.rest = REST_TOLERANCE * unit * (1.0 + scaling.effort)
-    rounding = (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + scaling.effort)
+    rounding = rounding_of(count, scaling.effort)
     sharply = rounding > VISIBLE
-    if at_once and rounding <= VISIBLE:
-        scaling.rounding = rounding
-        return max(residual[0], max(residual[1], residual[2])) + rounding
-    scaling.size[FASTEST] = math.inf  # nobody has looked
     if sharply:
         rounding = sum_velocities_sharply(problem, impulse, scaling, velocity)
-        answer.rest = REST_TOLERANCE * unit * (1.0 + scaling.effort)
-    elif not at_once:
+    else:
         sum_velocities(problem, impulse, velocity)
     scaling.rounding = rounding
+    answer.rest = REST_TOLERANCE * unit * (1.0 + scaling.effort)
     inverse = 1.0 / unit if unit > 0.0 else 0.0
     complementarity = cone = non_penetration = 0.0
     first, end = problem.first, 0
@@ -229,33 +227,50 @@ def note_size(unit: float, effort: float, scaling: Scaling) -> None:
     scaling.unit = unit
 
 
+@dissolved_kernel
+def rounding_of(count: int, effort: float) -> float:
+    """What rounding may hide where velocities are summed as usual."""
+    return (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + effort)
+
+
 @kernel
+def has_program(problem: ContactProblem, settings: Settings, scaling: Scaling) -> bool:
+    """Whether few contacts, all of them cones, fill their matrix, and none has to slide."""
+    count = problem.count
+    if count >= scaling.programs.shape[0] or problem.delassus.shape[1] != 2 * count:
+        return False
+    kinds, slopes = settings.skewed, 0.0
+    for contact in range(count):
+        kinds |= problem.set[contact]  # that of cones is zero
+        slopes += abs(scaling.slope[contact])
+    return kinds == 0 and slopes == 0.0 and scaling.programs[count] != 0
+
+
+@dissolved_kernel
 def certify_at_once(
     problem: ContactProblem, settings: Settings, scaling: Scaling, answer: ContactAnswer
-) -> bool:
-    """Weigh the rows, sum their velocities and find the residuals by a program; return success.
+) -> float:
+    """Do what :func:`certify` does by a program; return the largest residual.
 
-    There is one where few contacts, all of them cones, fill their matrix. Each row has to be moved
-    by something, and none may be prescribed to slide.
+    It is infinite where something moves a row but no impulse does, where rounding shows, or where a
+    number is none: then loops have to look.
     """
-    count, delassus, size = problem.count, problem.delassus, scaling.size
-    if count >= scaling.programs.shape[0] or delassus.shape[1] != 2 * count:
-        return False
-    plain = settings.skewed == 0 and scaling.programs[count] != 0
-    for contact in range(count):
-        plain = plain and problem.set[contact] == CONE and scaling.slope[contact] == 0.0
-    if not plain:
-        return False
+    count, size, residual = problem.count, scaling.size, answer.residual
     size[UNIT] = settings.floor
     play(
         scaling.programs[count],
         (
-            delassus, problem.free, problem.friction, answer.impulse, scaling.root,
-            answer.velocity, answer.residual, size, scaling.tree,
+            problem.delassus, problem.free, problem.friction, answer.impulse, scaling.root,
+            answer.velocity, residual, size, scaling.tree,
         ),
     )  # fmt: skip
     note_size(size[UNIT], size[EFFORT], scaling)
-    return bool(size[LEAST] > 0.0)
+    rounding = rounding_of(count, scaling.effort)
+    if not (size[LEAST] > 0.0 and rounding <= VISIBLE):
+        return math.inf
+    scaling.rounding = rounding
+    answer.rest = REST_TOLERANCE * scaling.unit * (1.0 + scaling.effort)
+    return max(residual[0], max(residual[1], residual[2])) + rounding
 
 
 @rare_kernel

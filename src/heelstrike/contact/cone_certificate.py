@@ -94,8 +94,10 @@ def certify_cones(
             velocity[i] += delassus[j, i] * impulse[j]
     for i in range(rows):
         tree[SIZES, leaf + i] = abs(free[i]) / root[i]
-        # Velocities that are no numbers make the effort none.
-        tree[EFFORTS, leaf + i] = root[i] * abs(impulse[i]) + (velocity[i] - velocity[i])
+        # What is no number, or infinite, makes the effort none.
+        limit = friction[i // 2] * impulse[i - i % 2]
+        nothing = (velocity[i] - velocity[i]) + (limit - limit)
+        tree[EFFORTS, leaf + i] = root[i] * abs(impulse[i]) + nothing
         tree[DIAGONAL, leaf + i] = delassus[i, i]
     gather(tree[SIZES], larger)
     gather(tree[EFFORTS], plus)

@@ -141,6 +141,8 @@ class UsualPoints(Bundle):
 
     usual_problem: ContactProblem = part(ContactProblem)
     """The contact problem with the matrix of these points."""
+    half_problem: ContactProblem = part(ContactProblem)
+    """That of half of them, as of one foot of two."""
     usual_points: Integers = array("points", of=int)
     """Which they are."""
     usual_place: Integers = array("nc", of=int)
@@ -294,6 +296,13 @@ def _contacts_of(kind: int, rows: Rows, extents: dict[str, int]) -> Contacts:
     return Contacts.allocate(extents, gap=gap, position=position, normal=normal)
 
 
+def _first_contacts(problem: ContactProblem, contacts: int) -> ContactProblem:
+    """Return a problem with the first contacts of another, and a matrix of just their size."""
+    return contact_problem(
+        contacts, free=problem.free[: 2 * contacts], friction=problem.friction[:contacts]
+    )
+
+
 def _laid_out(robot: Robot) -> Memory:
     nc, model = robot.nc, robot.model
     rows = lay_out_rows(robot)
@@ -324,11 +333,8 @@ def _laid_out(robot: Robot) -> Memory:
         solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
         usual=UsualPoints.allocate(
             extents,
-            usual_problem=contact_problem(
-                len(points),
-                free=problem.free[: 2 * len(points)],
-                friction=problem.friction[: len(points)],
-            ),
+            usual_problem=_first_contacts(problem, len(points)),
+            half_problem=_first_contacts(problem, len(points) // 2),
             usual_points=points,
             programs=programs,
             usual_place=place,

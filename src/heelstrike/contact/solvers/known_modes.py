@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
-from heelstrike.contact.certificate import REST_TOLERANCE, certify
+from heelstrike.contact.certificate import REST_TOLERANCE, certify, certify_at_once
 from heelstrike.contact.cone_certificate import FASTEST
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.sets import EVERY_ROW, INTERVAL, LINE, projected, row_of
@@ -501,7 +501,7 @@ def stand(
     )  # fmt: skip
     if not rows.margin[0] > 0.0 and not share_standing(code, problem, rows, answer.impulse):
         return False
-    worst = certify(problem, settings, scaling, answer)
+    worst = certify_at_once(problem, settings, scaling, answer)
     still = answer.residual[1] == 0.0 and scaling.size[FASTEST] <= answer.rest
     return still and worst <= min(settings.tolerance, AS_GOOD)
 

@@ -16,7 +16,6 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.recordings.recording import Program, smaller
 from heelstrike.compiler.straight_line import straight_line_code
 from heelstrike.contact.modes import STICK
-from heelstrike.contact.sets import CONE
 from heelstrike.contact.solvers.elimination import eliminate
 from heelstrike.contact.workspace import ContactProblem, Floats, Integers
 
@@ -100,16 +99,19 @@ def solve_standing(
 def code_of(problem: ContactProblem, mode: Integers) -> int:
     """Code of a problem whose contacts all stick and fill their matrix; zero of others."""
     delassus, count = problem.delassus, problem.count
-    plain = 0 < count <= MOST_STANDING and delassus.shape[1] == 2 * count
+    if not 0 < count <= MOST_STANDING or delassus.shape[1] != 2 * count:
+        return 0
+    others, least = 0, problem.friction[0]
     for contact in range(count):
-        rubs = problem.set[contact] == CONE and problem.friction[contact] > 0.0
-        plain = plain and rubs and mode[contact] == STICK
-    if not plain:
+        others |= problem.set[contact] | (mode[contact] ^ STICK)  # the set of cones is zero
+        least = min(least, problem.friction[contact])
+    if others != 0 or not least > 0.0:
         return 0
     code = 1
-    for tangent in range(3, 2 * count, 2):
-        both = delassus[tangent, tangent] + delassus[tangent - 2, tangent - 2]
-        apart = abs(both - 2.0 * delassus[tangent, tangent - 2])
+    for neighbour in range(count - 1):
+        one, other = 2 * neighbour + 1, 2 * neighbour + 3
+        both = delassus[one, one] + delassus[other, other]
+        apart = abs(both - 2.0 * delassus[other, one])
         code = 2 * code + int(apart <= SHARED_ROW * both)
     return code
 

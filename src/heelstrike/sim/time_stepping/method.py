@@ -773,6 +773,8 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         )  # fmt: skip
         problem = usual.usual_problem
     elif straight:
+        if near == count == usual.half_problem.set.shape[0]:
+            problem = usual.half_problem
         factor, delassus = equations.factor, problem.delassus
         gather_points(model, contacts, tree, factor, near, candidate, usual, delassus)
         for place in range(near, count):  # the rows of loops are there
