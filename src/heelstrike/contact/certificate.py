@@ -25,8 +25,9 @@ from heelstrike.compiler.straight_line import play
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.cone_certificate import EFFORT, FASTEST, LEAST, UNIT
 from heelstrike.contact.modes import Solver, SolveStatus
-from heelstrike.contact.sets import INTERVAL, LINE, is_empty, room, row_of
+from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE, is_empty, room, row_of
 from heelstrike.contact.workspace import (
+    PROGRAM_ROWS,
     ContactAnswer,
     ContactProblem,
     Floats,
@@ -114,8 +115,9 @@ def certify(
     count = problem.count
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
     root, slope = scaling.root, scaling.slope
-    if has_program(problem, settings, scaling):
-        worst = certify_at_once(problem, settings, scaling, answer)
+    cones = cones_of(problem, settings, scaling)
+    if cones > 0:
+        worst = certify_at_once(cones, problem, settings, scaling, answer)
         if worst < math.inf:
             return worst
     scaling.size[FASTEST] = math.inf  # nobody looks
@@ -234,22 +236,30 @@ def rounding_of(count: int, effort: float) -> float:
 
 
 @kernel
-def has_program(problem: ContactProblem, settings: Settings, scaling: Scaling) -> bool:
-    """Whether few contacts, all of them cones, fill their matrix, and none has to slide."""
+def cones_of(problem: ContactProblem, settings: Settings, scaling: Scaling) -> int:
+    """How many contacts a problem has for which there is a program, 0 if there is none.
+
+    There is for few of them with stops behind, where none has to slide.
+    """
     count = problem.count
-    if count >= scaling.programs.shape[0] or problem.delassus.shape[1] != 2 * count:
-        return False
-    kinds, slopes = settings.skewed, 0.0
+    cones = row_of(count, problem.first) - count
+    fits = 0 < cones < scaling.programs.shape[0] and count - cones < scaling.programs.shape[1]
+    if not fits or problem.delassus.shape[1] != PROGRAM_ROWS or settings.skewed != 0:
+        return 0
+    others, slopes = 0, 0.0
     for contact in range(count):
-        kinds |= problem.set[contact]  # that of cones is zero
+        others |= problem.set[contact] ^ (CONE if contact < cones else HALF_LINE)
         slopes += abs(scaling.slope[contact])
-    return kinds == 0 and slopes == 0.0 and scaling.programs[count] != 0
+    if others != 0 or slopes != 0.0 or scaling.programs[cones, count - cones] == 0:
+        return 0
+    return cones
 
 
 @dissolved_kernel
 def certify_at_once(
-    problem: ContactProblem, settings: Settings, scaling: Scaling, answer: ContactAnswer
-) -> float:
+    cones: int, problem: ContactProblem, settings: Settings, scaling: Scaling,
+    answer: ContactAnswer,
+) -> float:  # fmt: skip
     """Do what :func:`certify` does by a program; return the largest residual.
 
     It is infinite where something moves a row but no impulse does, where rounding shows, or where a
@@ -257,11 +267,12 @@ def certify_at_once(
     """
     count, size, residual = problem.count, scaling.size, answer.residual
     size[UNIT] = settings.floor
+    scratch = scaling.root  # nothing is read or written there
     play(
-        scaling.programs[count],
+        scaling.programs[cones, count - cones],
         (
-            problem.delassus, problem.free, problem.friction, answer.impulse, scaling.root,
-            answer.velocity, residual, size, scaling.tree,
+            problem.delassus, problem.free, problem.friction, scaling.held, answer.impulse,
+            scaling.root, answer.velocity, residual, size, scratch, scratch, scratch,
         ),
     )  # fmt: skip
     note_size(size[UNIT], size[EFFORT], scaling)

@@ -1,6 +1,6 @@
-"""The certificate of a few contacts with friction, as straight-line code.
+"""The certificate of a few contacts with friction, and of joint stops, as straight-line code.
 
-One program for each number of contacts, for all robots. It says what
+There is a program for each number of both, for all robots. It says what
 :mod:`heelstrike.contact.certificate` says by loops.
 """
 
@@ -16,11 +16,19 @@ from numpy.typing import NDArray
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.recordings.recording import Program, inverse_above, larger, smaller
 from heelstrike.compiler.straight_line import straight_line_code
-from heelstrike.contact.workspace import Floats
+from heelstrike.contact.workspace import PROGRAM_ROWS, Floats
 
 MOST_CONES = 5
-"""Contacts of the largest problem with a program; its length grows with the square of their
-number."""
+MOST_STOPS = 6
+"""MOST_CONES, MOST_STOPS: Contacts, and rows without friction after them, of the largest problems
+with a program; its length grows with the square of their number."""
+
+
+def has_stops(cones: int, stops: int) -> bool:
+    """Whether there are programs for so many contacts, of one foot or two, and so many stops."""
+    rows = 2 * cones + stops
+    return cones in (2, 4) and 0 < stops <= MOST_STOPS and rows <= PROGRAM_ROWS
+
 
 UNIT, EFFORT, LEAST, FASTEST = range(4)
 """What the programs measure with: the size of the data, the effort in its own unit, the least of
@@ -31,23 +39,30 @@ SIZES, EFFORTS, DIAGONAL, SPEEDS, PENETRATION, CONE, COMPLEMENTARITY = range(7)
 
 
 @kernel
-def gather(tree: Floats, combine: Callable[[float, float], float]) -> None:
-    """Combine numbers two by two, half of them with the other half, until one is left.
+def gather(level: Floats, count: int, combine: Callable[[float, float], float]) -> float:
+    """Combine numbers two by two, the first half of them with the second, until one is left.
 
     Machine code combines several at once.
 
     Parameters
     ----------
-    tree : (2 m,) float
-        The last m are the numbers, m a power of two. Those from ``w`` to ``2 w`` receive what has
-        been made of them when w are left.
+    level : (any,) float
+        The first are the numbers. What becomes of them is written behind, each time to new places.
+    count : int
+        How many there are, at least one.
     combine : callable
     """
-    width = tree.shape[0] // 4
-    while width >= 1:
-        for i in range(width):
-            tree[width + i] = combine(tree[2 * width + i], tree[3 * width + i])
-        width //= 2
+    begin = 0
+    while count > 1:
+        half = (count + 1) // 2
+        end = begin + count
+        for i in range(count - half):
+            level[end + i] = combine(level[begin + i], level[begin + half + i])
+        if count < 2 * half:
+            level[end + half - 1] = level[begin + half - 1]
+        begin, count = end, half
+    last: float = level[begin]
+    return last
 
 
 @kernel
@@ -57,9 +72,39 @@ def plus(one: float, other: float) -> float:
 
 
 @kernel
-def certify_cones(
-    delassus: Floats, free: Floats, friction: Floats, impulse: Floats, root: Floats,
-    velocity: Floats, residual: Floats, size: Floats, tree: Floats,
+def measure_rows(
+    first: int, last: int, delassus: Floats, free: Floats, impulse: Floats, root: Floats,
+    velocity: Floats, limit: Floats, tree: Floats,
+) -> None:  # fmt: skip
+    """Weights of rows, their velocities, and what tells the size of the data."""
+    for i in range(first, last):
+        root[i] = sqrt(delassus[i, i])
+        velocity[i] = free[i]
+    for j in range(root.shape[0]):
+        for i in range(first, last):
+            velocity[i] += delassus[j, i] * impulse[j]
+    for i in range(first, last):
+        tree[SIZES, i - first] = abs(free[i]) / root[i]
+        # What is no number, or infinite, makes the effort none.
+        nothing = (velocity[i] - velocity[i]) + (limit[i] - limit[i])
+        tree[EFFORTS, i - first] = root[i] * abs(impulse[i]) + nothing
+        tree[DIAGONAL, i - first] = delassus[i, i]
+
+
+@kernel
+def judge_row(
+    place: int, speed: float, scale: float, inverse: float, lower: float, upper: float, tree: Floats
+) -> None:
+    """Residuals of a row, of what its impulse lacks to its limits below and above."""
+    lower, upper, speed = lower * scale, upper * scale, speed * inverse
+    tree[CONE, place] = -smaller(lower, upper)
+    tree[COMPLEMENTARITY, place] = larger(smaller(speed, lower), smaller(-speed, upper))
+
+
+@kernel
+def certify_rows(
+    delassus: Floats, free: Floats, friction: Floats, held: Floats, impulse: Floats, root: Floats,
+    velocity: Floats, residual: Floats, size: Floats, limit: Floats, cones: Floats, stops: Floats,
 ) -> None:  # fmt: skip
     """Weights of rows, what impulses make of their velocities, and residuals.
 
@@ -68,94 +113,105 @@ def certify_cones(
 
     Parameters
     ----------
-    delassus : (2 n, 2 n) float
-        Symmetric: its columns are read as rows.
-    free, impulse : (2 n,) float
+    delassus : (PROGRAM_ROWS, PROGRAM_ROWS) float
+        Its first m rows and columns are symmetric: columns are read as rows.
+    free, impulse : (m,) float
+        Of n contacts with two rows each, and of as many stops as there are more rows.
     friction : (n,) float
-    root : (2 n,) float
+    held : (stops,) float
+        1 for the stops whose velocity counts among the fastest, 0 for the others.
+    root : (m,) float
         Receives ``g = sqrt(diag G)``.
-    velocity : (2 n,) float
+    velocity : (m,) float
         Receives ``G impulse + free``.
     residual : (3,) float
         Receives complementarity, cone and non-penetration, in units of the data.
     size : (4,) float
         In: the floor in the place of the size of the data. Receives all four.
-    tree : (7, 2 m) float
-        Scratch; m is at least 2 n, and a power of two.
+    limit, cones, stops : (m,), (7, any), (7, any) float
+        Scratch.
     """
-    rows, leaf = root.shape[0], tree.shape[1] // 2
-    tree[:, leaf:] = 0.0
-    tree[DIAGONAL, leaf:] = delassus[0, 0]
+    number, rows = friction.shape[0], root.shape[0]
+    edge = 2 * number
     for i in range(rows):
-        root[i] = sqrt(delassus[i, i])
-        velocity[i] = free[i]
-    for j in range(rows):
-        for i in range(rows):
-            velocity[i] += delassus[j, i] * impulse[j]
-    for i in range(rows):
-        tree[SIZES, leaf + i] = abs(free[i]) / root[i]
-        # What is no number, or infinite, makes the effort none.
-        limit = friction[i // 2] * impulse[i - i % 2]
-        nothing = (velocity[i] - velocity[i]) + (limit - limit)
-        tree[EFFORTS, leaf + i] = root[i] * abs(impulse[i]) + nothing
-        tree[DIAGONAL, leaf + i] = delassus[i, i]
-    gather(tree[SIZES], larger)
-    gather(tree[EFFORTS], plus)
-    gather(tree[DIAGONAL], smaller)
-    unit = larger(tree[SIZES, 1], size[UNIT])
+        limit[i] = friction[i // 2] * impulse[i - i % 2] if i < edge else 0.0
+    measure_rows(0, edge, delassus, free, impulse, root, velocity, limit, cones)
+    measure_rows(edge, rows, delassus, free, impulse, root, velocity, limit, stops)
+    unit = larger(gather(cones[SIZES], edge, larger), size[UNIT])
+    effort = gather(cones[EFFORTS], edge, plus)
+    least = gather(cones[DIAGONAL], edge, smaller)
+    if rows > edge:
+        unit = larger(gather(stops[SIZES], rows - edge, larger), unit)
+        effort = plus(gather(stops[EFFORTS], rows - edge, plus), effort)
+        least = smaller(gather(stops[DIAGONAL], rows - edge, smaller), least)
     inverse = inverse_above(unit, 0.0)
-    for i in range(rows):
-        speed = velocity[i] / root[i]
-        scale = root[i] * inverse
-        # A normal impulse lacks itself to zero, and nothing holds it on the other side.
-        normal = i - i % 2
-        limit = friction[i // 2] * impulse[normal]
-        lower = impulse[i] if i == normal else limit + impulse[i]
-        upper = 0.0 if i == normal else limit - impulse[i]
-        lower, upper = lower * scale, upper * scale
-        tree[SPEEDS, leaf + i] = abs(speed)
-        speed = speed * inverse
-        tree[PENETRATION, leaf + i] = -speed
-        tree[CONE, leaf + i] = -smaller(lower, upper)
-        slip = larger(smaller(speed, lower), smaller(-speed, upper))
-        tree[COMPLEMENTARITY, leaf + i] = slip
-    for kind in range(SPEEDS, COMPLEMENTARITY + 1):
-        gather(tree[kind], larger)
-    residual[0] = larger(tree[COMPLEMENTARITY, 1], 0.0)
-    residual[1] = larger(tree[CONE, 1], 0.0)
-    residual[2] = larger(tree[PENETRATION, 2], 0.0)  # the largest of even rows, the normals
-    size[UNIT] = unit
-    size[EFFORT] = tree[EFFORTS, 1]
-    size[LEAST] = tree[DIAGONAL, 1]
-    size[FASTEST] = tree[SPEEDS, 1]
+    for i in range(edge):
+        speed, scale = velocity[i] / root[i], root[i] * inverse
+        cones[SPEEDS, i] = abs(speed)
+        if i % 2 == 0:
+            # A normal impulse lacks itself to zero, and nothing holds it on the other side.
+            cones[PENETRATION, i // 2] = -speed
+            judge_row(i, speed, scale, inverse, impulse[i], 0.0, cones)
+        else:
+            lower, upper = limit[i] + impulse[i], limit[i] - impulse[i]
+            judge_row(i, speed, scale, inverse, lower, upper, cones)
+    for i in range(edge, rows):
+        speed, scale = velocity[i] / root[i], root[i] * inverse
+        stops[SPEEDS, i - edge] = abs(speed) * held[i - edge]
+        stops[PENETRATION, i - edge] = -speed
+        judge_row(i - edge, speed, scale, inverse, impulse[i], 0.0, stops)
+    fastest = gather(cones[SPEEDS], edge, larger)
+    deepest = larger(gather(cones[PENETRATION], number, larger), 0.0)
+    outside = larger(gather(cones[CONE], edge, larger), 0.0)
+    worst = larger(gather(cones[COMPLEMENTARITY], edge, larger), 0.0)
+    if rows > edge:
+        fastest = larger(gather(stops[SPEEDS], rows - edge, larger), fastest)
+        deepest = larger(gather(stops[PENETRATION], rows - edge, larger), deepest)
+        outside = larger(gather(stops[CONE], rows - edge, larger), outside)
+        worst = larger(gather(stops[COMPLEMENTARITY], rows - edge, larger), worst)
+    residual[0], residual[1], residual[2] = worst, outside, deepest * inverse
+    size[UNIT], size[EFFORT], size[LEAST], size[FASTEST] = unit, effort, least, fastest
 
 
 @lru_cache(maxsize=1)
-def cone_certificates() -> NDArray[np.int64]:
-    """Addresses of the programs by the number of contacts, (MOST_CONES + 1,); the first is zero.
+def certificate_programs() -> NDArray[np.int64]:
+    """Addresses of the programs by the numbers of contacts and of stops; zero where there is none.
 
     Read-only: all workspaces share them.
     """
-    programs = np.zeros(MOST_CONES + 1, dtype=np.int64)
-    programs[1:] = straight_line_code(
-        [
-            Program(
-                certify_cones,
-                {
-                    "delassus": np.zeros((2 * count, 2 * count)),
-                    "free": np.zeros(2 * count),
-                    "friction": np.zeros(count),
-                    **{name: np.zeros(2 * count) for name in ("impulse", "root", "velocity")},
-                    "residual": np.zeros(3),
-                    "size": np.zeros(4),
-                    "tree": np.zeros((7, 4 << (2 * count - 1).bit_length() >> 1)),
-                },
-                name=f"certify_{count}_cones",
-                scratch=("tree",),
-                side_by_side=True,
-            )
-            for count in range(1, MOST_CONES + 1)
-        ]
-    )
+    programs = np.zeros((MOST_CONES + 1, MOST_STOPS + 1), dtype=np.int64)
+    numbers = [
+        (cones, stops)
+        for cones in range(1, MOST_CONES + 1)
+        for stops in range(MOST_STOPS + 1)
+        if stops == 0 or has_stops(cones, stops)
+    ]
+    programs[tuple(np.transpose(numbers))] = straight_line_code([_program(*n) for n in numbers])
     programs.flags.writeable = False
     return programs
+
+
+def _program(cones: int, stops: int) -> Program:
+    rows = 2 * cones + stops
+    by_row = {name: np.zeros(rows) for name in ("impulse", "root", "velocity")}
+    scratch = {
+        "limit": np.zeros(rows),
+        "cones": np.zeros((7, 4 * cones + 4)),
+        "stops": np.zeros((7, 2 * stops + 4)),
+    }
+    return Program(
+        certify_rows,
+        {
+            "delassus": np.zeros((PROGRAM_ROWS, PROGRAM_ROWS)),
+            "free": np.zeros(rows),
+            "friction": np.zeros(cones),
+            "held": np.zeros(stops),
+            **by_row,
+            "residual": np.zeros(3),
+            "size": np.zeros(4),
+            **scratch,
+        },
+        name=f"certify_{cones}_and_{stops}",
+        scratch=tuple(scratch),
+        side_by_side=True,
+    )

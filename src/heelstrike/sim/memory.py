@@ -13,6 +13,7 @@ from heelstrike.compiler.mold import Mold
 from heelstrike.contact.modes import STICK
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import (
+    PROGRAM_ROWS,
     ContactAnswer,
     ContactProblem,
     ContactWorkspace,
@@ -34,7 +35,11 @@ from heelstrike.sim.contacts.rows import (
     lay_out_rows,
     most_rows,
 )
-from heelstrike.sim.contacts.straight_line import straight_line_programs, usual_points
+from heelstrike.sim.contacts.straight_line import (
+    room_of,
+    straight_line_programs,
+    usual_points,
+)
 from heelstrike.sim.contacts.writers import lay_out_ties
 from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
@@ -141,8 +146,8 @@ class UsualPoints(Bundle):
 
     usual_problem: ContactProblem = part(ContactProblem)
     """The contact problem with the matrix of these points."""
-    half_problem: ContactProblem = part(ContactProblem)
-    """That of half of them, as of one foot of two."""
+    small_problem: ContactProblem = part(ContactProblem)
+    """The contact problem of some of them, in as little room."""
     usual_points: Integers = array("points", of=int)
     """Which they are."""
     usual_place: Integers = array("nc", of=int)
@@ -296,11 +301,12 @@ def _contacts_of(kind: int, rows: Rows, extents: dict[str, int]) -> Contacts:
     return Contacts.allocate(extents, gap=gap, position=position, normal=normal)
 
 
-def _first_contacts(problem: ContactProblem, contacts: int) -> ContactProblem:
-    """Return a problem with the first contacts of another, and a matrix of just their size."""
-    return contact_problem(
-        contacts, free=problem.free[: 2 * contacts], friction=problem.friction[:contacts]
-    )
+def _in_room(problem: ContactProblem, rows: int) -> ContactProblem:
+    """Return a contact problem with the arrays of another, but a matrix of its own."""
+    shared = {
+        name: getattr(problem, name) for name in ("first", "free", "friction", "bound", "set")
+    }
+    return contact_problem(len(problem.set), room=rows, **shared)
 
 
 def _laid_out(robot: Robot) -> Memory:
@@ -333,8 +339,8 @@ def _laid_out(robot: Robot) -> Memory:
         solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
         usual=UsualPoints.allocate(
             extents,
-            usual_problem=_first_contacts(problem, len(points)),
-            half_problem=_first_contacts(problem, len(points) // 2),
+            usual_problem=_in_room(problem, room_of(len(points))),
+            small_problem=_in_room(problem, PROGRAM_ROWS),
             usual_points=points,
             programs=programs,
             usual_place=place,

@@ -12,7 +12,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import separate_kernel
 from heelstrike.contact.certificate import certify
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
-from heelstrike.contact.cone_certificate import cone_certificates
+from heelstrike.contact.cone_certificate import MOST_STOPS, certificate_programs
 from heelstrike.contact.modes import (
     COMBINATIONS,
     FISCHER_BURMEISTER,
@@ -334,15 +334,17 @@ def contact_workspace(
         try_solvers.finish()
     contacts = max(int(capacity), 1)
     rows = 2 * contacts
-    certificates = cone_certificates() if symmetric else np.zeros(1, np.int64)
+    certificates = certificate_programs() if symmetric else np.zeros((1, MOST_STOPS + 1), np.int64)
     work = ContactWorkspace.allocate(
         capacity=contacts,
-        scaling=Scaling.allocate(capacity=contacts, programs=certificates),
+        scaling=Scaling.allocate(capacity=contacts, most_stops=MOST_STOPS, programs=certificates),
         sticking=StickingRows.allocate(
             capacity=contacts,
             half=LARGEST * (LARGEST + 1) // 2,
             programs=elimination_programs(),
-            standing=standing_programs() if symmetric else np.zeros(CODES, np.int64),
+            standing=standing_programs()
+            if symmetric
+            else np.zeros((CODES, MOST_STOPS + 1), np.int64),
         ),
         equations=Equations.allocate(capacity=contacts, dual=Dictionary.allocate(pairs=rows)),
         lemke=Dictionary.allocate(pairs=2 * rows),

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
-from heelstrike.contact.certificate import REST_TOLERANCE, certify, certify_at_once
+from heelstrike.contact.certificate import REST_TOLERANCE, certify, certify_at_once, cones_of
 from heelstrike.contact.cone_certificate import FASTEST
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.sets import EVERY_ROW, INTERVAL, LINE, projected, row_of
 from heelstrike.contact.solvers.elimination import POOR_PIVOT
-from heelstrike.contact.solvers.standing import EARLY_PIVOT, SHARED_ROW, code_of
+from heelstrike.contact.solvers.standing import EARLY_PIVOT, MOST_STANDING, SHARED_ROW, code_of
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -486,49 +486,64 @@ def stand(
 ) -> bool:  # fmt: skip
     """Solve the contact problem at once if few contacts make it, and all stick; return success.
 
-    None pulls or slides in the answer. After a failure the modes are what they were.
+    None pulls or slides in the answer. Beside them there may be stops, pressed or not, and they are
+    so in the answer. After a failure the modes are what they were.
     """
-    code = code_of(problem, answer.mode)
-    program = rows.standing[code]
+    mode, count = answer.mode, problem.count
+    cones = cones_of(problem, settings, scaling)
+    stops = count - cones
+    code = code_of(cones, problem, mode) if 0 < cones <= MOST_STANDING else 0
+    program = rows.standing[code, stops] if code > 0 else 0
     if program == 0:
         return False
+    for stop in range(stops):
+        scaling.held[stop] = 0.0 if mode[cones + stop] == OPEN else 1.0
     play(
         program,
         (
-            rows.row, rows.equation, rows.order, problem.delassus, problem.free, rows.lower_half,
-            rows.x, rows.pivot, rows.margin, answer.impulse,
+            rows.row, rows.equation, rows.order, problem.delassus, problem.free, scaling.held,
+            rows.lower_half, rows.x, rows.pivot, rows.margin, answer.impulse,
         ),
     )  # fmt: skip
-    if not rows.margin[0] > 0.0 and not share_standing(code, problem, rows, answer.impulse):
+    if not rows.margin[0] > 0.0 and not share_standing(code, cones, problem, rows, scaling, answer):
         return False
-    worst = certify_at_once(problem, settings, scaling, answer)
+    worst = certify_at_once(cones, problem, settings, scaling, answer)
     still = answer.residual[1] == 0.0 and scaling.size[FASTEST] <= answer.rest
+    for row in range(2 * cones, 2 * cones + stops):
+        leaves = answer.velocity[row] > answer.rest * scaling.root[row]
+        still = still and (leaves or scaling.held[row - 2 * cones] == 1.0)
     return still and worst <= min(settings.tolerance, AS_GOOD)
 
 
 @kernel
-def share_standing(code: int, problem: ContactProblem, rows: StickingRows, impulse: Floats) -> bool:
+def share_standing(
+    code: int, cones: int, problem: ContactProblem, rows: StickingRows, scaling: Scaling,
+    answer: ContactAnswer,
+) -> bool:  # fmt: skip
     """Share impulses to the least norm where rows depend on others, as under straight legs.
 
     False is returned where it is not clear whether one does.
     """
     delassus, x, sharers, size = problem.delassus, rows.x, rows.sharers, 0
-    for row in range(2 * problem.count):
-        shared = row % 2 == 1 and (code >> (problem.count - 1 - row // 2)) & 1 == 1 and row > 1
+    last = row_of(problem.count, problem.first)
+    for row in range(last):
+        shared = 1 < row < 2 * cones and row % 2 == 1 and (code >> (cones - 1 - row // 2)) & 1 == 1
         if shared:
             rows.equation[row] = rows.equation[row - 2]
             sharers[rows.equation[row]] += 1.0
             continue
         pivot, diagonal = rows.pivot[size], delassus[row, row]
+        if row >= 2 * cones and scaling.held[row - 2 * cones] == 0.0:
+            diagonal = 1.0
         if not pivot > EARLY_PIVOT * diagonal and not abs(pivot) <= NO_PIVOT * diagonal:
             return False
         rows.equation[row] = size
         sharers[size] = 1.0
         size += 1
     leave_out_idle(size, rows)
-    for row in range(2 * problem.count):
+    for row in range(last):
         place = row_of(row, rows.equation)
-        impulse[row] = x[place] / sharers[place]
+        answer.impulse[row] = x[place] / sharers[place]
     return True
 
 

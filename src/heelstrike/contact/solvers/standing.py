@@ -1,7 +1,8 @@
 """Feet that stand: impulses of few contacts that all stick, as straight-line code.
 
 Vertices of one flat foot share their tangential row. There is a program for each way in which up to
-four neighbours, two feet at the most, share them, for all robots.
+four neighbours, two feet at the most, share them, and for each number of joint stops beside them,
+for all robots.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from numpy.typing import NDArray
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.recordings.recording import Program, smaller
 from heelstrike.compiler.straight_line import straight_line_code
+from heelstrike.contact.cone_certificate import MOST_STOPS, has_stops
 from heelstrike.contact.modes import STICK
 from heelstrike.contact.solvers.elimination import eliminate
-from heelstrike.contact.workspace import ContactProblem, Floats, Integers
+from heelstrike.contact.workspace import PROGRAM_ROWS, ContactProblem, Floats, Integers
 
 MOST_STANDING = 4
 """Contacts that programs are for."""
@@ -64,51 +66,76 @@ def sharing(code: int) -> Sharing:
 @kernel
 def solve_standing(
     source: Integers, equation: Integers, sharers: Integers, delassus: Floats, free: Floats,
-    matrix: Floats, x: Floats, pivot: Floats, margin: Floats, impulse: Floats,
+    held: Floats, matrix: Floats, x: Floats, pivot: Floats, margin: Floats, impulse: Floats,
 ) -> None:  # fmt: skip
     """Impulses that leave rows no velocity, ``G impulse = -free``, in equal shares.
 
     Parameters
     ----------
-    source, equation, sharers : (m,), (2 n,), (m,) int
-        As in :class:`Sharing`.
-    delassus, free : (2 n, 2 n), (2 n,) float
+    source, equation, sharers : (k,), (2 n,), (k,) int
+        Of the contacts, as in :class:`Sharing`.
+    delassus : (PROGRAM_ROWS, PROGRAM_ROWS) float
+    free : (2 n + stops,) float
+    held : (stops,) float
+        1 for the stops whose rows shall have no velocity, 0 for those without impulse.
     matrix, x, pivot : (m (m + 1) / 2,), (m,), (m,) float
-        Receive what :func:`~heelstrike.contact.solvers.elimination.eliminate` makes of them.
+        Receive what :func:`~heelstrike.contact.solvers.elimination.eliminate` makes of them, with
+        an equation for each of the stops after those of the contacts.
     margin : (1,) float
         Receives the least that a pivot has above what makes it good.
-    impulse : (2 n,) float
+    impulse : (2 n + stops,) float
         Receives the impulses.
     """
-    size = source.shape[0]
+    of_contacts, rows, size = source.shape[0], equation.shape[0], x.shape[0]
     for i in range(size):
-        x[i] = -free[source[i]]
+        stop = i - of_contacts
+        row = source[i] if stop < 0 else rows + stop
+        x[i] = -free[row] if stop < 0 else -held[stop] * free[row]
         for j in range(i + 1):
-            matrix[i * (i + 1) // 2 + j] = delassus[source[i], source[j]]
-    eliminate(matrix, x, pivot)
-    margin[0] = pivot[0] - EARLY_PIVOT * delassus[0, 0]
-    for i in range(1, size):
-        diagonal = delassus[source[i], source[i]]
-        margin[0] = smaller(pivot[i] - EARLY_PIVOT * diagonal, margin[0])
-    for row in range(equation.shape[0]):
+            entry = delassus[row, source[j] if j < of_contacts else rows + j - of_contacts]
+            if stop >= 0:
+                entry = held[stop] * entry
+            if i == j and stop >= 0:
+                entry = entry + (1.0 - held[stop])
+            elif j >= of_contacts:
+                entry = held[j - of_contacts] * entry
+            matrix[i * (i + 1) // 2 + j] = entry
+        pivot[i] = matrix[i * (i + 1) // 2 + i]
+    margin[0] = least_margin(matrix, x, pivot)
+    for row in range(rows):
         place = equation[row]
         impulse[row] = x[place] * (1.0 / sharers[place])
+    for stop in range(size - of_contacts):
+        impulse[rows + stop] = x[of_contacts + stop]
+
+
+@kernel
+def least_margin(matrix: Floats, x: Floats, pivot: Floats) -> float:
+    """Solve by elimination; return the least that a pivot has above what makes it good."""
+    size = x.shape[0]
+    good = [EARLY_PIVOT * pivot[i] for i in range(size)]
+    eliminate(matrix, x, pivot)
+    least = pivot[0] - good[0]
+    for i in range(1, size):
+        least = smaller(pivot[i] - good[i], least)
+    return least
 
 
 @dissolved_kernel
-def code_of(problem: ContactProblem, mode: Integers) -> int:
-    """Code of a problem whose contacts all stick and fill their matrix; zero of others."""
-    delassus, count = problem.delassus, problem.count
-    if not 0 < count <= MOST_STANDING or delassus.shape[1] != 2 * count:
-        return 0
+def code_of(cones: int, problem: ContactProblem, mode: Integers) -> int:
+    """Code of a problem whose contacts all stick, and rub; zero of others.
+
+    They are the first of it, and stops come after them.
+    """
+    delassus = problem.delassus
     others, least = 0, problem.friction[0]
-    for contact in range(count):
-        others |= problem.set[contact] | (mode[contact] ^ STICK)  # the set of cones is zero
+    for contact in range(cones):
+        others |= mode[contact] ^ STICK
         least = min(least, problem.friction[contact])
     if others != 0 or not least > 0.0:
         return 0
     code = 1
-    for neighbour in range(count - 1):
+    for neighbour in range(cones - 1):
         one, other = 2 * neighbour + 1, 2 * neighbour + 3
         both = delassus[one, one] + delassus[other, other]
         apart = abs(both - 2.0 * delassus[other, one])
@@ -118,13 +145,18 @@ def code_of(problem: ContactProblem, mode: Integers) -> int:
 
 @lru_cache(maxsize=1)
 def standing_programs() -> NDArray[np.int64]:
-    """Addresses of the programs by code, (CODES,); zero where there is none.
+    """Addresses of the programs by code and number of stops; zero where there is none.
 
     Read-only: all workspaces share them.
     """
-    codes = [code for code in range(1, CODES) if _is_of_two_feet(code)]
-    programs = np.zeros(CODES, dtype=np.int64)
-    programs[codes] = straight_line_code([_program(code) for code in codes])
+    numbers = [
+        (code, stops)
+        for code in range(1, CODES)
+        for stops in range(MOST_STOPS + 1)
+        if _is_of_two_feet(code) and (stops == 0 or has_stops(code.bit_length(), stops))
+    ]
+    programs = np.zeros((CODES, MOST_STOPS + 1), dtype=np.int64)
+    programs[tuple(np.transpose(numbers))] = straight_line_code([_program(*n) for n in numbers])
     programs.flags.writeable = False
     return programs
 
@@ -134,20 +166,21 @@ def _is_of_two_feet(code: int) -> bool:
     return code in (1, 2, 3) or (code >= 8 and code & 2 == 0)
 
 
-def _program(code: int) -> Program:
+def _program(code: int, stops: int) -> Program:
     shared = sharing(code)
-    size, rows = len(shared.source), len(shared.equation)
+    size, rows = len(shared.source) + stops, len(shared.equation) + stops
     return Program(
         solve_standing,
         {
             **shared._asdict(),
-            "delassus": np.zeros((rows, rows)),
+            "delassus": np.zeros((PROGRAM_ROWS, PROGRAM_ROWS)),
             "free": np.zeros(rows),
+            "held": np.zeros(stops),
             "matrix": np.zeros(size * (size + 1) // 2),
             "x": np.zeros(size),
             "pivot": np.zeros(size),
             "margin": np.zeros(1),
             "impulse": np.zeros(rows),
         },
-        name=f"stand_{code}",
+        name=f"stand_{code}_and_{stops}",
     )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from heelstrike.compiler.recordings.recording import Program
 from heelstrike.compiler.straight_line import straight_line_code
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.workspace import PROGRAM_ROWS
 from heelstrike.dynamics.kernels import (
     acceleration_without_contact,
     solve_factorized,
@@ -58,6 +59,11 @@ MOST_POINTS = 8
 """The same for contact points, which straight-line code takes all together."""
 
 
+def room_of(points: int) -> int:
+    """Rows of the Delassus matrix of so many usual points: there is room for stops beside them."""
+    return max(PROGRAM_ROWS, 2 * points)
+
+
 def usual_points(robot: Robot) -> NDArray[np.int64]:
     """Return the contact points that carry the robot usually: its feet, or all it has."""
     points = sorted(point for foot in robot.feet for point in foot.contacts) or range(robot.nc)
@@ -100,7 +106,7 @@ def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
         "tree": Workspace.allocate(extents),
         "matrix": np.zeros((nv, nv)), "factor": np.zeros((nv, nv)), "bias": np.zeros(nv),
         "points": points, "contacts": Contacts.allocate(extents),
-        "rows": np.zeros((2 * size, nv)), "delassus": np.zeros((2 * size, 2 * size)),
+        "rows": np.zeros((2 * size, nv)), "delassus": np.zeros((room_of(size), room_of(size))),
         "velocity": pairs, "impulse": pairs, "force": np.zeros(nv), "torque": np.zeros(model.nu),
         "v_dot": np.zeros(nv), "ground": Ground().model(), "friction": np.zeros(model.nc),
         "restitution": np.zeros(model.nc),
