@@ -510,8 +510,9 @@ def stand(
     worst = certify_at_once(cones, problem, settings, scaling, answer)
     still = answer.residual[1] == 0.0 and scaling.size[FASTEST] <= answer.rest
     for row in range(2 * cones, 2 * cones + stops):
-        leaves = answer.velocity[row] > answer.rest * scaling.root[row]
-        still = still and (leaves or scaling.held[row - 2 * cones] == 1.0)
+        # What parts, however slowly, would pull if it were held.
+        parts = answer.velocity[row] > BARELY * scaling.unit * scaling.root[row]
+        still = still and (parts or scaling.held[row - 2 * cones] == 1.0)
     return still and worst <= min(settings.tolerance, AS_GOOD)
 
 
@@ -524,24 +525,29 @@ def share_standing(
 
     False is returned where it is not clear whether one does.
     """
-    delassus, x, sharers, size = problem.delassus, rows.x, rows.sharers, 0
-    last = row_of(problem.count, problem.first)
-    for row in range(last):
-        shared = 1 < row < 2 * cones and row % 2 == 1 and (code >> (cones - 1 - row // 2)) & 1 == 1
-        if shared:
+    x, sharers, edge = rows.x, rows.sharers, 2 * cones
+    stops = problem.count - cones
+    size = stops
+    for row in range(edge):
+        if row > 1 and row % 2 == 1 and (code >> (cones - 1 - row // 2)) & 1 == 1:
             rows.equation[row] = rows.equation[row - 2]
             sharers[rows.equation[row]] += 1.0
-            continue
-        pivot, diagonal = rows.pivot[size], delassus[row, row]
-        if row >= 2 * cones and scaling.held[row - 2 * cones] == 0.0:
-            diagonal = 1.0
+        else:
+            rows.equation[row] = size
+            rows.row[size] = row
+            sharers[size] = 1.0
+            size += 1
+    for stop in range(stops):
+        rows.equation[edge + stop] = stop
+        rows.row[stop] = edge + stop
+        sharers[stop] = 1.0
+    for i in range(size):
+        row, pivot = rows.row[i], rows.pivot[i]
+        diagonal = 1.0 if i < stops and scaling.held[i] == 0.0 else problem.delassus[row, row]
         if not pivot > EARLY_PIVOT * diagonal and not abs(pivot) <= NO_PIVOT * diagonal:
             return False
-        rows.equation[row] = size
-        sharers[size] = 1.0
-        size += 1
     leave_out_idle(size, rows)
-    for row in range(last):
+    for row in range(edge + stops):
         place = row_of(row, rows.equation)
         answer.impulse[row] = x[place] / sharers[place]
     return True

@@ -79,34 +79,34 @@ def solve_standing(
     held : (stops,) float
         1 for the stops whose rows shall have no velocity, 0 for those without impulse.
     matrix, x, pivot : (m (m + 1) / 2,), (m,), (m,) float
-        Receive what :func:`~heelstrike.contact.solvers.elimination.eliminate` makes of them, with
-        an equation for each of the stops after those of the contacts.
+        Receive what :func:`~heelstrike.contact.solvers.elimination.eliminate` makes of them. The
+        equations of the stops are the first: where they hold straight legs, it is plain which
+        contacts depend on others.
     margin : (1,) float
         Receives the least that a pivot has above what makes it good.
     impulse : (2 n + stops,) float
         Receives the impulses.
     """
-    of_contacts, rows, size = source.shape[0], equation.shape[0], x.shape[0]
+    stops, rows, size = held.shape[0], equation.shape[0], x.shape[0]
     for i in range(size):
-        stop = i - of_contacts
-        row = source[i] if stop < 0 else rows + stop
-        x[i] = -free[row] if stop < 0 else -held[stop] * free[row]
+        row = rows + i if i < stops else source[i - stops]
+        diagonal = i * (i + 1) // 2 + i
+        x[i] = -free[row]
         for j in range(i + 1):
-            entry = delassus[row, source[j] if j < of_contacts else rows + j - of_contacts]
-            if stop >= 0:
-                entry = held[stop] * entry
-            if i == j and stop >= 0:
-                entry = entry + (1.0 - held[stop])
-            elif j >= of_contacts:
-                entry = held[j - of_contacts] * entry
-            matrix[i * (i + 1) // 2 + j] = entry
-        pivot[i] = matrix[i * (i + 1) // 2 + i]
+            entry = delassus[row, rows + j if j < stops else source[j - stops]]
+            matrix[diagonal - i + j] = held[j] * entry if j < stops else entry
+        if i < stops:
+            x[i] = held[i] * x[i]
+            for j in range(i):
+                matrix[diagonal - i + j] = held[i] * matrix[diagonal - i + j]
+            matrix[diagonal] = matrix[diagonal] + (1.0 - held[i])
+        pivot[i] = matrix[diagonal]
     margin[0] = least_margin(matrix, x, pivot)
     for row in range(rows):
         place = equation[row]
-        impulse[row] = x[place] * (1.0 / sharers[place])
-    for stop in range(size - of_contacts):
-        impulse[rows + stop] = x[of_contacts + stop]
+        impulse[row] = x[stops + place] * (1.0 / sharers[place])
+    for stop in range(stops):
+        impulse[rows + stop] = x[stop]
 
 
 @kernel
