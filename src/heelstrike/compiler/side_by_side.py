@@ -184,9 +184,9 @@ class Lay:
         parts = min((turns, halves), key=self._kinds)
         if self._kinds(parts) > 2:
             parts = halves
-        vectors = [self.vector(part) for part in parts]
+        one, other = (self.vector(part) for part in parts)
         order = [lane // 2 + half * (lane % 2) for lane in range(len(lanes))]
-        return self._shuffled(*vectors, order if parts is turns else list(range(len(lanes))))
+        return self._shuffled(one, other, order if parts is turns else list(range(len(lanes))))
 
     def _kinds(self, parts: list[Lanes]) -> int:
         return sum(len({self._kind(value) for value in part}) for part in parts)
