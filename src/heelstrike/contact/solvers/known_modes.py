@@ -112,10 +112,11 @@ def solve_slipping(size: int, problem: ContactProblem, rows: StickingRows) -> in
     """Solve ``(G_n + G_t r) x = -b`` over the listed rows; return the rank, or -1 to give up.
 
     What slips rubs with r times what it presses with. No rows change places: pivots are held
-    against their diagonals, whatever the units of the rows.
+    against their diagonals, whatever the units of the rows. Of rows that depend on others the
+    solution is the one of least norm, as where both feet of parallel legs slip.
     """
     delassus, source, edge = problem.delassus, rows.row, rows.edge
-    matrix, x, inverse = rows.factor, rows.x, rows.pivot
+    matrix, x, inverse, rank = rows.factor, rows.x, rows.pivot, 0
     for i in range(size):
         row = row_of(i, source)
         for j in range(size):
@@ -129,14 +130,48 @@ def solve_slipping(size: int, problem: ContactProblem, rows: StickingRows) -> in
             x[i] -= ratio * x[k]
             for j in range(k + 1, size):
                 matrix[i, j] -= ratio * matrix[k, j]
-        if not matrix[i, i] > EARLY_PIVOT * delassus[row, row]:
+        pivot, diagonal = matrix[i, i], delassus[row, row]
+        if pivot > EARLY_PIVOT * diagonal:
+            inverse[i] = 1.0 / pivot
+            rank += 1
+        elif abs(pivot) <= NO_PIVOT * diagonal:
+            inverse[i] = 0.0
+        else:
             return -1
-        inverse[i] = 1.0 / matrix[i, i]
     for i in range(size - 1, -1, -1):
         for j in range(i + 1, size):
             x[i] -= matrix[i, j] * x[j]
         x[i] *= inverse[i]
-    return size
+    if rank < size:
+        leave_out_idle_slips(size, rows)
+    return rank
+
+
+@kernel
+def leave_out_idle_slips(size: int, rows: StickingRows) -> None:
+    """Take from a solution what lies along directions that change no velocity, U n = 0.
+
+    The norm is that of the impulses, friction included.
+    """
+    matrix, x, basis, inverse, share = rows.factor, rows.x, rows.square, rows.pivot, rows.spare
+    for i in range(size):
+        share[i] = rows.sharers[i] / (1.0 + rows.edge[i] * rows.edge[i])
+    found = 0
+    for row in range(size):
+        if inverse[row] != 0.0:
+            continue
+        direction = basis[found]
+        for i in range(size):
+            direction[i] = 0.0
+        direction[row] = 1.0
+        for i in range(row - 1, -1, -1):
+            for j in range(i + 1, row + 1):
+                direction[i] -= matrix[i, j] * direction[j]
+            direction[i] *= inverse[i]
+        for earlier in range(found):
+            remove_part(size, basis[earlier], share, direction)
+        remove_part(size, direction, share, x)
+        found += 1
 
 
 @dissolved_kernel
