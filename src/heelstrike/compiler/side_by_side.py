@@ -103,8 +103,15 @@ class Lay:
 
     def vector(self, lanes: Lanes) -> Any:
         """Return the vector of some values."""
-        if lanes not in self._vectors:
-            self._vectors[lanes] = self._made(lanes)
+        waiting = [lanes]
+        while waiting:  # trees may be deep
+            missing = [each for each in self._parts(waiting[-1]) if each not in self._vectors]
+            if missing:
+                waiting.append(missing[0])
+                continue
+            found = waiting.pop()
+            if found not in self._vectors:
+                self._vectors[found] = self._made(found)
         return self._vectors[lanes]
 
     def lane(self, value: Value) -> Any:
@@ -119,18 +126,44 @@ class Lay:
             return self._spread(lanes)
         if not any(isinstance(value, Value) for value in lanes):
             return ir.Constant(ir.VectorType(_DOUBLE, len(lanes)), [float(x) for x in lanes])
-        homes = {id(self._home[value][0]) for value in lanes if value in self._home}
-        if len(homes) == 1 and all(value in self._home for value in lanes):
+        if self._are_at_home(lanes):
             vector = self._home[lanes[0]][0]
             return self._shuffled(vector, vector, [self._home[value][1] for value in lanes])
-        first = lanes[0]
-        if all(isinstance(value, Entry) and value.array == first.array for value in lanes):
+        if self._are_entries(lanes):
             return self._read(lanes)
-        if len({self._kind(value) for value in lanes}) == 1 and isinstance(first, Result):
+        if self._are_alike(lanes):
             return self._computed(lanes)
-        if len(lanes) > 2 and len(lanes) % 2 == 0:
-            return self._in_turns(lanes)
-        return self._gathered(lanes)
+        return self._in_turns(lanes) if self._turns(lanes) else self._gathered(lanes)
+
+    def _parts(self, lanes: Lanes) -> list[Lanes]:
+        """Vectors from which that of some values is made."""
+        if lanes in self._vectors or len(set(lanes)) == 1 or self._are_at_home(lanes):
+            return []
+        if self._are_entries(lanes):
+            return [] if self._are_near(lanes) else self._turns(lanes)
+        if self._are_alike(lanes):
+            return self._operands(lanes)
+        return self._turns(lanes)
+
+    def _are_at_home(self, lanes: Lanes) -> bool:
+        """Whether all are in one vector already."""
+        homes = {id(self._home[value][0]) if value in self._home else None for value in lanes}
+        return len(homes) == 1 and None not in homes
+
+    def _are_entries(self, lanes: Lanes) -> bool:
+        """Whether all are entries of one array."""
+        kinds = {value.array if isinstance(value, Entry) else None for value in lanes}
+        return len(kinds) == 1 and None not in kinds
+
+    def _are_near(self, lanes: Lanes) -> bool:
+        """Whether all from the first to the last of some entries of an array are few."""
+        places = [value.index for value in lanes]
+        return max(places) - min(places) < 2 * len(lanes)
+
+    def _are_alike(self, lanes: Lanes) -> bool:
+        """Whether one instruction computes all, or one and its twin."""
+        kinds = {self._kind(value) for value in lanes}
+        return len(kinds) == 1 and all(isinstance(value, Result) for value in lanes)
 
     def _kind(self, value: Any) -> Any:
         """What has to be the same of values that one instruction computes, or one and its twin."""
@@ -141,8 +174,7 @@ class Lay:
         """Apply the operation of all lanes to the vectors of their operands."""
         differences = [value for value in lanes if value.operation is Operation.SUBTRACT]
         leader = (differences or lanes)[0]
-        operands = [self._ordered(value, leader) for value in lanes]
-        vectors = [self.vector(each) for each in zip(*operands, strict=True)]
+        vectors = [self.vector(each) for each in self._operands(lanes)]
         vector = self.writer.operate(leader.operation, vectors)
         if 0 < len(differences) < len(lanes) and leader.operation in SUMS:
             total = self.writer.operate(Operation.ADD, vectors)
@@ -154,6 +186,12 @@ class Lay:
         for lane, value in enumerate(lanes):
             self._home.setdefault(value, (vector, lane))
         return vector
+
+    def _operands(self, lanes: Lanes) -> list[Lanes]:
+        """Operands of all lanes: the first of each, and so on."""
+        differences = [value for value in lanes if value.operation is Operation.SUBTRACT]
+        leader = (differences or lanes)[0]
+        return list(zip(*(self._ordered(value, leader) for value in lanes), strict=True))
 
     def _ordered(self, value: Result, leader: Result) -> list[Any]:
         """Operands in the order of those of another lane."""
@@ -169,24 +207,29 @@ class Lay:
 
     def _read(self, lanes: Lanes) -> Any:
         """Read entries of an array, at once with what is between them if that is little."""
+        if not self._are_near(lanes):
+            return self._in_turns(lanes) if self._turns(lanes) else self._gathered(lanes)
         places = [value.index for value in lanes]
-        begin, width = min(places), max(places) - min(places) + 1
-        if width > 2 * len(lanes):
-            return self._in_turns(lanes) if len(lanes) > 2 else self._gathered(lanes)
-        vector = self.writer.read_beside(lanes[places.index(begin)], width)
+        begin = min(places)
+        vector = self.writer.read_beside(lanes[places.index(begin)], max(places) - begin + 1)
         return self._shuffled(vector, vector, [place - begin for place in places])
 
     def _in_turns(self, lanes: Lanes) -> Any:
         """Lay vectors of every second lane, or of both halves, into each other."""
-        half = len(lanes) // 2
-        turns = [lanes[0::2], lanes[1::2]]
-        halves = [lanes[:half], lanes[half:]]
-        parts = min((turns, halves), key=self._kinds)
-        if self._kinds(parts) > 2:
-            parts = halves
+        half, parts = len(lanes) // 2, self._turns(lanes)
         one, other = (self.vector(part) for part in parts)
-        order = [lane // 2 + half * (lane % 2) for lane in range(len(lanes))]
-        return self._shuffled(one, other, order if parts is turns else list(range(len(lanes))))
+        order = list(range(len(lanes)))
+        if parts[0] == lanes[0::2]:
+            order = [lane // 2 + half * (lane % 2) for lane in order]
+        return self._shuffled(one, other, order)
+
+    def _turns(self, lanes: Lanes) -> list[Lanes]:
+        """Every second lane and the others, or both halves, if they are more alike than all."""
+        half = len(lanes) // 2
+        if half < 2 or len(lanes) % 2 == 1:
+            return []
+        turns, halves = [lanes[0::2], lanes[1::2]], [lanes[:half], lanes[half:]]
+        return turns if self._kinds(turns) <= min(2, self._kinds(halves)) else halves
 
     def _kinds(self, parts: list[Lanes]) -> int:
         return sum(len({self._kind(value) for value in part}) for part in parts)

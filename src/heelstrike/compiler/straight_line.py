@@ -293,8 +293,20 @@ class _SideBySide(_Writer):
         self.builder.ret_void()
 
     def _computed(self, result: Result) -> Any:
-        beside = self._lay.lane(result)
-        return super()._computed(result) if beside is None else beside
+        """Emit all that it hangs on, one after the other: trees may be deep."""
+        waiting = [result]
+        while waiting:
+            value = waiting[-1]
+            beside = self._lay.lane(value)
+            operands = [each for each in value.operands if isinstance(each, Result)]
+            missing = [each for each in operands if each not in self._values]
+            if beside is None and missing:
+                waiting.append(missing[0])
+                continue
+            waiting.pop()
+            if value not in self._values:
+                self._values[value] = super()._computed(value) if beside is None else beside
+        return self._values[result]
 
 
 def _filled(kind: Any, number: float) -> ir.Constant:

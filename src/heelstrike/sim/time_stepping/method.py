@@ -784,7 +784,7 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         write_joint_rows(rows, assembly)
         write_contact_rows(SECOND_FACE, model, tree, second_faces, rows.owner, assembly)
         assemble_delassus(model, count, equations, directions, problem)
-    problem.count = count
+    problem.count = assembly.problem.count = count
     if work.scheme == MOREAU_JEAN:
         status = solve_restitution(work.order, problem, memory.solver, impact, answer)
     else:
