@@ -319,7 +319,7 @@ def test_snapshots_of_an_older_layout_are_refused_for_that(tmp_path: Path) -> No
     kept = simulation("time stepping").snapshot()
     identity = np.array(json.dumps({"format": 1, **kept.identity}))
     np.savez(tmp_path / "old.npz", identity=identity, **kept.arrays)
-    with pytest.raises(hs.SimulationError, match="layout 1, this version of heelstrike reads 11"):
+    with pytest.raises(hs.SimulationError, match="layout 1, this version of heelstrike reads 12"):
         hs.load_snapshot(tmp_path / "old.npz")
 
 

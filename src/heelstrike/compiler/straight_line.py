@@ -293,7 +293,7 @@ class _SideBySide(_Writer):
         self.builder.ret_void()
 
     def _computed(self, result: Result) -> Any:
-        """Emit all that it hangs on, one after the other: trees may be deep."""
+        """Emit all that it is made of, one after the other: trees may be deep."""
         waiting = [result]
         while waiting:
             value = waiting[-1]

@@ -39,18 +39,18 @@ SIZES, EFFORTS, DIAGONAL, SPEEDS, PENETRATION, CONE, COMPLEMENTARITY = range(7)
 
 
 @kernel
-def gather(level: Floats, count: int, combine: Callable[[float, float], float]) -> float:
+def gather(count: int, combine: Callable[[float, float], float], level: Floats) -> float:
     """Combine numbers two by two, the first half of them with the second, until one is left.
 
     Machine code combines several at once.
 
     Parameters
     ----------
-    level : (any,) float
-        The first are the numbers. What becomes of them is written behind, each time to new places.
     count : int
         How many there are, at least one.
     combine : callable
+    level : (any,) float
+        The first are the numbers. What becomes of them is written behind, each time to new places.
     """
     begin = 0
     while count > 1:
@@ -73,8 +73,8 @@ def plus(one: float, other: float) -> float:
 
 @kernel
 def measure_rows(
-    first: int, last: int, delassus: Floats, free: Floats, impulse: Floats, root: Floats,
-    velocity: Floats, limit: Floats, tree: Floats,
+    first: int, last: int, delassus: Floats, free: Floats, impulse: Floats, limit: Floats,
+    root: Floats, velocity: Floats, tree: Floats,
 ) -> None:  # fmt: skip
     """Weights of rows, their velocities, and what tells the size of the data."""
     for i in range(first, last):
@@ -135,15 +135,15 @@ def certify_rows(
     edge = 2 * number
     for i in range(rows):
         limit[i] = friction[i // 2] * impulse[i - i % 2] if i < edge else 0.0
-    measure_rows(0, edge, delassus, free, impulse, root, velocity, limit, cones)
-    measure_rows(edge, rows, delassus, free, impulse, root, velocity, limit, stops)
-    unit = larger(gather(cones[SIZES], edge, larger), size[UNIT])
-    effort = gather(cones[EFFORTS], edge, plus)
-    least = gather(cones[DIAGONAL], edge, smaller)
+    measure_rows(0, edge, delassus, free, impulse, limit, root, velocity, cones)
+    measure_rows(edge, rows, delassus, free, impulse, limit, root, velocity, stops)
+    unit = larger(gather(edge, larger, cones[SIZES]), size[UNIT])
+    effort = gather(edge, plus, cones[EFFORTS])
+    least = gather(edge, smaller, cones[DIAGONAL])
     if rows > edge:
-        unit = larger(gather(stops[SIZES], rows - edge, larger), unit)
-        effort = plus(gather(stops[EFFORTS], rows - edge, plus), effort)
-        least = smaller(gather(stops[DIAGONAL], rows - edge, smaller), least)
+        unit = larger(gather(rows - edge, larger, stops[SIZES]), unit)
+        effort = plus(gather(rows - edge, plus, stops[EFFORTS]), effort)
+        least = smaller(gather(rows - edge, smaller, stops[DIAGONAL]), least)
     inverse = inverse_above(unit, 0.0)
     for i in range(edge):
         speed, scale = velocity[i] / root[i], root[i] * inverse
@@ -160,15 +160,15 @@ def certify_rows(
         stops[SPEEDS, i - edge] = abs(speed) * held[i - edge]
         stops[PENETRATION, i - edge] = -speed
         judge_row(i - edge, speed, scale, inverse, impulse[i], 0.0, stops)
-    fastest = gather(cones[SPEEDS], edge, larger)
-    deepest = larger(gather(cones[PENETRATION], number, larger), 0.0)
-    outside = larger(gather(cones[CONE], edge, larger), 0.0)
-    worst = larger(gather(cones[COMPLEMENTARITY], edge, larger), 0.0)
+    fastest = gather(edge, larger, cones[SPEEDS])
+    deepest = larger(gather(number, larger, cones[PENETRATION]), 0.0)
+    outside = larger(gather(edge, larger, cones[CONE]), 0.0)
+    worst = larger(gather(edge, larger, cones[COMPLEMENTARITY]), 0.0)
     if rows > edge:
-        fastest = larger(gather(stops[SPEEDS], rows - edge, larger), fastest)
-        deepest = larger(gather(stops[PENETRATION], rows - edge, larger), deepest)
-        outside = larger(gather(stops[CONE], rows - edge, larger), outside)
-        worst = larger(gather(stops[COMPLEMENTARITY], rows - edge, larger), worst)
+        fastest = larger(gather(rows - edge, larger, stops[SPEEDS]), fastest)
+        deepest = larger(gather(rows - edge, larger, stops[PENETRATION]), deepest)
+        outside = larger(gather(rows - edge, larger, stops[CONE]), outside)
+        worst = larger(gather(rows - edge, larger, stops[COMPLEMENTARITY]), worst)
     residual[0], residual[1], residual[2] = worst, outside, deepest * inverse
     size[UNIT], size[EFFORT], size[LEAST], size[FASTEST] = unit, effort, least, fastest
 

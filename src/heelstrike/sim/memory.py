@@ -146,8 +146,6 @@ class UsualPoints(Bundle):
 
     usual_problem: ContactProblem = part(ContactProblem)
     """The contact problem with the matrix of these points."""
-    small_problem: ContactProblem = part(ContactProblem)
-    """The contact problem of some of them, in as little room."""
     usual_points: Integers = array("points", of=int)
     """Which they are."""
     usual_place: Integers = array("nc", of=int)
@@ -267,6 +265,8 @@ class Memory(Bundle):
     """The ground under them."""
     assembly: Assembly = part(Assembly, flat=True)
     """The contact problem."""
+    small_problem: ContactProblem = part(ContactProblem)
+    """The contact problem in as little room as programs ask for."""
     solver: ContactWorkspace = part(ContactWorkspace)
     """Memory of the contact solvers."""
     usual: UsualPoints = part(UsualPoints, flat=True)
@@ -336,11 +336,11 @@ def _laid_out(robot: Robot) -> Memory:
         contacts=_contacts_of(POINT, rows, extents),
         second_faces=_contacts_of(SECOND_FACE, rows, extents),
         assembly=assembly,
+        small_problem=_in_room(problem, PROGRAM_ROWS),
         solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
         usual=UsualPoints.allocate(
             extents,
             usual_problem=_in_room(problem, room_of(len(points))),
-            small_problem=_in_room(problem, PROGRAM_ROWS),
             usual_points=points,
             programs=programs,
             usual_place=place,

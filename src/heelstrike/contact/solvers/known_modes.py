@@ -540,7 +540,7 @@ def stand(
             rows.lower_half, rows.x, rows.pivot, rows.margin, answer.impulse,
         ),
     )  # fmt: skip
-    if not rows.margin[0] > 0.0 and not share_standing(code, cones, problem, rows, scaling, answer):
+    if not rows.margin[0] > 0.0 and not share_standing(code, cones, problem, scaling, rows, answer):
         return False
     worst = certify_at_once(cones, problem, settings, scaling, answer)
     still = answer.residual[1] == 0.0 and scaling.size[FASTEST] <= answer.rest
@@ -553,7 +553,7 @@ def stand(
 
 @kernel
 def share_standing(
-    code: int, cones: int, problem: ContactProblem, rows: StickingRows, scaling: Scaling,
+    code: int, cones: int, problem: ContactProblem, scaling: Scaling, rows: StickingRows,
     answer: ContactAnswer,
 ) -> bool:  # fmt: skip
     """Share impulses to the least norm where rows depend on others, as under straight legs.

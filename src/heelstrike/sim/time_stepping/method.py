@@ -764,7 +764,7 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
             problem = usual.usual_problem
         else:
             if first[count] <= PROGRAM_ROWS:
-                problem = usual.small_problem
+                problem = memory.small_problem
             pick_points(near, candidate, usual, problem.delassus)
         delassus = problem.delassus
         for place in range(near, count):  # the rows of loops are there
