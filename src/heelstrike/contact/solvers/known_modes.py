@@ -521,8 +521,8 @@ def stand(
 ) -> bool:  # fmt: skip
     """Solve the contact problem at once if few contacts make it, and all stick; return success.
 
-    None pulls or slides in the answer. Beside them there may be stops, pressed or not, and they are
-    so in the answer. After a failure the modes are what they were.
+    None pulls or slides in the answer. Beside them there may be stops, pressed or not; those that
+    would pull are let go. After a failure the modes are what they were.
     """
     mode, count = answer.mode, problem.count
     cones = cones_of(problem, settings, scaling)
@@ -533,22 +533,48 @@ def stand(
         return False
     for stop in range(stops):
         scaling.held[stop] = 0.0 if mode[cones + stop] == OPEN else 1.0
-    play(
-        program,
-        (
-            rows.row, rows.equation, rows.order, problem.delassus, problem.free, scaling.held,
-            rows.lower_half, rows.x, rows.pivot, rows.margin, answer.impulse,
-        ),
-    )  # fmt: skip
-    if not rows.margin[0] > 0.0 and not share_standing(code, cones, problem, scaling, rows, answer):
-        return False
+    pulling = 1
+    while pulling > 0:  # each time fewer are held
+        play(
+            program,
+            (
+                rows.row, rows.equation, rows.order, problem.delassus, problem.free, scaling.held,
+                rows.lower_half, rows.x, rows.pivot, rows.margin, answer.impulse,
+            ),
+        )  # fmt: skip
+        good = rows.margin[0] > 0.0
+        if not good and not share_standing(code, cones, problem, scaling, rows, answer):
+            return False
+        pulling = let_go(2 * cones, stops, scaling.held, answer.impulse) if stops > 0 else 0
     worst = certify_at_once(cones, problem, settings, scaling, answer)
     still = answer.residual[1] == 0.0 and scaling.size[FASTEST] <= answer.rest
     for row in range(2 * cones, 2 * cones + stops):
         # What parts, however slowly, would pull if it were held.
         parts = answer.velocity[row] > BARELY * scaling.unit * scaling.root[row]
         still = still and (parts or scaling.held[row - 2 * cones] == 1.0)
-    return still and worst <= min(settings.tolerance, AS_GOOD)
+    if not still or not worst <= min(settings.tolerance, AS_GOOD):
+        return False
+    for stop in range(stops):
+        mode[cones + stop] = STICK if scaling.held[stop] == 1.0 else OPEN
+    return True
+
+
+@kernel
+def let_go(first: int, stops: int, held: Floats, impulse: Floats) -> int:
+    """Hold the stops no longer that pull; return how many.
+
+    What pulls no more than rounding may explain is left without an impulse. Stops begin in a row.
+    """
+    largest, pulling = 0.0, 0
+    for row in range(first + stops):
+        largest = max(largest, abs(impulse[row]))
+    for stop in range(stops):
+        if impulse[first + stop] < 0.0:
+            if impulse[first + stop] < -CLEAN * largest:
+                held[stop] = 0.0
+                pulling += 1
+            impulse[first + stop] = 0.0
+    return pulling
 
 
 @kernel
