@@ -28,6 +28,9 @@ CODES = 2**MOST_STANDING
 """Ways in which up to so many contacts share rows: 1 for one contact, and with each contact more
 twice that, and one if its tangent is shared with the contact before."""
 
+BESIDE_STOPS = (0b10, 0b11, 0b1101)
+"""Codes that have programs with stops: two point feet, one flat foot, and two."""
+
 SHARED_ROW = 1e-14
 """Two rows are one if the inverse mass along their difference is less than this, relative."""
 
@@ -149,12 +152,9 @@ def standing_programs() -> NDArray[np.int64]:
 
     Read-only: all workspaces share them.
     """
-    numbers = [
-        (code, stops)
-        for code in range(1, CODES)
-        for stops in range(MOST_STOPS + 1)
-        if _is_of_two_feet(code) and (stops == 0 or has_stops(code.bit_length(), stops))
-    ]
+    alone = [(code, 0) for code in range(1, CODES) if _is_of_two_feet(code)]
+    beside = [(code, k) for code in BESIDE_STOPS for k in range(1, MOST_STOPS + 1)]
+    numbers = alone + [(code, k) for code, k in beside if has_stops(code.bit_length(), k)]
     programs = np.zeros((CODES, MOST_STOPS + 1), dtype=np.int64)
     programs[tuple(np.transpose(numbers))] = straight_line_code([_program(*n) for n in numbers])
     programs.flags.writeable = False
