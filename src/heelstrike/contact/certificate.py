@@ -116,7 +116,7 @@ def certify(
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
     root, slope = scaling.root, scaling.slope
     cones = cones_of(problem, settings, scaling)
-    if cones > 0:
+    if cones > 0 and not any_slides(count, slope):
         worst = certify_at_once(cones, problem, settings, scaling, answer)
         if worst < math.inf:
             return worst
@@ -239,20 +239,28 @@ def rounding_of(count: int, effort: float) -> float:
 def cones_of(problem: ContactProblem, settings: Settings, scaling: Scaling) -> int:
     """How many contacts a problem has for which there is a program, 0 if there is none.
 
-    There is for few of them with stops behind, where none has to slide.
+    There is for few of them with stops behind.
     """
     count = problem.count
     cones = row_of(count, problem.first) - count
     fits = 0 < cones < scaling.programs.shape[0] and count - cones < scaling.programs.shape[1]
     if not fits or problem.delassus.shape[1] != PROGRAM_ROWS or settings.skewed != 0:
         return 0
-    others, slopes = 0, 0.0
+    others = 0
+    for contact in range(cones):
+        others |= problem.set[contact] ^ CONE
+    for stop in range(cones, count):
+        others |= problem.set[stop] ^ HALF_LINE
+    return cones if others == 0 and scaling.programs[cones, count - cones] != 0 else 0
+
+
+@kernel
+def any_slides(count: int, slope: Floats) -> bool:
+    """Whether any contact is prescribed to slide."""
+    slides = 0
     for contact in range(count):
-        others |= problem.set[contact] ^ (CONE if contact < cones else HALF_LINE)
-        slopes += abs(scaling.slope[contact])
-    if others != 0 or slopes != 0.0 or scaling.programs[cones, count - cones] == 0:
-        return 0
-    return cones
+        slides += slope[contact] != 0.0
+    return slides > 0
 
 
 @dissolved_kernel

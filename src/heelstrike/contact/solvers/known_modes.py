@@ -531,31 +531,68 @@ def stand(
     program = rows.standing[code, stops] if code > 0 else 0
     if program == 0:
         return False
-    for stop in range(stops):
-        scaling.held[stop] = 0.0 if mode[cones + stop] == OPEN else 1.0
-    pulling = 1
-    while pulling > 0:  # each time fewer are held
-        play(
-            program,
-            (
-                rows.row, rows.equation, rows.order, problem.delassus, problem.free, scaling.held,
-                rows.lower_half, rows.x, rows.pivot, rows.margin, answer.impulse,
-            ),
-        )  # fmt: skip
-        good = rows.margin[0] > 0.0
-        if not good and not share_standing(code, cones, problem, scaling, rows, answer):
+    if stops > 0:
+        if not hold_stops(code, cones, program, problem, scaling, rows, answer):
             return False
-        pulling = let_go(2 * cones, stops, scaling.held, answer.impulse) if stops > 0 else 0
+    elif not play_standing(code, cones, program, problem, scaling, rows, answer):
+        return False
     worst = certify_at_once(cones, problem, settings, scaling, answer)
     still = answer.residual[1] == 0.0 and scaling.size[FASTEST] <= answer.rest
-    for row in range(2 * cones, 2 * cones + stops):
-        # What parts, however slowly, would pull if it were held.
-        parts = answer.velocity[row] > BARELY * scaling.unit * scaling.root[row]
-        still = still and (parts or scaling.held[row - 2 * cones] == 1.0)
     if not still or not worst <= min(settings.tolerance, AS_GOOD):
         return False
+    return stops == 0 or name_stops(cones, problem, scaling, answer)
+
+
+@dissolved_kernel
+def play_standing(
+    code: int, cones: int, program: int, problem: ContactProblem, scaling: Scaling,
+    rows: StickingRows, answer: ContactAnswer,
+) -> bool:  # fmt: skip
+    """Find the impulses of contacts that stick and of the stops that are held; return success."""
+    play(
+        program,
+        (
+            rows.row, rows.equation, rows.order, problem.delassus, problem.free, scaling.held,
+            rows.lower_half, rows.x, rows.pivot, rows.margin, answer.impulse,
+        ),
+    )  # fmt: skip
+    good = rows.margin[0] > 0.0
+    return good or share_standing(code, cones, problem, scaling, rows, answer)
+
+
+@rare_kernel
+def hold_stops(
+    code: int, cones: int, program: int, problem: ContactProblem, scaling: Scaling,
+    rows: StickingRows, answer: ContactAnswer,
+) -> bool:  # fmt: skip
+    """The same, where none of the stops that are held in the end pulls."""
+    stops = problem.count - cones
     for stop in range(stops):
-        mode[cones + stop] = STICK if scaling.held[stop] == 1.0 else OPEN
+        scaling.held[stop] = 0.0 if answer.mode[cones + stop] == OPEN else 1.0
+    pulling = 1
+    while pulling > 0:  # each time fewer are held
+        if not play_standing(code, cones, program, problem, scaling, rows, answer):
+            return False
+        pulling = let_go(2 * cones, stops, scaling.held, answer.impulse)
+    return True
+
+
+@rare_kernel
+def name_stops(
+    cones: int, problem: ContactProblem, scaling: Scaling, answer: ContactAnswer
+) -> bool:
+    """Name what stops do; return whether all that are not held part.
+
+    What parts, however slowly, would pull if it were held.
+    """
+    stops, first = problem.count - cones, 2 * cones
+    for stop in range(stops):
+        speed = answer.velocity[first + stop]
+        parts = speed > BARELY * scaling.unit * scaling.root[first + stop]
+        if scaling.held[stop] == 0.0 and not parts:
+            return False
+    for stop in range(stops):
+        answer.mode[cones + stop] = STICK if scaling.held[stop] == 1.0 else OPEN
     return True
 
 
