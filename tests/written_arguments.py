@@ -15,6 +15,7 @@ from typing import Any, get_type_hints
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.compilation import Kernel
 from heelstrike.compiler.straight_line import play
+from heelstrike.compiler.words import copy_words
 from heelstrike.robot.model import Model
 from heelstrike.robot.spatial.model import SpatialModel
 from heelstrike.sim.contacts.straight_line import KERNELS
@@ -143,6 +144,8 @@ class _Reading(ast.NodeVisitor):
             assert isinstance(node.args[1], ast.Tuple)
             self.visit(node.args[0])
             self._hand_over(program, node.args[1].elts)
+        elif called is copy_words:
+            self._hand_over(None, node.args)
         elif isinstance(called, Kernel):
             self._hand_over(called, node.args)
         elif isinstance(node.func, ast.Attribute) and (method := self._method(node.func)):
@@ -186,7 +189,7 @@ class _Reading(ast.NodeVisitor):
 
     def _hand_over(self, kernel: Kernel | None, values: Iterable[ast.expr]) -> None:
         values = list(values)
-        if kernel is None:  # straight-line code of another kind: its last argument
+        if kernel is None:  # straight-line code of another kind, and copies: the last argument
             self._write_to(self.paths(values[-1]))
             for value in values:
                 self.visit(value)
