@@ -75,7 +75,7 @@ def pose(model: Any, step: float, memory: Any) -> int:
     sim.write_joint_rows(rows, assembly)
     for row in range(assembly.problem.first[count]):
         assembly.problem.free[row] = sim.row_product(assembly.directions.jacobian, row, v)
-    total = sim.append_loops(count, 1, loops, assembly)
+    total = sim.append_loops(count, loops, assembly)
     sim.free_loops(total, loops, v, 0.5 * step, assembly)
     return sim.note_group(sim.LOOP, count, total, assembly)
 

@@ -144,8 +144,6 @@ class _Reading(ast.NodeVisitor):
             assert isinstance(node.args[1], ast.Tuple)
             self.visit(node.args[0])
             self._hand_over(program, node.args[1].elts)
-        elif called is copy_words:
-            self._hand_over(None, node.args)
         elif isinstance(called, Kernel):
             self._hand_over(called, node.args)
         elif isinstance(node.func, ast.Attribute) and (method := self._method(node.func)):
@@ -154,8 +152,9 @@ class _Reading(ast.NodeVisitor):
             values = [value for value in node.args if not self._is_bundle(value)]
         else:
             values = [node.func, *node.args]
-            if isinstance(node.func, ast.Name) and node.func.id in self.stands_for:
-                # A function that was handed over: a controller, which writes its last argument.
+            handed = isinstance(node.func, ast.Name) and node.func.id in self.stands_for
+            if handed or called is copy_words:
+                # A function that was handed over, such as a controller, writes its last argument.
                 self._write_to(self.paths(node.args[-1]))
         for value in values:
             self.visit(value)
@@ -189,7 +188,7 @@ class _Reading(ast.NodeVisitor):
 
     def _hand_over(self, kernel: Kernel | None, values: Iterable[ast.expr]) -> None:
         values = list(values)
-        if kernel is None:  # straight-line code of another kind, and copies: the last argument
+        if kernel is None:  # straight-line code of another kind: its last argument
             self._write_to(self.paths(values[-1]))
             for value in values:
                 self.visit(value)

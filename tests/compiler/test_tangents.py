@@ -16,6 +16,7 @@ from heelstrike.compiler.recordings.recording import (
     Recording,
     inverse_above,
     larger,
+    smaller,
 )
 from heelstrike.compiler.recordings.tangents import tangents
 from heelstrike.compiler.recordings.tape import Entry, Operation, Result, Tape, Value
@@ -33,6 +34,7 @@ PLAYED = {
     Operation.ROOT: math.sqrt,
     Operation.MAGNITUDE: abs,
     Operation.LARGER: max,
+    Operation.SMALLER: min,
     Operation.INVERT_ABOVE: lambda a, b: 1.0 / a if a > b else 0.0,
 }
 
@@ -56,6 +58,7 @@ def everything(x: Floats, y: Floats, result: Floats) -> None:
     result[3] = 7.0
     result[4] = sqrt(x[1]) * abs(y[1]) + abs(y[0])
     result[5] = larger(x[0] * y[0], x[1]) + larger(y[1], 2.0 * x[0]) + larger(x[0], 0.0)
+    result[5] = result[5] + smaller(x[0] * y[0], x[1]) * smaller(y[1], 2.0 * x[0])
 
 
 def test_every_operation_has_its_derivative() -> None:

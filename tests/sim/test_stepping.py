@@ -319,7 +319,7 @@ def test_snapshots_of_an_older_layout_are_refused_for_that(tmp_path: Path) -> No
     kept = simulation("time stepping").snapshot()
     identity = np.array(json.dumps({"format": 1, **kept.identity}))
     np.savez(tmp_path / "old.npz", identity=identity, **kept.arrays)
-    with pytest.raises(hs.SimulationError, match="layout 1, this version of heelstrike reads 11"):
+    with pytest.raises(hs.SimulationError, match="layout 1, this version of heelstrike reads 12"):
         hs.load_snapshot(tmp_path / "old.npz")
 
 
@@ -338,7 +338,7 @@ def test_other_names_of_arrays_are_another_layout() -> None:
         for method, arrays in kept.items()
     }
     digest = hashlib.sha256(json.dumps(names, sort_keys=True).encode()).hexdigest()[:16]
-    assert (snapshot._FORMAT, digest) == (11, "054ff737b38dfeae")
+    assert (snapshot._FORMAT, digest) == (12, "7c541a7f5e40909e")
 
 
 def test_files_that_are_no_snapshots_are_refused(tmp_path: Path) -> None:

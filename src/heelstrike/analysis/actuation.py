@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.spatial.model import BALL, HINGE
+from heelstrike.sim.dimension import AnyRobot
 from heelstrike.sim.run import AnyRun, Run
 
+SHORTEST_WAY = 1e-3
+"""Distance (m) below which energy a distance means nothing."""
 
-def torque_cost(run: Run, *, start: float = -np.inf, end: float = np.inf) -> float:
+
+def torque_cost(run: AnyRun, *, start: float = -np.inf, end: float = np.inf) -> float:
     """∫ ΓᵀΓ dt over the rows from `start` to `end` (s), in N²m²s (paper eq. 40).
 
     Where torques are held from row to row, the sum is the integral.
@@ -51,6 +58,14 @@ def actuator_power(run: AnyRun) -> Floats:
     """
     speed = run.velocity[:, run.robot.driven]
     return np.asarray(mean_over_intervals(run, run.torque) * 0.5 * (speed[:-1] + speed[1:]))
+
+
+def turning(robot: AnyRobot) -> NDArray[np.bool_]:
+    """Which velocities of a robot turn something, (nv,)."""
+    if isinstance(robot, Robot):
+        return np.asarray(robot.model.axis[:, 0] != 0.0)
+    kind = robot.model.joint_kind[robot.model.velocity_joint]
+    return np.asarray((kind == BALL) | (kind == HINGE))
 
 
 def torque_bounds(run: AnyRun) -> tuple[Floats, Floats]:
@@ -109,11 +124,15 @@ def cost_of_transport(run: Run, *, motion: Motion | None = None) -> CostOfTransp
     CostOfTransport
         Energy a unit of weight and distance.
     """
-    distance = distance_travelled(run, motion=motion)
+    return transport_over(run, distance_travelled(run, motion=motion))
+
+
+def transport_over(run: AnyRun, distance: float) -> CostOfTransport:
+    """Mechanical cost of transport of a run over a distance (m); see :func:`cost_of_transport`."""
     held = np.diff(run.time)[:, None]
     power = actuator_power(run)
     scale = run.robot.weight * abs(distance)
-    if not (run.robot.weight > 0.0 and abs(distance) > 1e-3):
+    if not (run.robot.weight > 0.0 and abs(distance) > SHORTEST_WAY):
         scale = float("nan")
     return CostOfTransport(
         absolute=float((np.abs(power) * held).sum() / scale),

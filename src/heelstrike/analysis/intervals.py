@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from heelstrike.robot.model import Floats
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import AnyRun, Event, Run
 from heelstrike.tolerances import SAME_ROW
@@ -30,6 +30,40 @@ def mean_over_intervals(run: AnyRun, values: Floats) -> Floats:
     if impulses_in_events(run):
         return np.asarray(0.5 * (values[:-1] + values[1:]))
     return values[:-1]
+
+
+def mean_between(
+    time: Floats, gained: Floats, rows: Integers, still: Floats, *, since: bool = False
+) -> Floats:
+    """Means over the spans between some rows of a run.
+
+    Parameters
+    ----------
+    time : (n,) float
+        Time of the rows of the run (s).
+    gained : (n - 1, ...) float
+        What is gained from each of them to the next: the impulse (N s) of a force.
+    rows : (k,) int
+        Some of the rows, in order.
+    still : (k, ...) float
+        Values where no time passes.
+    since : bool
+        Whether the mean of a row is that since the one before, not that until the next.
+
+    Returns
+    -------
+    (k, ...) float
+        The mean of each row.
+    """
+    sums = np.concatenate((np.zeros((1, *gained.shape[1:])), np.cumsum(gained, axis=0)))
+    before, after = np.append(rows[:1], rows[:-1]), np.append(rows[1:], rows[-1:])
+    first, last = (before, rows) if since else (rows, after)
+    elapsed = time[last] - time[first]
+    lasting = elapsed > 0.0
+    found = still.copy()
+    spans = elapsed[lasting].reshape(-1, *[1] * (still.ndim - 1))
+    found[lasting] = (sums[last] - sums[first])[lasting] / spans
+    return found
 
 
 def friction_work(run: Run, torque: Floats, velocity: Floats) -> Floats:

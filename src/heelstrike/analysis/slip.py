@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.support import pushing
 from heelstrike.robot.model import Floats
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import AnyRun, Run
 
 
-def slip_distance(run: Run) -> Floats:
+def slip_distance(run: AnyRun) -> Floats:
     """Distance that every contact point has slid while pressed, up to each row, (nt, nc), in m.
 
     The sum over steps of |tangential velocity at the end of the step| times the step, taken over
@@ -28,13 +30,15 @@ def slip_distance(run: Run) -> Floats:
     (nt, nc) float
         Metres.
     """
-    speed = np.where(pushing(run), np.abs(run.slip_velocity), 0.0)
+    in_space: Any = run
+    slips = run.slip_velocity if isinstance(run, Run) else np.linalg.norm(in_space.slip, axis=-1)
+    speed = np.where(pushing(run), np.abs(slips), 0.0)
     slid = np.zeros_like(speed)
     slid[1:] = np.cumsum(mean_over_intervals(run, speed) * np.diff(run.time)[:, None], axis=0)
     return slid
 
 
-def max_slip(run: Run) -> float:
+def max_slip(run: AnyRun) -> float:
     """Largest distance that any contact point slid over the whole run, in m.
 
     Parameters

@@ -6,17 +6,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from heelstrike.analysis.actuation import cost_of_transport, torque_cost
+from heelstrike.analysis.actuation import cost_of_transport
 from heelstrike.analysis.diagnosis.falls import first_cause
 from heelstrike.analysis.friction import friction_use
 from heelstrike.analysis.motion import run_motion
-from heelstrike.analysis.slip import max_slip
 from heelstrike.analysis.support import double_support_fraction, walking_steps
-from heelstrike.analysis.told_summary import OF_A_GAIN, UNKNOWN, ToldSummary, in_lines
+from heelstrike.analysis.told_summary import (
+    COST_LINES,
+    FRICTION_LINES,
+    GAIN_LINE,
+    OF_A_GAIN,
+    UNKNOWN,
+    ToldSummary,
+    common_figures,
+    in_lines,
+)
 from heelstrike.analysis.tracking import tracking_error
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
 from heelstrike.field_texts import dataclass
-from heelstrike.sim.run import Run, SolverCount
+from heelstrike.sim.run import Run
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
@@ -33,23 +41,16 @@ class GaitFigures:
     """∫ ΓᵀΓ dt of one step of the gait as designed (paper eq. 40)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Summary(ToldSummary):
     """Figures of a run. Those that do not exist for it are NaN (null in JSON)."""
 
-    robot: str
-    """Name of the robot."""
-    status: str
-    message: str
-    """status, message: How the run ended."""
     first_cause: str
     """Why it did not go well, what came first in time first; nothing if it did."""
     steps: int
     """Walking steps taken: touchdowns of alternating feet."""
     distance_m: float
     """How far the centre of mass moved along x."""
-    duration_s: float
-    """Time simulated."""
     gait: GaitFigures | None
     """The gait that the run followed, if it was given."""
     tracking_rms_rad: float
@@ -65,31 +66,10 @@ class Summary(ToldSummary):
     """Least distance of that zero moment point to the ends of the sole's touching points."""
     friction_use_max: float
     """Largest |f_t| / (μ f_n) of a foot."""
-    slip_max_m: float
-    """Largest distance that a contact point slid while pressed, over the whole run."""
-    penetration_max_m: float
     complementarity_max: float
-    """penetration_max_m, complementarity_max: Worst values over all steps, from the certificates;
-    the latter is relative."""
-    solver: SolverCount
-    """How the contact problems were solved."""
-    torque_cost_N2m2s: float  # noqa: N815 - units keep their capitals
-    """∫ ΓᵀΓ dt over the whole run."""
-    cost_of_transport: float
-    cost_of_transport_positive: float
-    """cost_of_transport, cost_of_transport_positive: ∫ Σ |τ ω| dt / (m g d), and the same of
-    positive work only."""
+    """Worst value over all steps, from the certificates; it is relative."""
     double_support_fraction: float
     """Share of the time in which both feet push."""
-    saturations: int
-    """Times that a torque was clipped to its limit."""
-    compile_s: float
-    wall_s: float
-    """compile_s, wall_s: Time spent on compilation, and on the simulation."""
-    real_time_factor: float
-    """Time simulated over time spent on the simulation."""
-    energy_gain_J: float = 0.0  # noqa: N815 - units keep their capitals
-    """Kinetic energy that restitution with friction made in impacts."""
     doubt: str = ""
     """Why the run may mean little though it was completed; nothing if nothing is known."""
 
@@ -130,19 +110,15 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
     """
     motion = run_motion(run)
     fall = first_cause(run, gait)
-    duration = float(run.time[-1] - run.time[0]) if len(run.time) else 0.0
     tracking = tracking_error(run, gait) if gait is not None and len(run.time) else None
     zmp = zero_moment_point(run, motion=motion)
     margin = np.where(zmp.single_support[:, None], zmp.foot_margin, np.nan)
     transport = cost_of_transport(run, motion=motion)
     return Summary(
-        robot=run.robot.name,
-        status=run.status.value,
-        message=run.message,
+        **common_figures(run, transport),
         first_cause="" if fall is None else str(fall),
         steps=len(walking_steps(run)),
         distance_m=transport.distance,
-        duration_s=duration,
         gait=None
         if gait is None
         else GaitFigures(float(gait.step_length), float(gait.step_duration), float(gait.cost)),
@@ -153,20 +129,9 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
         zmp_limits_m=zero_moment_point_limits(run.robot),
         zmp_margin_min_m=float(np.fmin.reduce(margin, axis=None, initial=UNKNOWN)),
         friction_use_max=friction_use(run).max,
-        slip_max_m=max_slip(run),
-        penetration_max_m=run.certificates.penetration,
         complementarity_max=run.certificates.complementarity,
-        energy_gain_J=run.certificates.energy_gain,
         doubt=run.doubt,
-        solver=run.solver,
-        torque_cost_N2m2s=torque_cost(run),
-        cost_of_transport=transport.absolute,
-        cost_of_transport_positive=transport.positive,
         double_support_fraction=double_support_fraction(run),
-        saturations=run.saturations,
-        compile_s=run.timing.compile_s,
-        wall_s=run.timing.wall_s,
-        real_time_factor=duration / run.timing.wall_s if run.timing.wall_s > 0.0 else UNKNOWN,
     )
 
 
@@ -182,15 +147,9 @@ LINES = {
     "joint tracking error": "{s.tracking_rms_rad:.3} rad rms, {s.tracking_max_rad:.3} rad at most",
     "zero moment point": "{s.zmp_min_m:.3} … {s.zmp_max_m:.3} m "
     "(sole {s.zmp_limits_m[0]:.3} … {s.zmp_limits_m[1]:.3} m)",
-    "friction use": "{s.friction_use_max:.3} of the cone",
-    "slip": "{s.slip_max_m:.2} m",
-    "penetration": "{s.penetration_max_m:.2} m",
+    **FRICTION_LINES,
     "contact problems": "{s.solver}; complementarity residual {s.complementarity_max:.2}",
-    OF_A_GAIN: "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
-    "cost of transport": "{s.cost_of_transport:.3} "
-    "({s.cost_of_transport_positive:.3} by positive work alone)",
-    "torques at their limit": "{s.saturations}",
-    "computing time": "{s.wall_s:.3} s ({s.real_time_factor:.3} × real time), "
-    "compilation {s.compile_s:.3} s",
+    **GAIN_LINE,
+    **COST_LINES,
 }
 OF_A_GAIT = ("gait", "joint tracking error")

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.robot.model import Floats
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.run import Event, Run
+from heelstrike.sim.run import AnyRun, Event, Run
+from heelstrike.tolerances import STANDING_GAP
 
 NOTHING = 1e-9
 """Normal forces below this fraction of the robot's weight are no force."""
@@ -22,7 +24,7 @@ CHATTER = 0.02
 it: they chatter, or scuff."""
 
 
-def pushing(run: Run) -> NDArray[np.bool_]:
+def pushing(run: AnyRun) -> NDArray[np.bool_]:
     """Tell which contact points push in each row, (nt, nc).
 
     A row's forces act over the step that follows it, so that a foot pushes in the row whose step
@@ -31,12 +33,22 @@ def pushing(run: Run) -> NDArray[np.bool_]:
     return np.asarray(run.contact_force[..., 0] > NOTHING * run.robot.weight)
 
 
-def pushing_feet(run: Run) -> NDArray[np.bool_]:
+def carrying(run: AnyRun) -> NDArray[np.bool_]:
+    """Tell which contact points touch the ground or push on it in each row, (nt, nc)."""
+    return np.asarray((run.gap <= STANDING_GAP) | pushing(run))
+
+
+def on_ground(run: AnyRun) -> Floats:
+    """Project the contact points onto the ground, (nt, nc, dimension), in m."""
+    return np.asarray(run.contact_point - run.gap[..., None] * run.contact_normal)
+
+
+def pushing_feet(run: AnyRun) -> NDArray[np.bool_]:
     """Tell which feet push in each row, (nt, nf)."""
     return np.asarray(foot_sums(run, pushing(run)) > 0)
 
 
-def foot_sums(run: Run, values: NDArray[Any]) -> NDArray[Any]:
+def foot_sums(run: AnyRun, values: NDArray[Any]) -> NDArray[Any]:
     """Sum what is of contact points, (nt, nc, ...), over those of each foot, (nt, nf, ...)."""
     sums = [values[:, list(foot.contacts)].sum(axis=1) for foot in run.robot.feet]
     return np.stack(sums, axis=1) if sums else np.zeros((len(values), 0, *values.shape[2:]))
@@ -80,7 +92,7 @@ class SupportPhase:
         return self.end - self.start
 
 
-def support_phases(run: Run) -> tuple[SupportPhase, ...]:
+def support_phases(run: AnyRun) -> tuple[SupportPhase, ...]:
     """Divide a run into phases between which the set of pushing feet changes.
 
     Parameters
@@ -109,7 +121,7 @@ def support_phases(run: Run) -> tuple[SupportPhase, ...]:
     )
 
 
-def double_support_fraction(run: Run) -> float:
+def double_support_fraction(run: AnyRun) -> float:
     """Share of the time in which two feet or more push; NaN for a run without duration.
 
     Parameters

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import Motion
-from heelstrike.analysis.support import NOTHING, pushing, single_support
+from heelstrike.analysis.support import NOTHING, carrying, single_support
 from heelstrike.analysis.wrenches import sole_points
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
@@ -30,7 +30,6 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import soles
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.run import Run
-from heelstrike.tolerances import STANDING_GAP
 
 if TYPE_CHECKING:
     from heelstrike.analysis.spatial.zero_moment_point import SpatialZeroMomentPoint
@@ -165,7 +164,7 @@ def _pressure(run: Run, contacts: list[int], reference: Floats) -> _Pressure:
     place = np.full(len(row), np.nan)
     place[loaded] = -moment[loaded] / pressing[loaded]
     along = np.einsum("tck,tk->tc", arm, tangent)
-    touching = (run.gap[:, contacts] <= STANDING_GAP) | pushing(run)[:, contacts]
+    touching = carrying(run)[:, contacts]
     heel = np.where(touching, along, np.inf).min(axis=1)
     toe = np.where(touching, along, -np.inf).max(axis=1)
     return _Pressure(origin, tangent, place, np.minimum(place - heel, toe - place))

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from heelstrike.cli.options import Afresh, AsJson, Workers, method_called
-from heelstrike.cli.terminal import complain, many, output, spoken, stage, tell, this_command, wrote
+from heelstrike.cli.terminal import (
+    complain,
+    many,
+    output,
+    print_found,
+    spoken,
+    stage,
+    tell,
+    this_command,
+    wrote,
+)
 
 if TYPE_CHECKING:
     from heelstrike.experiments.campaigns import CampaignResults, Progress
@@ -118,15 +128,12 @@ def _tell(results: CampaignResults, folder: Path, *, as_json: bool) -> None:
         found = verdict(results)
         page = save_campaign_page(results, folder / "verdict.html", command=this_command())
     wrote(page)
-    if as_json:
-        told = {
-            "trials": len(results), "success": found.success.count,
-            "interval": [found.success.low, found.success.high], "causes": results.causes,
-            "worst": found.worst,
-        }  # fmt: skip
-        typer.echo(json.dumps(told, indent=2))
-    else:
-        output().print(str(found))
+    told = {
+        "trials": len(results), "success": found.success.count,
+        "interval": [found.success.low, found.success.high], "causes": results.causes,
+        "worst": found.worst,
+    }  # fmt: skip
+    print_found(str(found), told, as_json=as_json)
     tell(f"in {folder}: campaign.sqlite, verdict.html")
 
 

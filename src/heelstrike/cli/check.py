@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +10,7 @@ import typer
 
 from heelstrike.cli.options import AsJson, Friction, MeasuredRobot, Rate, Reading, Unit
 from heelstrike.cli.planning import planar_robot_called
-from heelstrike.cli.terminal import FAILED, output, spoken, stage, this_command, wrote
+from heelstrike.cli.terminal import FAILED, print_found, spoken, stage, this_command, wrote
 
 
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
@@ -69,16 +68,13 @@ def check(
         )  # fmt: skip
     if page is not None and found.run is not None and len(found.run.time):
         wrote(save_html(found.run, page, command=this_command()))
-    if as_json:
-        told = {
-            "good": found.good, "headline": found.headline,
-            "findings": [asdict(each) | {"broken": each.broken} for each in found.findings],
-        }  # fmt: skip
-        if found.campaign is not None:
-            good = int(found.campaign.success.sum())
-            told["tolerances"] = {"trials": len(found.campaign), "success": good}
-        typer.echo(json.dumps(told, indent=2))
-    else:
-        output().print(str(found), markup=False)
+    told = {
+        "good": found.good, "headline": found.headline,
+        "findings": [asdict(each) | {"broken": each.broken} for each in found.findings],
+    }  # fmt: skip
+    if found.campaign is not None:
+        good = int(found.campaign.success.sum())
+        told["tolerances"] = {"trials": len(found.campaign), "success": good}
+    print_found(str(found), told, as_json=as_json)
     if not found.good:
         raise typer.Exit(FAILED)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -25,12 +24,12 @@ from heelstrike.cli.planning import asked_for, methods_asked, with_gait
 from heelstrike.cli.terminal import (
     FAILED,
     complain,
-    output,
+    print_found,
+    save_json,
     spoken,
     stage,
     tell,
     tell_interruption,
-    wrote,
 )
 from heelstrike.cli.whole_comparison import compare_whole
 from heelstrike.errors import SimulationError
@@ -75,7 +74,6 @@ def compare(
     from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
     from heelstrike.experiments.walk import beginning
     from heelstrike.view.style import save_figure
-    from heelstrike.whole_file import write_whole
 
     if others.engines is None:
         others.refuse_without_engines()
@@ -102,13 +100,9 @@ def compare(
             ground=case.ground,
             pushes=case.pushes,
         )
-    out.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(comparison.to_dict(), indent=2)
-    wrote(write_whole(out / "compare.json", text + "\n"))
-    if as_json:
-        typer.echo(text)
-    else:
-        output().print(comparison)
+    told = comparison.to_dict()
+    save_json(out / "compare.json", told)
+    print_found(comparison, told, as_json=as_json)
     if comparison.interrupted:  # no figure of what somebody did not wait for
         tell_interruption(doing)
         raise typer.Exit(INTERRUPTED)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from heelstrike.cli.terminal import output, stage, tell, wrote
+from heelstrike.cli.terminal import output, print_found, save_json, stage, tell, wrote
 from heelstrike.cli.values import numbers_called
 from heelstrike.errors import SimulationError
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 QUICK_STEPS, QUICK_SIZES = 4, (1e-3,)
 """Walking steps and step sizes (s) of a quick comparison."""
-QUICK_SEARCH: Mapping[str, int] = {"strides": 2, "halvings": 1}
+QUICK_SEARCH: Mapping[str, Any] = {"strides": 2, "halvings": 1}
 """How it searches for the largest push."""
 
 
@@ -155,12 +155,10 @@ def compare_in_engines(
     """Walk a case in other engines; tell, write and draw what came of it."""
     from heelstrike.experiments.engine_comparison import compare_engines
     from heelstrike.experiments.engine_comparison.comparison import STEP_SIZES
+    from heelstrike.experiments.engine_comparison.two_processes import walk_of
     from heelstrike.view.style import save_figure
 
-    assert asked.engines is not None
-    assert start.controller is not None
     check(case)
-    assert case.followed is not None
     if asked.search:
         asked.refuse_beside_search()
         _search(case, start, asked, steps, out, as_json=as_json)
@@ -175,25 +173,20 @@ def compare_in_engines(
         sizes = tuple(numbers_called(asked.sizes, "--sizes"))
     with stage("walking in engines") as show:
         comparison = compare_engines(
-            case.robot,
-            start.controller,
-            case.followed,
+            **walk_of(case, start),
             engines=asked.names,
             steps=QUICK_STEPS if asked.quick else steps,
             step_sizes=sizes,
             settings=asked.settings.split(","),
             control_period=asked.period,
-            friction=case.lowest_friction,
             folder=out / "engines",
             films=asked.films,
             progress=show.doing,
         )
     law = named(start, asked, sizes)
-    text = written(out / f"engines-{law}.json", comparison)
-    if as_json:
-        typer.echo(text)
-    else:
-        output().print(comparison)
+    told = comparison.to_dict()
+    save_json(out / f"engines-{law}.json", told)
+    print_found(comparison, told, as_json=as_json)
     figure = out / f"engines{asked.suffix}.png"
     save_figure(comparison.plot(), figure)
     tell(f"in {out}: engines-{law}.json, {figure.name}")
@@ -212,17 +205,6 @@ def refuse_a_quick_page(asked: InEngines) -> None:
         raise SimulationError(
             "--page: quick comparisons are left out of pages. Leave out, or leave --quick out"
         )
-
-
-def written(file: Path, told: Any) -> str:
-    """Write a table as JSON, and return that."""
-    from heelstrike.whole_file import write_whole
-
-    entries = told if isinstance(told, dict) else told.to_dict()
-    text = json.dumps(entries, indent=2, ensure_ascii=False)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    wrote(write_whole(file, text + "\n"))
-    return text
 
 
 def named(start: Beginning, asked: InEngines, sizes: Sequence[float] = ()) -> str:
@@ -253,22 +235,21 @@ def scenes_in_engines(
     from heelstrike.experiments.engine_comparison.scene_table import STEPS
     from heelstrike.experiments.engine_comparison.whole import PATIENCE
     from heelstrike.experiments.engines import InvalidRunError
-    from heelstrike.experiments.engines.served import EngineProcesses
+    from heelstrike.experiments.engines.served import lent
 
-    engines, own = asked.names, processes or EngineProcesses()
     landing: tuple[float, ...] = () if asked.quick else STEPS
     walker: tuple[float, ...] = QUICK_SIZES if asked.quick else COMPASS_STEPS
     if asked.quick and asked.whole:
         walker = ()  # it would take longest
-    shared: Any = {"engines": engines, "processes": own, "folder": out / "engines"}
-    try:
+    with lent(processes) as own:
+        shared: Any = {"engines": asked.names, "processes": own, "folder": out / "engines"}
         with stage("simulating scenes with closed forms") as show:
             table = compare_scenes(steps=landing, patience=PATIENCE, progress=show.doing, **shared)
         with stage("walking the compass gait down its slope") as show:
             passive = compare_compass(steps=walker, progress=show.doing, **shared)
         guards: dict[str, dict[str, object]] = {}
         with stage("asking whether engines have the robot") as show:
-            for name, entry in entries_called(engines).items():
+            for name, entry in entries_called(asked.names).items():
                 show.doing(f"asking whether {entry.title} has the robot", 0.0)
                 try:
                     found = guard(entry, case.robot, entry.given, own)
@@ -276,11 +257,8 @@ def scenes_in_engines(
                     guards[name] = {"reason": str(error)}
                 else:
                     guards[name] = asdict(found) | {"holds": found.holds}
-    finally:
-        if processes is None:
-            own.end()
     name = f"scenes{asked.suffix}.json"
-    written(out / name, {**table.to_dict(), "guards": guards, "compass": passive.to_dict()})
+    save_json(out / name, {**table.to_dict(), "guards": guards, "compass": passive.to_dict()})
     if not as_json:
         output().print(table)
         output().print(passive)
@@ -294,17 +272,13 @@ def pushes_in_engines(
 ) -> None:  # fmt: skip
     """Search for the largest push that is stood in engines."""
     from heelstrike.experiments.engine_comparison import compare_pushes
+    from heelstrike.experiments.engine_comparison.two_processes import walk_of
 
-    assert start.controller is not None
-    assert case.followed is not None
     with stage("pushing in engines") as show:
         table = compare_pushes(
-            case.robot,
-            start.controller,
-            case.followed,
+            **walk_of(case, start),
             engines=asked.names,
             settings=asked.settings.split(","),
-            friction=case.lowest_friction,
             control_period=asked.period,
             folder=out / "engines",
             processes=processes,
@@ -312,7 +286,7 @@ def pushes_in_engines(
             **(QUICK_SEARCH if asked.quick else {}),
         )
     name = f"pushes-{named(start, asked)}.json"
-    written(out / name, table)
+    save_json(out / name, table.to_dict())
     if not as_json:
         output().print(table)
     tell(f"in {out}: {name}")
@@ -358,17 +332,13 @@ def _search(
     from heelstrike.experiments.engine_comparison import search
     from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
     from heelstrike.experiments.engine_comparison.entries import entries_called
+    from heelstrike.experiments.engine_comparison.two_processes import walk_of
     from heelstrike.experiments.engine_comparison.walk import Walk
     from heelstrike.experiments.engines import InvalidRunError
     from heelstrike.experiments.engines.packages import peers
     from heelstrike.whole_file import write_whole
 
-    assert case.followed is not None
-    assert start.controller is not None
-    walk = Walk(
-        case.robot, start.controller, case.followed, steps, CONTROL_PERIOD,
-        case.lowest_friction, 60.0,
-    )  # fmt: skip
+    walk = Walk(**walk_of(case, start), steps=steps, control_period=CONTROL_PERIOD, patience=60.0)
     versions = peers(load=False)
     file = out / "best_settings.json"
     out.mkdir(parents=True, exist_ok=True)
@@ -389,5 +359,5 @@ def _search(
         tell(f"{entry.title}: {dict(best.settings) or 'the defaults'}, {best.error:.2g}")
     walk.processes.end()
     if as_json:
-        typer.echo(json.dumps(told, indent=2, ensure_ascii=False))
+        typer.echo(json.dumps(told, indent=2))
     wrote(file)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +9,7 @@ import typer
 
 from heelstrike.cli.options import AsJson, MeasuredRobot, Rate, Reading, Unit
 from heelstrike.cli.planning import planar_robot_called
-from heelstrike.cli.terminal import output, spoken, stage, tell, wrote
+from heelstrike.cli.terminal import print_found, spoken, stage, tell, wrote
 from heelstrike.wording import some_of
 
 SHOWN = 6
@@ -49,6 +47,7 @@ def identify(
     named. Lengths are those of the robot's file.
     """
     with stage("loading"):
+        from heelstrike.analysis.told_summary import plain
         from heelstrike.experiments.identification import identify as told_by
         from heelstrike.experiments.identification.figure import draw_identified
         from heelstrike.gait.recordings.robot_log import load_robot_log
@@ -65,21 +64,16 @@ def identify(
         )  # fmt: skip
     if figure is not None:
         wrote(save_figure(draw_identified(found), figure))
-    if as_json:
-        told = {
-            "numbers": [
-                {"name": each.name, "unit": each.unit, "value": each.value, "low": each.low,
-                 "high": each.high, "file": each.assumed, "told": each.told,
-                 "with": [{"share": share, "name": name} for share, name in each.others]}
-                for each in found.numbers
-            ],
-            "delay": None if math.isnan(found.delay) else found.delay,
-            "friction": found.friction.value if found.friction.samples else None,
-            "friction_at_least": (
-                None if math.isnan(found.friction.at_least) else found.friction.at_least
-            ),
-            "not_told": list(found.hidden), "misfit": found.misfit,
-        }  # fmt: skip
-        typer.echo(json.dumps(told, indent=2))
-    else:
-        output().print(str(found), markup=False)
+    told = {
+        "numbers": [
+            {"name": each.name, "unit": each.unit, "value": each.value, "low": each.low,
+             "high": each.high, "file": each.assumed, "told": each.told,
+             "with": [{"share": share, "name": name} for share, name in each.others]}
+            for each in found.numbers
+        ],
+        "delay": plain(found.delay),
+        "friction": found.friction.value if found.friction.samples else None,
+        "friction_at_least": plain(found.friction.at_least),
+        "not_told": list(found.hidden), "misfit": found.misfit,
+    }  # fmt: skip
+    print_found(str(found), told, as_json=as_json)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +10,7 @@ import typer
 
 from heelstrike.cli.options import AsJson, Friction, Reading, Steps
 from heelstrike.cli.planning import FIRST_TIME, planar_robot_called
-from heelstrike.cli.terminal import FAILED, output, spoken, stage, tell, wrote
+from heelstrike.cli.terminal import FAILED, print_found, spoken, stage, tell, wrote
 
 
 @dataclass(frozen=True)
@@ -117,10 +116,8 @@ def mimic(
     with stage("writing results"):
         files = write_mimicry(found, out, rate=csv_rate)
         wrote(*files)
-    if as_json:
-        typer.echo(json.dumps(figures_of(found), indent=2))
-    else:
-        output().print(str(found), markup=False)
+    print_found(str(found), figures_of(found), as_json=as_json)
+    if not as_json:
         tell(f"in {out}: {', '.join(each.name for each in files)}")
     if not found.walk.all_of_them:
         raise typer.Exit(FAILED)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +9,7 @@ import typer
 
 from heelstrike.cli.options import AsJson, Friction, Reading, RobotName, TableFolder
 from heelstrike.cli.planning import planar_robot_called
-from heelstrike.cli.terminal import FAILED, output, spoken, stage, tell, wrote
+from heelstrike.cli.terminal import FAILED, print_found, save_json, spoken, stage, tell
 from heelstrike.cli.values import numbers_called
 
 
@@ -39,7 +38,6 @@ def planners(
         from heelstrike.experiments.planners import compare_planners
         from heelstrike.view.planner_figure import draw_planners
         from heelstrike.view.style import save_figure
-        from heelstrike.whole_file import write_whole
 
         machine = planar_robot_called(robot, how)
         asked = numbers_called(speeds, "--speeds")
@@ -48,14 +46,9 @@ def planners(
             machine, speeds=asked, step_duration=step_duration, friction=friction, steps=steps,
             progress=lambda what: doing.doing(what, 0.0),
         )  # fmt: skip
-    out.mkdir(parents=True, exist_ok=True)
     told = found.to_dict()
-    text = json.dumps(told, indent=2)
-    wrote(write_whole(out / "planners.json", text + "\n"))
-    if as_json:
-        typer.echo(text)
-    else:
-        output().print(found)
+    save_json(out / "planners.json", told)
+    print_found(found, told, as_json=as_json)
     save_figure(draw_planners(machine, told["walks"]), out / "planners.png")
     tell(f"in {out}: planners.json, planners.png")
     if not all(each.walks for each in found.walks):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import inspect
 import io
+import json
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -34,6 +35,7 @@ from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.declared import declared, grouped
 from heelstrike.errors import HeelstrikeError
 from heelstrike.interruption import insistent_interrupts
+from heelstrike.whole_file import write_whole
 
 FAILED = 1
 """Exit status when the work was done but did not come out well: the robot fell, say."""
@@ -50,6 +52,14 @@ def output() -> Console:
         # A pipe may have an encoding without ∫ or −: a question mark is better than no result.
         sys.stdout.reconfigure(errors="replace")
     return Console(highlight=False)
+
+
+def print_found(found: Any, entries: Any, *, as_json: bool) -> None:
+    """Print what a command found: as JSON has it, or as people read it."""
+    if as_json:
+        typer.echo(json.dumps(entries, indent=2))
+    else:
+        output().print(found, markup=False)
 
 
 def messages() -> Console:
@@ -143,6 +153,12 @@ _written: list[Path] = []
 def wrote(*files: Path) -> None:
     """Remember files that a command has written, for the case of Ctrl-C."""
     _written.extend(files)
+
+
+def save_json(file: Path, entries: Any) -> None:
+    """Write what a command found as JSON, into a folder that is made if need be."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    wrote(write_whole(file, json.dumps(entries, indent=2, ensure_ascii=False) + "\n"))
 
 
 def this_command() -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from heelstrike.cli.options import Afresh, AsJson
-from heelstrike.cli.terminal import many, output, spoken, stage, tell, wrote
+from heelstrike.cli.terminal import many, print_found, spoken, stage, tell, wrote
 from heelstrike.cli.values import range_called, ranges_called
 from heelstrike.errors import SimulationError
 
@@ -139,12 +138,10 @@ def train(
         "run": {"status": run.status.value, "time": float(run.time[-1]),
                 "distance": float(run.position[-1, 0] - run.position[0, 0])},
     }  # fmt: skip
-    if as_json:
-        typer.echo(json.dumps(found, indent=2))
-    else:
-        output().print(
-            f"{run.robot.name}: return {curve.mean_return[-1]:.0f} over the last 100 episodes of "
-            f"{curve.mean_length[-1]:.0f} decisions; the run of the policy: {run.message}, "
-            f"{run.position[-1, 0] - run.position[0, 0]:.2f} m"
-        )
+    said = (
+        f"{run.robot.name}: return {curve.mean_return[-1]:.0f} over the last 100 episodes of "
+        f"{curve.mean_length[-1]:.0f} decisions; the run of the policy: {run.message}, "
+        f"{run.position[-1, 0] - run.position[0, 0]:.2f} m"
+    )
+    print_found(said, found, as_json=as_json)
     tell(f"in {folder}: {', '.join(each.name for each in files)}")

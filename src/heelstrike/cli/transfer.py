@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +9,7 @@ import typer
 from rich.table import Table
 
 from heelstrike.cli.options import AsJson
-from heelstrike.cli.terminal import output, spoken, stage
+from heelstrike.cli.terminal import print_found, spoken, stage
 
 COLUMNS = {
     "episodes": "{:.0f}", "return": "{:.0f}", "interval": "± {:.0f}", "fell": "{:.0%}",
@@ -53,10 +52,7 @@ def transfer(
             network, episodes, seed=seed, progress=lambda world: doing.doing(world, 0.0)
         ):
             rows.append(found.row())
-    if as_json:
-        typer.echo(json.dumps(rows, indent=2))
-        return
     table = Table("world", *COLUMNS)
     for row in rows:
         table.add_row(row["world"], *(form.format(row[name]) for name, form in COLUMNS.items()))
-    output().print(table)
+    print_found(table, rows, as_json=as_json)

@@ -18,11 +18,10 @@ from heelstrike.cli.engines import (
     refuse_a_quick_page,
     scenes_in_engines,
     write_page,
-    written,
 )
 from heelstrike.cli.options import Walking
 from heelstrike.cli.planning import with_gait
-from heelstrike.cli.terminal import output, stage, tell
+from heelstrike.cli.terminal import output, save_json, stage, tell
 from heelstrike.errors import SimulationError
 
 if TYPE_CHECKING:
@@ -95,7 +94,7 @@ def _compared(
             comparison = compare_part(work, part, walked, processes, show.doing)
         start = begun(part, walked)
         name = named(start, replace(asked, period=part.control_period))
-        written(out / f"engines-{name}.json", comparison)
+        save_json(out / f"engines-{name}.json", comparison.to_dict())
         found.append(comparison)
         if not as_json:
             output().print(comparison)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -19,7 +18,15 @@ from heelstrike.cli.options import (
     Workers,
     method_called,
 )
-from heelstrike.cli.terminal import many, output, spoken, stage, tell, this_command, wrote
+from heelstrike.cli.terminal import (
+    many,
+    print_found,
+    spoken,
+    stage,
+    tell,
+    this_command,
+    wrote,
+)
 
 ROBOTS = "bravo7,geyer7,spring_flamingo,rabbit,human7,walker2d"
 
@@ -110,8 +117,5 @@ def zoo(
         )
     with stage("writing"):
         wrote(*targets.write(results, this_command()))
-    if as_json:
-        typer.echo(json.dumps(results.to_dict(), indent=2))
-    else:
-        output().print(on_terminal(results))
+    print_found(on_terminal(results), results.to_dict(), as_json=as_json)
     tell(f"in {out}: zoo.json, zoo.csv; {targets.page}, {targets.figure}")

@@ -45,9 +45,8 @@ def processor() -> tuple[str, str]:
 
 
 def addresses(
-    names: Sequence[str], described: bytes, made_of: str, write: Callable[[], ir.Module], *,
-    vectors: bool = False,
-) -> tuple[int, ...]:  # fmt: skip
+    names: Sequence[str], described: bytes, made_of: str, write: Callable[[], ir.Module]
+) -> tuple[int, ...]:
     """Return the addresses of the functions of a module, which is compiled if it is new.
 
     Parameters
@@ -60,18 +59,15 @@ def addresses(
         Fingerprint of what writes the module.
     write : callable
         Writes the module.
-    vectors : bool
-        Whether to compute with several numbers at once where they stand side by side.
     """
-    described += repr(vectors).encode()
     key = _key(described, made_of)
     with _loading:
         if key not in _loaded:
-            _loaded[key] = _engine(_name(described), key, write, vectors)
+            _loaded[key] = _engine(_name(described), key, write)
         return tuple(_loaded[key].get_function_address(name) for name in names)
 
 
-def _engine(name: str, key: bytes, write: Callable[[], ir.Module], vectors: bool) -> Any:
+def _engine(name: str, key: bytes, write: Callable[[], ir.Module]) -> Any:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     cpu, features = processor()
@@ -81,7 +77,7 @@ def _engine(name: str, key: bytes, write: Callable[[], ir.Module], vectors: bool
     places = directories(Path(__file__))
     code = kept_code.read(places, name, key)
     if code is None:
-        code = _compiled(write(), machine, vectors)
+        code = _compiled(write(), machine)
         kept_code.write(places, name, key, code)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
@@ -89,12 +85,12 @@ def _engine(name: str, key: bytes, write: Callable[[], ir.Module], vectors: bool
     return engine
 
 
-def _compiled(module: ir.Module, machine: Any, vectors: bool) -> bytes:
+def _compiled(module: ir.Module, machine: Any) -> bytes:
     module.triple = machine.triple
     parsed = llvm.parse_assembly(str(module))
     parsed.verify()
     options = llvm.create_pipeline_tuning_options(_OPTIMISATION)
-    options.slp_vectorization = vectors
+    options.slp_vectorization = False
     passes = llvm.create_pass_builder(machine, options)
     passes.getModulePassManager().run(parsed, passes)
     code: bytes = machine.emit_object(parsed)

@@ -11,7 +11,7 @@ The function computes what the kernel computes, to rounding.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 from llvmlite import ir
@@ -24,8 +24,10 @@ from heelstrike.compiler.machine_code import addresses
 from heelstrike.compiler.recordings.recording import CONSTANT, Program, Recording
 from heelstrike.compiler.recordings.tape import Entry, Operation, Result, Symbols, Value, needed
 from heelstrike.compiler.recordings.trigonometry import sine_and_cosine
+from heelstrike.compiler.side_by_side import Lay, Shapes, runs
 
 _DOUBLE = ir.DoubleType()
+_DOUBLE_BYTES = 8
 _WORD = ir.IntType(64)
 _POINTER = _WORD.as_pointer()
 _ANGLES_AT_ONCE = 8
@@ -55,11 +57,10 @@ def straight_line_code(
             seen |= made[-1].left()
         return made
 
-    def write(vectors: bool) -> ir.Module:
+    def write() -> ir.Module:
         module = ir.Module("straight_line")
         for recording in recordings():
-            if recording.program.side_by_side == vectors:
-                add_function(module, recording)
+            add_function(module, recording)
         return module
 
     described = [repr([(name, array.tolist()) for name, array in known.items()]).encode()]
@@ -67,15 +68,8 @@ def straight_line_code(
     made_of = fingerprint(
         Recording, Program, add_function, *(program.kernel for program in programs)
     )
-    found: dict[str, int] = {}
-    for vectors in (False, True):
-        names = [program.name for program in programs if program.side_by_side == vectors]
-        if names:
-            made = addresses(
-                names, b"\0".join(described), made_of, partial(write, vectors), vectors=vectors
-            )
-            found |= zip(names, made, strict=True)
-    return tuple(found[program.name] for program in programs)
+    names = [program.name for program in programs]
+    return addresses(names, b"\0".join(described), made_of, write)
 
 
 def add_function(module: ir.Module, recording: Recording) -> None:
@@ -87,7 +81,8 @@ def add_function(module: ir.Module, recording: Recording) -> None:
     kind = ir.FunctionType(ir.VoidType(), parameters)
     function = ir.Function(module, kind, recording.program.name)
     function.attributes.add("nounwind")
-    _Writer(ir.IRBuilder(function.append_basic_block()), recording).write()
+    writer = _SideBySide if recording.program.side_by_side else _Writer
+    writer(ir.IRBuilder(function.append_basic_block()), recording).write()
 
 
 class _Writer:
@@ -155,12 +150,15 @@ class _Writer:
             return ir.Constant(_DOUBLE, float(value))
         if value not in self._values:
             self._values[value] = (
-                self._read(value) if isinstance(value, Entry) else self._emit(value)
+                self._read(value) if isinstance(value, Entry) else self._computed(value)
             )
         elif value in self._stored and self._count - self._since[value] > _FAR:
             self._values[value] = self._read_again(*self._stored[value])
             self._since[value] = self._count
         return self._values[value]
+
+    def _computed(self, result: Result) -> Any:
+        return self.operate(result.operation, [self._emitted(each) for each in result.operands])
 
     def _read_again(self, name: str, index: int) -> Any:
         """Read what has been stored, through an address of which the compiler knows nothing.
@@ -181,11 +179,24 @@ class _Writer:
             number.set_metadata("invariant.load", self._unchanging)
         return number
 
-    def _emit(self, result: Result) -> Any:
-        builder = self.builder
-        values = [self._emitted(operand) for operand in result.operands]
+    def number(self, value: Any) -> Any:
+        """Return a number."""
+        return self._emitted(value)
+
+    def read_beside(self, first: Entry, width: int) -> Any:
+        """Read so many numbers of an array at once."""
+        kind = ir.VectorType(_DOUBLE, width).as_pointer()
+        slot = self.builder.bitcast(self._slot(first.array, first.index), kind)
+        vector = self.builder.load(slot, align=_DOUBLE_BYTES)
+        if first.array.startswith(CONSTANT + "."):
+            vector.set_metadata("invariant.load", self._unchanging)
+        return vector
+
+    def operate(self, operation: Operation, values: Sequence[Any]) -> Any:
+        """Emit an operation on numbers, or on vectors of them."""
+        builder, kind = self.builder, values[0].type
         # A product and a sum may be fused, which rounds once instead of twice.
-        match result.operation:
+        match operation:
             case Operation.ADD:
                 return builder.fadd(*values, flags=("contract",))
             case Operation.SUBTRACT:
@@ -197,16 +208,24 @@ class _Writer:
             case Operation.NEGATE:
                 return builder.fneg(*values)
             case Operation.ROOT | Operation.MAGNITUDE:
-                name = "llvm.sqrt" if result.operation is Operation.ROOT else "llvm.fabs"
-                function = builder.module.declare_intrinsic(name, [_DOUBLE])
-                return builder.call(function, values)
-            case Operation.LARGER:
-                return builder.select(builder.fcmp_ordered(">", *values), *values)
+                name = "llvm.sqrt" if operation is Operation.ROOT else "llvm.fabs"
+                return builder.call(self._function(name, kind), values)
+            case Operation.LARGER | Operation.SMALLER:
+                sign = ">" if operation is Operation.LARGER else "<"
+                return builder.select(builder.fcmp_ordered(sign, *values), *values)
             case Operation.INVERT_ABOVE:
-                inverse = builder.fdiv(ir.Constant(_DOUBLE, 1.0), values[0])
-                above = builder.fcmp_ordered(">", *values)
-                return builder.select(above, inverse, ir.Constant(_DOUBLE, 0.0))
-        raise ValueError(f"{result.operation} belongs to the angles")
+                inverse = builder.fdiv(_filled(kind, 1.0), values[0])
+                return builder.select(
+                    builder.fcmp_ordered(">", *values), inverse, _filled(kind, 0.0)
+                )
+        raise ValueError(f"{operation} belongs to the angles")
+
+    def _function(self, name: str, kind: Any) -> Any:
+        """Return a function of LLVM that takes and gives numbers, or vectors of them."""
+        module = self.builder.module
+        name += "." + (f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f64")
+        known = module.globals.get(name)
+        return known or ir.Function(module, ir.FunctionType(kind, [kind]), name)
 
     def _slot(self, name: str, index: int) -> Any:
         """Return the address of an entry of an array."""
@@ -241,6 +260,59 @@ class _Writer:
                     found[operation, angle] = element
         for value in waiting:
             self._values[value] = found[value.operation, value.operands[0]]
+
+
+class _SideBySide(_Writer):
+    """Writes one recording down that does the same with many numbers."""
+
+    def __init__(self, builder: ir.IRBuilder, recording: Recording) -> None:
+        super().__init__(builder, recording)
+        self._shapes = Shapes()
+        self._lay = Lay(self, self._shapes)
+
+    def write(self) -> None:
+        """Read all that is read before anything is written.
+
+        What is left in scratch tells which numbers are alike, as much as what is written.
+        """
+        self._angles(self._needed())
+        unread = self.recording.program.leaves_unread
+        found = []
+        changed = sorted(self.recording.changed(), key=lambda each: unread(each[0]))
+        for array, index, lanes in runs(changed, self._shapes):
+            beside = self._lay.vector(lanes) if len(lanes) > 1 else lanes[0]
+            if not unread(array):
+                found.append((array, index, beside))
+        for array, index, value in found:
+            slot = self._slot(array, index)
+            if isinstance(value, Entry | Result | float | int):
+                self.builder.store(self._emitted(value), slot)
+            else:
+                slot = self.builder.bitcast(slot, value.type.as_pointer())
+                self.builder.store(value, slot, align=_DOUBLE_BYTES)
+        self.builder.ret_void()
+
+    def _computed(self, result: Result) -> Any:
+        """Emit all that it is made of, one after the other: trees may be deep."""
+        waiting = [result]
+        while waiting:
+            value = waiting[-1]
+            beside = self._lay.lane(value)
+            operands = [each for each in value.operands if isinstance(each, Result)]
+            missing = [each for each in operands if each not in self._values]
+            if beside is None and missing:
+                waiting.append(missing[0])
+                continue
+            waiting.pop()
+            if value not in self._values:
+                self._values[value] = super()._computed(value) if beside is None else beside
+        return self._values[result]
+
+
+def _filled(kind: Any, number: float) -> ir.Constant:
+    """Return a number, or a vector of it."""
+    many = isinstance(kind, ir.VectorType)
+    return ir.Constant(kind, [number] * kind.count if many else number)
 
 
 def _lane(lane: int) -> ir.Constant:

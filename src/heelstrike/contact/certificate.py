@@ -20,12 +20,14 @@ from dataclasses import field
 
 import numpy as np
 
-from heelstrike.compiler.compilation import kernel, rare_kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
+from heelstrike.contact.cone_certificate import EFFORT, FASTEST, LEAST, UNIT
 from heelstrike.contact.modes import Solver, SolveStatus
-from heelstrike.contact.sets import INTERVAL, LINE, is_empty, room, row_of
+from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE, is_empty, room, row_of
 from heelstrike.contact.workspace import (
+    PROGRAM_ROWS,
     ContactAnswer,
     ContactProblem,
     Floats,
@@ -113,15 +115,19 @@ def certify(
     count = problem.count
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
     root, slope = scaling.root, scaling.slope
-    at_once = weigh_at_once(problem, settings, impulse, velocity, scaling)
-    if not at_once:
-        weigh(problem, settings, impulse, scaling)
+    cones = cones_of(problem, settings, scaling)
+    if cones > 0:
+        worst = certify_at_once(cones, problem, settings, scaling, answer)
+        if worst < math.inf:
+            return worst
+    scaling.size[FASTEST] = math.inf  # nobody looks
+    weigh(problem, settings, impulse, scaling)
     unit = scaling.unit
-    rounding = (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + scaling.effort)
+    rounding = rounding_of(count, scaling.effort)
     sharply = rounding > VISIBLE
     if sharply:
         rounding = sum_velocities_sharply(problem, impulse, scaling, velocity)
-    elif not at_once:
+    else:
         sum_velocities(problem, impulse, velocity)
     scaling.rounding = rounding
     answer.rest = REST_TOLERANCE * unit * (1.0 + scaling.effort)
@@ -223,23 +229,59 @@ def note_size(unit: float, effort: float, scaling: Scaling) -> None:
     scaling.unit = unit
 
 
-@kernel
-def weigh_at_once(
-    problem: ContactProblem, settings: Settings, impulse: Floats, velocity: Floats, scaling: Scaling
-) -> bool:
-    """Do what :func:`weigh` and :func:`sum_velocities` do by a program; return success.
+@dissolved_kernel
+def rounding_of(count: int, effort: float) -> float:
+    """What rounding may hide where velocities are summed as usual."""
+    return (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + effort)
 
-    There is one where few rows fill their matrix and each of them is moved by something.
+
+@kernel
+def cones_of(problem: ContactProblem, settings: Settings, scaling: Scaling) -> int:
+    """How many contacts a problem has for which there is a program, 0 if there is none.
+
+    There is for few of them with stops behind, where none has to slide.
     """
-    rows, delassus, size = row_of(problem.count, problem.first), problem.delassus, scaling.size
-    if rows >= scaling.programs.shape[0] or delassus.shape[1] != rows or settings.skewed != 0:
-        return False
-    program, free, root = scaling.programs[rows], problem.free, scaling.root
-    if program == 0:
-        return False
-    play(program, (delassus, free, impulse, root, velocity, size))
-    note_size(max(settings.floor, size[0]), size[1], scaling)
-    return bool(size[2] > 0.0)
+    count = problem.count
+    cones = row_of(count, problem.first) - count
+    fits = 0 < cones < scaling.programs.shape[0] and count - cones < scaling.programs.shape[1]
+    if not fits or problem.delassus.shape[1] != PROGRAM_ROWS or settings.skewed != 0:
+        return 0
+    others, slopes = 0, 0.0
+    for contact in range(count):
+        others |= problem.set[contact] ^ (CONE if contact < cones else HALF_LINE)
+        slopes += abs(scaling.slope[contact])
+    if others != 0 or slopes != 0.0 or scaling.programs[cones, count - cones] == 0:
+        return 0
+    return cones
+
+
+@dissolved_kernel
+def certify_at_once(
+    cones: int, problem: ContactProblem, settings: Settings, scaling: Scaling,
+    answer: ContactAnswer,
+) -> float:  # fmt: skip
+    """Do what :func:`certify` does by a program; return the largest residual.
+
+    It is infinite where something moves a row but no impulse does, where rounding shows, or where a
+    number is none: then loops have to look.
+    """
+    count, size, residual = problem.count, scaling.size, answer.residual
+    size[UNIT] = settings.floor
+    scratch = scaling.root  # nothing is read or written there
+    play(
+        scaling.programs[cones, count - cones],
+        (
+            problem.delassus, problem.free, problem.friction, scaling.held, answer.impulse,
+            scaling.root, answer.velocity, residual, size, scratch, scratch, scratch,
+        ),
+    )  # fmt: skip
+    note_size(size[UNIT], size[EFFORT], scaling)
+    rounding = rounding_of(count, scaling.effort)
+    if not (size[LEAST] > 0.0 and rounding <= VISIBLE):
+        return math.inf
+    scaling.rounding = rounding
+    answer.rest = REST_TOLERANCE * scaling.unit * (1.0 + scaling.effort)
+    return max(residual[0], max(residual[1], residual[2])) + rounding
 
 
 @rare_kernel

@@ -19,6 +19,10 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
+PROGRAM_ROWS = 12
+"""Rows and columns that a matrix has room for if straight-line code shall read it."""
+
+
 class ContactProblem(Bundle):
     """A contact problem of up to `capacity` contacts."""
 
@@ -26,8 +30,8 @@ class ContactProblem(Bundle):
     """Number of contacts; the leading blocks of the arrays are used."""
     first: Integers = array("capacity + 1", of=int)
     """Row that each contact begins with; after the last, how many rows there are."""
-    delassus: Floats = array("2 capacity", "2 capacity")
-    """Delassus matrix, symmetric."""
+    delassus: Floats = array("room", "room")
+    """Delassus matrix, symmetric; as a rule there is room for two rows of each contact."""
     free: Floats = array("2 capacity")
     """Free velocity (or acceleration), the free term b."""
     friction: Floats = array("capacity")
@@ -41,7 +45,8 @@ class ContactProblem(Bundle):
 def contact_problem(contacts: int, **given: Any) -> ContactProblem:
     """Allocate a problem of so many contacts, each with a normal and a tangent."""
     first = 2 * np.arange(contacts + 1)
-    return ContactProblem.allocate(**{"capacity": contacts, "first": first} | given)
+    usual = {"capacity": contacts, "room": 2 * contacts, "first": first}
+    return ContactProblem.allocate(**usual | given)
 
 
 class ContactAnswer(Bundle):
@@ -107,10 +112,13 @@ class Scaling(Bundle):
     """The velocities that cancel, in units of the data's."""
     rounding: float = cell(float)
     """What rounding may hide from it."""
-    size: Floats = array(3)
-    """Scratch of the programs."""
-    programs: Integers = array("weighed", of=int, address=True)
-    """Addresses of the programs that weigh few rows, by their number; zero where there is none."""
+    size: Floats = array(4)
+    """What the programs measure with; see :mod:`heelstrike.contact.cone_certificate`."""
+    held: Floats = array("most_stops")
+    """1 for the stops whose velocity counts among the fastest, 0 for the others."""
+    programs: Integers = array("cones", "stops", of=int, address=True)
+    """Addresses of the programs that certify few contacts and stops, by their numbers; zero where
+    there is none."""
 
 
 class StickingRows(Bundle):
@@ -141,6 +149,11 @@ class StickingRows(Bundle):
     """Solution in the order of the elimination; diagonals; edges of cones."""
     programs: Integers = array("sizes", of=int, address=True)
     """Addresses of the programs that solve small systems, by size; zero where there is none."""
+    margin: Floats = array(1)
+    """The least that a pivot has above what makes it good."""
+    standing: Integers = array("codes", "stops", of=int, address=True)
+    """Addresses of the programs for contacts that all stick, by their code and the number of stops;
+    zero where there is none."""
 
 
 class ReducedProblem(Bundle):

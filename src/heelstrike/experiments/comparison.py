@@ -8,7 +8,6 @@ from dataclasses import asdict, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.console import Group
 from rich.table import Table
 
@@ -30,6 +29,7 @@ from heelstrike.robot.model import Floats
 from heelstrike.sim import Controller, Push, Run, simulate
 from heelstrike.sim.closed_sets import OnError, RunStatus
 from heelstrike.sim.method import Method
+from heelstrike.view.terminal import bare_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -117,11 +117,7 @@ class Comparison:
         return Group(apart, "", self._table("each by itself", ALONE), *self._reasons())
 
     def _table(self, title: str, columns: Mapping[str, str]) -> Table:
-        look = {"box": SIMPLE_HEAD, "show_edge": False, "padding": (0, 1, 0, 0)}
-        table = Table(title=title, title_justify="left", **look)  # type: ignore[arg-type]
-        table.add_column("method", no_wrap=True)
-        for heading in columns.values():
-            table.add_column(heading, justify="right")
+        table = bare_table(title, ("method",), columns.values())
         for each in self.differences:
             values = [getattr(each, name) for name in columns]
             cells = [f"{v:.2g}" if isinstance(v, float) else str(v) for v in values]

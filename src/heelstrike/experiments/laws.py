@@ -149,10 +149,8 @@ def walking(
     return Entry(name, trial, needs)
 
 
-def on_points(
-    name: str, law: Callable[[PhasedGait], Law], needs: Callable[[Robot], str] = point_feet
-) -> Entry:
-    """Enter a controller that walks on points by the phase of a gait.
+def on_points(name: str, law: Callable[[PhasedGait], Law]) -> Entry:
+    """Enter a controller that walks on two point feet by the phase of a gait.
 
     Parameters
     ----------
@@ -160,8 +158,6 @@ def on_points(
         What it is called.
     law : callable
         Takes the gait over its phase, which has its robot, and returns the controller.
-    needs : callable
-        Takes a robot, returns what it lacks, in a word; by default it must have two point feet.
 
     Returns
     -------
@@ -178,15 +174,11 @@ def on_points(
             step_length=zero.step_length, step_duration=zero.period,
         )  # fmt: skip
 
-    return Entry(name, trial, needs, bent_knees=True)
+    return Entry(name, trial, point_feet, bent_knees=True)
 
 
-def standing(
-    name: str,
-    law: Callable[[Robot, Floats], Law],
-    needs: Callable[[Robot], str] = flat_feet,
-) -> Entry:
-    """Enter a controller that makes a robot stand, as it does on level ground.
+def standing(name: str, law: Callable[[Robot, Floats], Law]) -> Entry:
+    """Enter a controller that makes a robot stand on two flat feet, as it does on level ground.
 
     Parameters
     ----------
@@ -194,8 +186,6 @@ def standing(
         What it is called.
     law : callable
         Takes a robot and the coordinates (nq,) in which it stands, returns the controller.
-    needs : callable
-        Takes a robot, returns what it lacks, in a word; by default it must have two flat feet.
 
     Returns
     -------
@@ -210,7 +200,7 @@ def standing(
             step_duration=typical_step(robot).duration,
         )  # fmt: skip
 
-    return Entry(name, trial, needs, stands=True)
+    return Entry(name, trial, flat_feet, stands=True)
 
 
 def servo_gains(robot: Robot) -> tuple[float, Floats]:

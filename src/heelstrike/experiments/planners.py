@@ -7,17 +7,14 @@ and the centre of mass at constant height, against one of least torque.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.console import Group
-from rich.table import Table
 
 from heelstrike.analysis import zero_moment_point
 from heelstrike.analysis.diagnosis.falls import first_cause, walked_on
-from heelstrike.analysis.told_summary import plain
+from heelstrike.analysis.told_summary import PlainEntries
 from heelstrike.arguments import is_number, takes
 from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque
@@ -26,6 +23,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait, Motion, Planner, optimize_gait, plan_motion
 from heelstrike.robot import Robot
 from heelstrike.sim import EventDriven, Run, simulate
+from heelstrike.view.terminal import bare_table
 
 SPEEDS = (0.2, 0.3, 0.4, 0.5, 0.6)
 """Speeds of a comparison (m/s)."""
@@ -69,7 +67,7 @@ class Planned:
 
 
 @dataclass(frozen=True, eq=False)
-class PlannerComparison:
+class PlannerComparison(PlainEntries):
     """Walks of several planners over several speeds."""
 
     robot: str
@@ -80,12 +78,8 @@ class PlannerComparison:
     """The walks, speed by speed."""
 
     def __rich__(self) -> Group:
-        look = {"box": SIMPLE_HEAD, "show_edge": False, "padding": (0, 1, 0, 0)}
-        table = Table(title=f"{self.robot}: planned walks", title_justify="left", **look)  # type: ignore[arg-type]
-        table.add_column("speed m/s")
-        table.add_column("planner", no_wrap=True)
-        for heading in COLUMNS.values():
-            table.add_column(heading, justify="right")
+        title = f"{self.robot}: planned walks"
+        table = bare_table(title, ("speed m/s", "planner"), COLUMNS.values())
         for each in self.walks:
             numbers = [f"{getattr(each, name):.3g}".replace("nan", "–") for name in COLUMNS]
             table.add_row(f"{each.speed:g}", each.planner.replace("_", " "), *numbers)
@@ -95,11 +89,6 @@ class PlannerComparison:
             for each in failed
         ]
         return Group(table, *why)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain dictionaries, lists and numbers, with None for what does not exist."""
-        found: dict[str, Any] = plain(asdict(self))
-        return found
 
 
 @takes(GaitError)

@@ -30,7 +30,14 @@ from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.library import load_planar_robot
 from heelstrike.sim import Simulation
 from heelstrike.sim.method import Method
-from heelstrike.view.live.stage import Control, Stage, friction_control, step_control, step_of
+from heelstrike.view.live.stage import (
+    Control,
+    Stage,
+    friction_control,
+    slope_control,
+    step_control,
+    step_of,
+)
 
 if TYPE_CHECKING:
     from heelstrike.view.live.dimension import AnySimulation
@@ -246,10 +253,7 @@ class WalkStage(Stage):
         slope, passive = self._first.slope, robot.nu == 0
         if slope is None:
             slope = USUAL_SLOPES.get(robot.name, DESCENT) if passive else 0.0
-        steepest = max(STEEPEST, abs(slope))
-        shapes = [
-            Control("slope", "slope", slope, low=-steepest, high=steepest, step=0.5, unit="°")
-        ]
+        shapes = [slope_control(slope, STEEPEST)]
         rough = 0.0 if passive else self._first.roughness
         highest = 0.0 if passive else max(ROUGHEST, rough)
         shapes.append(

@@ -18,7 +18,14 @@ from heelstrike.robot.state import State
 from heelstrike.sim.spatial.placing import placed_in_space
 from heelstrike.sim.spatial.simulation import SpatialSimulation
 from heelstrike.view.live.dimension import LiveDimension
-from heelstrike.view.live.stage import Control, Stage, friction_control, step_control, step_of
+from heelstrike.view.live.stage import (
+    Control,
+    Stage,
+    friction_control,
+    slope_control,
+    step_control,
+    step_of,
+)
 from heelstrike.view.spatial.live import LIVE_SPACE
 
 STEEPEST = 20.0
@@ -93,14 +100,11 @@ class SpaceStage(Stage):
         laws = tuple(self._laws(robot))
         drop = Control("above", "drop from", 0.0, high=HIGHEST, step=0.01, unit="m")
         first = self._first
-        steepest = max(STEEPEST, abs(first.slope))
         return (
             Control("robot", "robot", name, names, resets=("controller",)),
             Control("controller", "controller", laws[0], laws),
             friction_control(first.friction),
-            Control(
-                "slope", "slope", first.slope, low=-steepest, high=steepest, step=0.5, unit="°"
-            ),
+            slope_control(first.slope, STEEPEST),
             *((drop,) if robot.floating else ()),
             Control("method", "method", first.method, self._method_names),
             step_control(first.step),

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.contact_points import ContactPoint
-from heelstrike.robot.model import NUMBERS, Floats, Model, label
+from heelstrike.robot.model import NUMBERS, Floats, Model, Number
 from heelstrike.robot.named_tree import Foot
 from heelstrike.robot.plausibility import unlikely_numbers
 from heelstrike.robot.robot import LockedJoint, Robot
@@ -75,7 +75,7 @@ def assembled(
         If left and right differ, the base floats by joints in an unusual order, or numbers look as
         if they were in another unit.
     """
-    _refuse_impossible_numbers(model, source)
+    refuse_impossible_numbers(model, NUMBERS, source)
     if average:
         model = averaged(model, joint_names, link_names, source)
     origin = link_origins(model)
@@ -183,16 +183,27 @@ def link_origins(model: Model) -> Floats:
     return origin
 
 
-def _refuse_impossible_numbers(model: Model, source: str) -> None:
+def refuse_impossible_numbers(
+    model: Model | SpatialModel, numbers: Mapping[str, Number], source: str
+) -> None:
     """Refuse NaN, and what is infinite or huge where only a limit may be."""
-    for field, values in model.members().items():
-        infinite = NUMBERS[field].infinite
-        bad = np.isnan(values) if infinite else ~(np.abs(values) <= LARGEST_NUMBER)
+    for name, values in model.members().items():
+        number = numbers[name]
+        bad = np.isnan(values) if number.infinite else ~(np.abs(values) <= LARGEST_NUMBER)
         if np.any(bad):
+            words = number.label or name.replace("_", " ")
             raise RobotError(
-                f"{source}: the {label(field)} of the robot is not a number below "
-                f"{LARGEST_NUMBER:g}. Look for NaN or a misplaced exponent in the file."
+                f"{source}: the {words} of the robot is not a number below {LARGEST_NUMBER:g}. "
+                "Look for NaN or a misplaced exponent in the file."
             )
+
+
+def refuse_idle_joint(joint: str, source: str) -> None:
+    """Refuse a joint whose acceleration no mass resists."""
+    raise RobotError(
+        f"{source}: joint {joint!r} moves no mass and has no armature, so that nothing resists it. "
+        "Give the link that it moves a mass and moments of inertia, or make it a fixed joint."
+    )
 
 
 def _refuse_joints_without_inertia(model: Model, joint_names: tuple[str, ...], source: str) -> None:
@@ -204,11 +215,7 @@ def _refuse_joints_without_inertia(model: Model, joint_names: tuple[str, ...], s
     resistance = _mass_matrix(model, np.zeros(model.nj)).diagonal()
     idle = np.flatnonzero(~(resistance > 0.0))
     if len(idle):
-        raise RobotError(
-            f"{source}: joint {joint_names[idle[0]]!r} moves no mass and has no armature, so that "
-            "nothing resists it. Give the link that it moves a mass and a moment of inertia, or "
-            "make it a fixed joint."
-        )
+        refuse_idle_joint(joint_names[idle[0]], source)
     floats = list(model.parent[:3]) == [-1, 0, 1]
     if np.all(model.inertia[2 * floats :] > 0.0):
         return

@@ -11,6 +11,7 @@ from heelstrike.compiler.mold import Mold
 from heelstrike.contact.modes import STICK
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import (
+    PROGRAM_ROWS,
     ContactAnswer,
     ContactProblem,
     ContactWorkspace,
@@ -34,7 +35,11 @@ from heelstrike.sim.contacts.rows import (
     lay_out_rows,
     most_rows,
 )
-from heelstrike.sim.contacts.straight_line import straight_line_programs, usual_points
+from heelstrike.sim.contacts.straight_line import (
+    room_of,
+    straight_line_programs,
+    usual_points,
+)
 from heelstrike.sim.contacts.writers import lay_out_ties
 from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
@@ -257,6 +262,8 @@ class Memory(Bundle):
     """The ground under them."""
     assembly: Assembly = part(Assembly, flat=True)
     """The contact problem."""
+    small_problem: ContactProblem = part(ContactProblem)
+    """The contact problem in as little room as programs ask for."""
     solver: ContactWorkspace = part(ContactWorkspace)
     """Memory of the contact solvers."""
     usual: UsualPoints = part(UsualPoints, flat=True)
@@ -284,6 +291,14 @@ def _contacts_of(kind: int, rows: Rows, extents: dict[str, int]) -> Contacts:
     its = slice(rows.first[kind], rows.end[kind])
     gap, position, normal = rows.gap[its], rows.position[its], rows.normal[its]
     return Contacts.allocate(extents, gap=gap, position=position, normal=normal)
+
+
+def _in_room(problem: ContactProblem, rows: int) -> ContactProblem:
+    """Return a contact problem with the arrays of another, but a matrix of its own."""
+    shared = {
+        name: getattr(problem, name) for name in ("first", "free", "friction", "bound", "set")
+    }
+    return contact_problem(len(problem.set), room=rows, **shared)
 
 
 @once_each
@@ -314,14 +329,11 @@ def _mold_of(robot: Robot) -> Mold[Memory]:
         contacts=_contacts_of(POINT, rows, extents),
         second_faces=_contacts_of(SECOND_FACE, rows, extents),
         assembly=assembly,
+        small_problem=_in_room(problem, PROGRAM_ROWS),
         solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
         usual=UsualPoints.allocate(
             extents,
-            usual_problem=contact_problem(
-                len(points),
-                free=problem.free[: 2 * len(points)],
-                friction=problem.friction[: len(points)],
-            ),
+            usual_problem=_in_room(problem, room_of(len(points))),
             usual_points=points,
             programs=programs,
             usual_place=place,

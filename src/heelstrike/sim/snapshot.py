@@ -20,7 +20,7 @@ from heelstrike.robot.state import State
 from heelstrike.sim.image import Image
 
 _IDENTITY = "identity"
-_FORMAT = 11
+_FORMAT = 12
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ from heelstrike.dynamics import LinkPoses, link_poses
 from heelstrike.errors import ViewError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
-from heelstrike.robot.named_tree import legs
+from heelstrike.robot.named_tree import NamedTree, legs
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import are_around
 from heelstrike.robot.spatial.robot import SpatialRobot
@@ -277,7 +277,7 @@ def _disc(center: Floats, radius: float) -> list[tuple[Floats, Floats]]:
     return list(pairwise(rim))
 
 
-def leg_labels(robot: Robot) -> list[tuple[str, str]]:
+def leg_labels(robot: NamedTree) -> list[tuple[str, str]]:
     """Colours of the legs with the names of their feet; none for a robot of one leg."""
     if len(robot.feet) < 2:
         return []

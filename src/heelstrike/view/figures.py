@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
@@ -78,7 +78,7 @@ def plot(
         If the gait does not fit the robot of the run.
     """
     if what not in _DRAWINGS and what not in QUANTITIES and what not in run.log:
-        raise ViewError(_unknown(what, tuple(run.log)))
+        raise unknown_figure(what, "figure", _DRAWINGS, (*QUANTITIES, *run.log))
     excerpt = Excerpt(run, rows_within(run, span), gait)
     with styled():
         drawing = _DRAWINGS.get(what)
@@ -88,10 +88,14 @@ def plot(
     return figure
 
 
-def _unknown(what: str, logged: tuple[str, ...]) -> str:
-    guess = meant(str(what).lower(), (*FIGURES, *QUANTITIES, *logged))
-    names = " ".join(f"{name}: {drawing.__doc__}" for name, drawing in _DRAWINGS.items())
-    return (
-        f"there is no figure called {what!r}.{guess} There are: {names} And what is recorded: "
-        f"{', '.join((*QUANTITIES, *logged))}."
+def unknown_figure(
+    what: str, kind: str, drawings: Mapping[str, Callable[..., Any]], recorded: Iterable[str]
+) -> ViewError:
+    """Return what says that there is no such figure of a kind, and which there are."""
+    recorded = tuple(recorded)
+    guess = meant(str(what).lower(), (*drawings, *recorded))
+    names = " ".join(f"{name}: {drawing.__doc__}" for name, drawing in drawings.items())
+    return ViewError(
+        f"there is no {kind} called {what!r}.{guess} There are: {names} And what is recorded: "
+        f"{', '.join(recorded)}."
     )

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
+from heelstrike.analysis.intervals import mean_between
 from heelstrike.analysis.motion import run_motion
+from heelstrike.analysis.support import on_ground
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
-from heelstrike.sim.run import Run
+from heelstrike.robot.named_tree import NamedTree
+from heelstrike.sim.run import AnyRun, Run
 from heelstrike.view.arrows import Arrows, draw_scale
 from heelstrike.view.canvas import Canvas
 from heelstrike.view.drawing import body, extent, leg_labels
@@ -51,21 +53,12 @@ class Frames:
 
 def frames(run: Run, interval: float) -> Frames:
     """Pick the instants of a run that a film shows, `interval` (s) apart."""
-    count = int(np.floor((run.time[-1] - run.time[0]) / interval + 1e-9)) + 1
-    time = run.time[0] + interval * np.arange(count)
-    row = np.maximum(np.searchsorted(run.time, time + 1e-9, side="right") - 1, 0)
+    time, row = instants(run, interval)
     motion = run_motion(run)
     acting = np.concatenate((run.world_force, run.contact_force[..., :1]), axis=-1)
-    impulse = np.zeros_like(acting)  # up to each row
-    impulse[1:] = np.cumsum(acting[:-1] * np.diff(run.time)[:, None, None], axis=0)
-    before = np.append(row[:1], row[:-1])
-    elapsed = run.time[row] - run.time[before]
-    same = elapsed <= 0.0  # two frames of one row, or the first frame
-    elapsed[same] = 1.0
-    mean = (impulse[row] - impulse[before]) / elapsed[:, None, None]
-    mean[same] = acting[row[same]]
+    gained = acting[:-1] * np.diff(run.time)[:, None, None]
+    mean = mean_between(run.time, gained, row, acting[row], since=True)
     force, normal = mean[..., :2], mean[..., 2]
-    on_ground = run.contact_point[row] - run.gap[row][..., None] * run.contact_normal[row]
     total = normal.sum(axis=1, keepdims=True)
     share = normal / np.where(total > 1e-6 * run.robot.weight, total, np.nan)
     return Frames(
@@ -75,8 +68,15 @@ def frames(run: Run, interval: float) -> Frames:
         center=motion.center_of_mass[row],
         point=run.contact_point[row],
         force=force,
-        pressure=np.einsum("fc,fck->fk", share, on_ground),
+        pressure=np.einsum("fc,fck->fk", share, on_ground(run)[row]),
     )
+
+
+def instants(run: AnyRun, interval: float) -> tuple[Floats, Integers]:
+    """Times that are so far apart (s), and the row of the run at or before each."""
+    count = int(np.floor((run.time[-1] - run.time[0]) / interval + 1e-9)) + 1
+    time = run.time[0] + interval * np.arange(count)
+    return time, np.maximum(np.searchsorted(run.time, time + 1e-9, side="right") - 1, 0)
 
 
 def evened(place: Floats, interval: float) -> Floats:
@@ -86,6 +86,24 @@ def evened(place: Floats, interval: float) -> Floats:
     padded = np.pad(place, reach, mode="reflect", reflect_type="odd")
     window = np.hanning(2 * reach + 3)[1:-1]
     return np.convolve(padded, window / window.sum(), mode="valid")
+
+
+def legend_of(
+    robot: NamedTree, *, forces: bool, pressure: str = "zero moment point"
+) -> list[Line2D]:
+    """What the colours and dots of a picture mean, of which `pressure` is one's name."""
+    lines, dots = leg_labels(robot), [("o", ORANGE, "centre of mass")]
+    if forces:
+        lines.append((FORCE_COLOR, "contact force"))
+        dots.insert(0, ("D", ZERO_MOMENT_POINT_COLOR, pressure))
+    handles = [
+        Line2D([], [], color=color, lw=4.0, solid_capstyle="round", label=label)
+        for color, label in lines
+    ]
+    return handles + [
+        Line2D([], [], marker=marker, color=color, mec="white", ls="", ms=8, label=label)
+        for marker, color, label in dots
+    ]
 
 
 class Film:
@@ -130,7 +148,10 @@ class Film:
         (self._center,) = axes.plot([], [], "o", color=ORANGE, mec="white", ms=7.0 * scale)
         self._metres = Milestones(0.9 * font)
         axes.add_artist(self._metres)
-        self._legend(canvas.figure, run, font)
+        handles = legend_of(run.robot, forces=run.robot.nc > 0)
+        canvas.figure.legend(
+            handles=handles, loc="upper right", fontsize=0.85 * font, labelspacing=0.35
+        )
         canvas.begin([
             self._soil, self._marks, self._metres, self._robot, self._arrows.shafts,
             self._arrows.heads, self._center, self._pressure,
@@ -181,18 +202,3 @@ class Film:
         self._marks.set_segments(list(np.stack((top, top - np.outer(tall, [0.0, 1.0])), axis=1)))
         whole = marks == np.round(marks)
         self._metres.show(marks[whole], top[whole] - [0.0, 0.035 * self._size])
-
-    def _legend(self, figure: Figure, run: Run, font: float) -> None:
-        lines, dots = leg_labels(run.robot), [("o", ORANGE, "centre of mass")]
-        if run.robot.nc:
-            lines.append((FORCE_COLOR, "contact force"))
-            dots.insert(0, ("D", ZERO_MOMENT_POINT_COLOR, "zero moment point"))
-        handles = [
-            Line2D([], [], color=color, lw=4.0, solid_capstyle="round", label=label)
-            for color, label in lines
-        ]
-        handles += [
-            Line2D([], [], marker=marker, color=color, mec="white", ls="", ms=8, label=label)
-            for marker, color, label in dots
-        ]
-        figure.legend(handles=handles, loc="upper right", fontsize=0.85 * font, labelspacing=0.35)

@@ -12,7 +12,7 @@ from heelstrike.analysis.tracking import reference_motion
 from heelstrike.errors import ViewError
 from heelstrike.robot.named_tree import legs
 from heelstrike.view.panels import Curve, Excerpt, Panel, draw_panels
-from heelstrike.view.style import INK, foot_color, in_words
+from heelstrike.view.style import INK, foot_color, in_words, limits_in_words
 
 REFERENCE: dict[str, Any] = {"color": INK, "linestyle": (0, (4, 3)), "linewidth": 1.0}
 
@@ -54,12 +54,11 @@ def draw_torque(excerpt: Excerpt) -> Figure:
         unit = "N m" if turns else "N"
         ends = np.array([model.torque_lower[joint], model.torque_upper[joint]])
         limits = ends[np.isfinite(ends)].tolist()
-        text = " … ".join(f"{limit:g}" for limit in limits).replace("-", "−")
         return Panel(
             unit,
             [Curve(run.torque[:, joint], look={"color": color, "drawstyle": "steps-post"})],
             in_words(run.robot.actuator_names[joint]),
-            remark=f"limits {text} {unit}" if limits else "",
+            remark=limits_in_words(limits, unit),
             bounds={"": limits},
             impacts=False,
         )

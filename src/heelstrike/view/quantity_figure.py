@@ -14,7 +14,7 @@ from heelstrike.view.comparison_figure import COLORS, STROKES
 from heelstrike.view.panels import THIN, Curve, Excerpt, Panel, draw_panels
 
 
-def _look(number: int) -> dict[str, Any]:
+def look(number: int) -> dict[str, Any]:
     """Look of a curve: a colour of the palette, and other strokes when all have been used."""
     stroke = STROKES[number // len(COLORS) % len(STROKES)]
     return {"linewidth": THIN, "color": COLORS[number % len(COLORS)], "linestyle": stroke}
@@ -51,7 +51,7 @@ def draw_quantity(excerpt: Excerpt, name: str) -> Figure:
         Panel(
             unit,
             [
-                Curve(values[:, i, k], each.replace("_", " "), _look(i))
+                Curve(values[:, i, k], each.replace("_", " "), look(i))
                 for i, each in enumerate(names[0])
             ],
             title=component,

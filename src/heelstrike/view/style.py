@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -142,6 +142,12 @@ def label_powers(axis: Axis) -> None:
 def foot_color(foot: int) -> str:
     """Colour of a foot and its leg, dark for what belongs to none (-1)."""
     return INK if foot < 0 else FOOT_COLORS[foot % len(FOOT_COLORS)]
+
+
+def limits_in_words(limits: Sequence[float], unit: str = "") -> str:
+    """Say which limits there are."""
+    text = " … ".join(f"{limit:g}" for limit in limits).replace("-", "−")
+    return f"limits {text} {unit}".rstrip() if limits else ""
 
 
 def in_words(name: str) -> str:

@@ -1,9 +1,13 @@
-"""A robot drawn in the terminal, in the dots of braille letters."""
+"""What a terminal shows: tables, and a robot drawn in the dots of braille letters."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
 
 from heelstrike.dynamics import link_poses
 from heelstrike.robot.robot import Robot
@@ -14,6 +18,33 @@ _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 _EMPTY = 0x2800
 _ROWS, _COLUMNS = _BITS.shape
 _WIDEST = 72  # letters
+
+
+def bare_table(title: str, names: Sequence[str] = (), numbers: Iterable[str] = ()) -> Table:
+    """Begin a table with a rule beneath its headings and nothing around it.
+
+    Parameters
+    ----------
+    title : str
+        Above it, to the left.
+    names : sequence of str
+        Headings of the first columns, whose cells are not broken.
+    numbers : iterable of str
+        Headings of the columns after them, to the right.
+
+    Returns
+    -------
+    Table
+        Without rows.
+    """
+    table = Table(
+        title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0)
+    )
+    for heading in names:
+        table.add_column(heading, no_wrap=True)
+    for heading in numbers:
+        table.add_column(heading, justify="right")
+    return table
 
 
 def terminal_drawing(robot: Robot, *, lines: int = 20) -> str:

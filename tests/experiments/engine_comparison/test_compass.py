@@ -32,6 +32,7 @@ from heelstrike.experiments.engine_comparison.compass import (
 from heelstrike.experiments.engine_comparison.entries import ENTRIES
 from heelstrike.experiments.engines.packages import PACKAGES
 from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.experiments.engines.served import lent
 from heelstrike.robot import State
 from heelstrike.sim import EventDriven, TimeStepping
 
@@ -178,13 +179,11 @@ def test_an_engine_that_falls_at_its_defaults_is_tried_at_its_best(
 
 
 def test_mujoco_takes_steps(cycle: tuple[CompassWalk, State]) -> None:
-    mover = InEngine(ENTRIES["mujoco"], 1e-3, {})
     q, v = cycle[1].q, cycle[1].v
-    try:
+    with lent(None) as processes:
+        mover = InEngine(ENTRIES["mujoco"], 1e-3, {}, processes)
         mover.begin(False, q, v)
         rows = mover.more(20)
-    finally:
-        mover.close()
     assert np.abs(rows[-1, :4] - q).max() > 1e-2
     foot = rows[:, 0] - np.sin(rows[:, 2]), rows[:, 1] - np.cos(rows[:, 2])
     assert np.abs(foot[0]).max() < 2e-3  # it stands on its foot, which is soft

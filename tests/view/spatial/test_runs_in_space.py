@@ -20,6 +20,7 @@ from heelstrike.view import robot_picture
 from heelstrike.view.spatial import figures
 from heelstrike.view.spatial.camera import Camera
 from heelstrike.view.spatial.film import SpatialFilm
+from heelstrike.view.spatial.stage import grid_spacing
 from heelstrike.view.style import styled
 
 BIPED = """
@@ -129,6 +130,13 @@ def test_an_unknown_figure_is_refused_with_what_there_is(run: hs.sim.spatial.Spa
         run.plot("gap", span=(5.0, 6.0))
     with pytest.raises(ViewError, match="a span is a pair of times"):
         run.plot("gap", span=0.5)
+
+
+@pytest.mark.parametrize("size", [0.001, 0.66, 0.67, 0.92, 1.0, 1.7, 6.6, 6.7, 9.99, 40.0])
+def test_the_ground_has_lines_for_a_robot_of_any_size(size: float) -> None:
+    spacing = grid_spacing(size)
+    assert 0.3 * size < spacing < size
+    assert f"{spacing:.0e}"[0] in "125"
 
 
 def test_a_portrait(robot: hs.SpatialRobot, tmp_path: Path) -> None:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.actuation import torque_bounds
+from heelstrike.analysis.actuation import torque_bounds, turning
 from heelstrike.analysis.friction import friction_coefficient, friction_use
 from heelstrike.analysis.zero_moment_point import zero_moment_point
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.robot.sole import has_length, soles
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import AnyRun, Run
 
 Rows = NDArray[np.bool_]
 
@@ -56,17 +56,23 @@ def limits(run: Run, *, until: float = math.inf) -> tuple[Limit, ...]:
     tuple of Limit
         One for each foot, motor and joint that has a limit.
     """
-    return tuple(
-        sorted(_limits(run, run.time <= until), key=lambda limit: (limit.reached, -limit.used))
-    )
+    shown = run.time <= until
+    return ordered(_limits(run, shown) if shown.any() else ())
+
+
+def ordered(found: Iterable[Limit]) -> tuple[Limit, ...]:
+    """Return limits in the order in which they were reached, then the closest first."""
+    return tuple(sorted(found, key=lambda limit: (limit.reached, -limit.used)))
 
 
 def _limits(run: Run, shown: Rows) -> Iterator[Limit]:
-    if not shown.any():
-        return
+    model = run.robot.model
     yield from _of_feet(run, shown)
-    yield from _of_motors(run, shown)
-    yield from _of_joints(run, shown)
+    yield from of_motors(run, shown)
+    for joint, name in enumerate(run.robot.joint_names):
+        ends = float(model.lower[joint]), float(model.upper[joint])
+        hinge = bool(model.axis[joint, 0] != 0.0)
+        yield from limit_of_range(run.time, name, run.position[:, joint], ends, shown, hinge=hinge)
 
 
 def _of_feet(run: Run, shown: Rows) -> Iterator[Limit]:
@@ -74,39 +80,53 @@ def _of_feet(run: Run, shown: Rows) -> Iterator[Limit]:
     zmp = zero_moment_point(run)
     alone = np.where(zmp.single_support[:, None], zmp.foot_margin, np.nan)
     for i, (foot, sole) in enumerate(zip(run.robot.feet, soles(run.robot), strict=True)):
-        if (found := largest(run.time, use[:, i], shown)) is not None:
-            k, used, reached = found
-            time = float(run.time[k])
-            there = float(friction[k, foot.contacts[0]])
-            detail = f"{used * there:.3g} of {there:.3g} at {time:.3g} s"
-            yield Limit(f"friction of the {_in_words(foot.name)}", "friction", used, time, reached,
-                        detail)  # fmt: skip
-        half = 0.5 * (sole.toe - sole.heel)
-        if (
-            has_length(run.robot, sole)
-            and (found := largest(run.time, 1.0 - alone[:, i] / half, shown)) is not None
-        ):
-            k, used, reached = found
-            time = float(run.time[k])
-            margin = max(float(alone[k, i]), 0.0)
-            detail = f"{1e3 * margin:.3g} mm from the end of the sole at {time:.3g} s"
-            name = f"zero moment point of the {_in_words(foot.name)}"
-            yield Limit(name, "zero moment point", used, time, reached, detail)
+        there = friction[:, foot.contacts[0]]
+        yield from limit_of_friction(run.time, foot.name, use[:, i], there, shown)
+        if has_length(run.robot, sole):
+            half, of = 0.5 * (sole.toe - sole.heel), f" of the {_in_words(foot.name)}"
+            yield from limit_of_pressure(
+                run.time, of, alone[:, i], half, shown, edge="the end of the sole"
+            )
 
 
-def _of_motors(run: Run, shown: Rows) -> Iterator[Limit]:
-    model = run.robot.model
+def of_motors(run: AnyRun, shown: Rows) -> Iterator[Limit]:
+    """Yield how close the motors of a run come to their torques and speeds."""
     lower, upper = torque_bounds(run)
+    hinges = turning(run.robot)
     for i, name in enumerate(run.robot.actuator_names):
-        joint = model.actuator_joint[i]
-        hinge = bool(model.axis[joint, 0] != 0.0)
-        ends = lower[:, i], upper[:, i]
-        yield from limit_of_torque(run.time, name, run.torque[:, i], ends, shown, hinge=hinge)
-        fastest, speed = float(model.no_load_speed[joint]), run.velocity[:, joint]
-        yield from limit_of_speed(run.time, name, speed, fastest, shown, hinge=hinge)
+        k = int(run.robot.driven[i])
+        ends, fastest = (lower[:, i], upper[:, i]), float(run.robot.model.no_load_speed[k])
+        hinge, speed = bool(hinges[k]), np.abs(run.velocity[:, k])
+        yield from _limit_of_torque(run.time, name, run.torque[:, i], ends, shown, hinge=hinge)
+        yield from _limit_of_speed(run.time, name, speed, fastest, shown, hinge=hinge)
 
 
-def limit_of_torque(
+def limit_of_friction(
+    time: Floats, foot: str, share: Floats, friction: Floats, shown: Rows
+) -> Iterator[Limit]:
+    """Yield how much of its friction (nt,) a foot uses at most."""
+
+    def told(k: int) -> str:
+        return f"{share[k] * friction[k]:.3g} of {friction[k]:.3g}"
+
+    yield from _worst(f"friction of the {_in_words(foot)}", "friction", time, share, shown, told)
+
+
+def limit_of_pressure(
+    time: Floats, of: str, margin: Floats, room: Floats | float, shown: Rows, *, edge: str
+) -> Iterator[Limit]:
+    """Yield how close a zero moment point comes to an edge, from which `room` (m) is farthest."""
+
+    def told(k: int) -> str:
+        return f"{1e3 * max(float(margin[k]), 0.0):.3g} mm from {edge}"
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(np.asarray(room) > 0.0, 1.0 - margin / room, np.nan)
+    name = "zero moment point"
+    yield from _worst(f"{name}{of}", name, time, share, shown, told)
+
+
+def _limit_of_torque(
     time: Floats,
     name: str,
     torque: Floats,
@@ -119,55 +139,59 @@ def limit_of_torque(
     reached = np.where(torque < 0.0, *ends)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(torque == 0.0, 0.0, torque / reached)
-    if np.isfinite(reached).any() and (found := largest(time, share, shown)) is not None:
-        k, used, first = found
+
+    def told(k: int) -> str:
         unit = "N m" if hinge else "N"
-        detail = f"{torque[k]:.3g} of {reached[k]:.3g} {unit} at {time[k]:.3g} s".replace("-", "−")
-        yield Limit(f"torque of {_in_words(name)}", "torque", used, float(time[k]), first, detail)
+        return f"{torque[k]:.3g} of {reached[k]:.3g} {unit}".replace("-", "−")
+
+    if np.isfinite(reached).any():
+        yield from _worst(f"torque of {_in_words(name)}", "torque", time, share, shown, told)
 
 
-def limit_of_speed(
+def _limit_of_speed(
     time: Floats, name: str, speed: Floats, fastest: float, shown: Rows, *, hinge: bool
 ) -> Iterator[Limit]:
-    """Yield how close the speed (nt,) of a motor comes to that without load, if that is known."""
-    speed = np.abs(speed)
-    if np.isfinite(fastest) and (found := largest(time, speed / fastest, shown)) is not None:
-        k, used, first = found
-        detail = f"{speed[k]:.3g} of {fastest:.3g} {'rad/s' if hinge else 'm/s'} at {time[k]:.3g} s"
-        yield Limit(f"speed of {_in_words(name)}", "speed", used, float(time[k]), first, detail)
+    """Yield how close a motor comes to its fastest speed, if it has one."""
 
+    def told(k: int) -> str:
+        return f"{speed[k]:.3g} of {fastest:.3g} {'rad/s' if hinge else 'm/s'}"
 
-def _of_joints(run: Run, shown: Rows) -> Iterator[Limit]:
-    model = run.robot.model
-    for joint, name in enumerate(run.robot.joint_names):
-        ends = float(model.lower[joint]), float(model.upper[joint])
-        hinge = bool(model.axis[joint, 0] != 0.0)
-        yield from limit_of_range(run.time, name, run.position[:, joint], ends, shown, hinge=hinge)
+    if np.isfinite(fastest):
+        share = speed / fastest
+        yield from _worst(f"speed of {_in_words(name)}", "speed", time, share, shown, told)
 
 
 def limit_of_range(
     time: Floats, name: str, angle: Floats, ends: tuple[float, float], shown: Rows, *, hinge: bool
 ) -> Iterator[Limit]:
-    """Yield how close a joint (nt,) comes to the ends of its range, if it has two."""
+    """Yield how close a joint comes to the ends of its range, if it has both."""
     low, high = ends
     if not (np.isfinite(low) and np.isfinite(high) and high > low):
         return
     share = np.abs(angle - 0.5 * (low + high)) / (0.5 * (high - low))
-    if (found := largest(time, share, shown)) is not None:
-        k, used, first = found
+
+    def told(k: int) -> str:
         away = max(min(float(angle[k]) - low, high - float(angle[k])), 0.0)
-        detail = f"{away:.3g} {'rad' if hinge else 'm'} from its stop at {time[k]:.3g} s"
-        yield Limit(f"range of {_in_words(name)}", "joint", used, float(time[k]), first, detail)
+        return f"{away:.3g} {'rad' if hinge else 'm'} from its stop"
+
+    yield from _worst(f"range of {_in_words(name)}", "joint", time, share, shown, told)
 
 
-def largest(time: Floats, share: Floats, shown: Rows) -> tuple[int, float, float] | None:
-    """Row of the largest share (nt,), the share, and when it first reached 1 (s)."""
+def _worst(
+    name: str, kind: str, time: Floats, share: Floats, shown: Rows, told: Callable[[int], str]
+) -> Iterator[Limit]:
+    """Yield the largest share (nt,) of a limit in some rows, if any has one.
+
+    `told` says what it is in a row.
+    """
     share = np.where(shown & np.isfinite(share), share, np.nan)
     if np.isnan(share).all():
-        return None
+        return
     k = int(np.nanargmax(share))
     there = np.flatnonzero(share >= REACHED)
-    return k, float(share[k]), float(time[there[0]]) if len(there) else math.inf
+    reached = float(time[there[0]]) if len(there) else math.inf
+    detail = f"{told(k)} at {time[k]:.3g} s"
+    yield Limit(name, kind, float(share[k]), float(time[k]), reached, detail)
 
 
 def _in_words(name: str) -> str:

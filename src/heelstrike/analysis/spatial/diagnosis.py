@@ -8,14 +8,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.actuation import torque_bounds
 from heelstrike.analysis.diagnosis.falls import SUNK, Fall, fall_of
 from heelstrike.analysis.diagnosis.limits import (
     Limit,
-    largest,
+    limit_of_friction,
+    limit_of_pressure,
     limit_of_range,
-    limit_of_speed,
-    limit_of_torque,
+    of_motors,
+    ordered,
 )
 from heelstrike.analysis.diagnosis.symptoms import (
     BRIEF,
@@ -31,11 +31,11 @@ from heelstrike.analysis.diagnosis.symptoms import (
 )
 from heelstrike.analysis.spatial.friction import face_friction, foot_friction
 from heelstrike.analysis.spatial.links import link_motion
-from heelstrike.analysis.spatial.support import pushing_in_space
 from heelstrike.analysis.spatial.zero_moment_point import (
     SpatialZeroMomentPoint,
     spatial_zero_moment_point,
 )
+from heelstrike.analysis.support import pushing
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.model import HINGE, SLIDE
 from heelstrike.sim.closed_sets import RunStatus
@@ -67,8 +67,7 @@ def spatial_limits(run: SpatialRun, *, until: float = math.inf) -> tuple[Limit, 
         each motor, and the range of each joint that has ends.
     """
     shown = run.time <= until
-    found = _limits(run, shown) if shown.any() else ()
-    return tuple(sorted(found, key=lambda limit: (limit.reached, -limit.used)))
+    return ordered(_limits(run, shown) if shown.any() else ())
 
 
 def _limits(run: SpatialRun, shown: Rows) -> Iterator[Limit]:
@@ -76,29 +75,13 @@ def _limits(run: SpatialRun, shown: Rows) -> Iterator[Limit]:
     friction = face_friction(run)
     for foot in robot.feet:
         share, coefficient = foot_friction(run, friction, foot.contacts)
-        if (found := largest(time, share, shown)) is not None:
-            k, used, reached = found
-            mu = coefficient[k]
-            detail = f"{used * mu:.3g} of {mu:.3g} at {time[k]:.3g} s"
-            name = f"friction of the {foot.name.replace('_', ' ')}"
-            yield Limit(name, "friction", used, float(time[k]), reached, detail)
+        yield from limit_of_friction(time, foot.name, share, coefficient, shown)
     rows, zmp = _looked_at(run)
     room = np.array([_room(polygon) for polygon in zmp.polygon])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(room > 0.0, 1.0 - zmp.margin / room, np.nan)
-    if (found := largest(time[rows], share, shown[rows])) is not None:
-        k, used, reached = found
-        inside, when = 1e3 * max(float(zmp.margin[k]), 0.0), float(time[rows[k]])
-        detail = f"{inside:.3g} mm from the edge of the support polygon at {when:.3g} s"
-        yield Limit("zero moment point", "zero moment point", used, when, reached, detail)
-    lower, upper = torque_bounds(run)
-    for i, name in enumerate(robot.actuator_names):
-        k = int(model.actuator_velocity[i])
-        hinge = int(model.joint_kind[model.velocity_joint[k]]) != SLIDE
-        ends = lower[:, i], upper[:, i]
-        yield from limit_of_torque(time, name, run.torque[:, i], ends, shown, hinge=hinge)
-        fastest = float(model.no_load_speed[k])
-        yield from limit_of_speed(time, name, run.velocity[:, k], fastest, shown, hinge=hinge)
+    yield from limit_of_pressure(
+        time[rows], "", zmp.margin, room, shown[rows], edge="the edge of the support polygon"
+    )
+    yield from of_motors(run, shown)
     for joint, kind in enumerate(model.joint_kind.tolist()):
         if kind in (HINGE, SLIDE):
             angle = run.position[:, int(model.first_position[joint])]
@@ -187,7 +170,7 @@ def _symptoms(run: SpatialRun, height: float, pace: float, center: Floats) -> It
 
 def _slips(run: SpatialRun, height: float, pace: float) -> Iterator[Symptom]:
     """Feet that slide while they press."""
-    pressed = pushing_in_space(run)
+    pressed = pushing(run)
     speed = np.where(pressed, np.linalg.norm(run.slip, axis=-1), 0.0)
     held = np.diff(run.time, append=run.time[-1:])
     friction = face_friction(run)

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from heelstrike.analysis.actuation import actuator_power
+from heelstrike.analysis.actuation import transport_over
 from heelstrike.analysis.spatial.friction import face_friction, foot_friction
 from heelstrike.analysis.spatial.links import link_motion
-from heelstrike.analysis.spatial.support import pushing_in_space
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
-from heelstrike.analysis.told_summary import OF_A_GAIN, UNKNOWN, ToldSummary, in_lines
+from heelstrike.analysis.told_summary import (
+    COST_LINES,
+    FRICTION_LINES,
+    GAIN_LINE,
+    OF_A_GAIN,
+    UNKNOWN,
+    ToldSummary,
+    common_figures,
+    in_lines,
+)
 from heelstrike.field_texts import dataclass
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.run import SolverCount
 from heelstrike.sim.spatial.run import SpatialRun
-
-SHORTEST_WAY = 1e-3
-"""Distance (m) below which energy a distance means nothing."""
 
 CERTAIN = 9
 """Decimals of a distance (m) that the tolerance of the contact problems leaves certain."""
@@ -25,17 +29,10 @@ MOST_LOOKED_AT = 2000
 """Rows of a run in which the zero moment point is looked for, evenly spread."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SpatialSummary(ToldSummary):
     """Figures of a run in space. Those that do not exist for it are NaN (null in JSON)."""
 
-    robot: str
-    """Name of the robot."""
-    status: str
-    message: str
-    """status, message: How the run ended."""
-    duration_s: float
-    """Time simulated."""
     forward_m: float
     left_m: float
     """forward_m, left_m: How far the centre of mass moved along x and y."""
@@ -54,35 +51,14 @@ class SpatialSummary(ToldSummary):
     """Largest |f_t| / (μ f_n) of any foot, each of its points with the friction of the plane or box
     under it; of all points, if there are no feet. Rows in which one is at a wall, too, do not
     count."""
-    slip_max_m: float
-    """Largest distance that a contact point slid while pressed, over the whole run."""
-    penetration_max_m: float
     residual_max: float
-    """penetration_max_m, residual_max: Worst values over all steps, from the certificates; the
-    latter is relative."""
+    """Worst value over all steps, from the certificates; it is relative."""
     uncertified: int
     halved: int
     relaxed: int
     """uncertified, halved, relaxed: Steps that went on with a residual above 1e-9; steps taken in
     parts; steps in which points in a wedge were not asked to leave the ground, or whose impact did
     not bounce or was left to the next step."""
-    solver: SolverCount
-    """How the contact problems were solved."""
-    torque_cost_N2m2s: float  # noqa: N815 - units keep their capitals
-    """∫ ΓᵀΓ dt over the whole run."""
-    cost_of_transport: float
-    cost_of_transport_positive: float
-    """cost_of_transport, cost_of_transport_positive: ∫ Σ |τ ω| dt / (m g d), and the same of
-    positive work only."""
-    saturations: int
-    """Times that a torque was clipped to its limit."""
-    compile_s: float
-    wall_s: float
-    """compile_s, wall_s: Time spent on compilation, and on the simulation."""
-    real_time_factor: float
-    """Time simulated over time spent on the simulation."""
-    energy_gain_J: float = 0.0  # noqa: N815 - units keep their capitals
-    """Kinetic energy that restitution with friction made in impacts."""
 
     def lines(self) -> list[tuple[str, str]]:
         """Label and value of every line of the table a person reads."""
@@ -107,24 +83,16 @@ def summarize_in_space(run: SpatialRun) -> SpatialSummary:
         Figures with units in their names.
     """
     count = len(run.time)
-    duration = float(run.time[-1] - run.time[0]) if count else 0.0
     ends = np.array([0, count - 1]) if count else np.zeros(0, dtype=np.int64)
     center = link_motion(run, ends).center_of_mass
     moved = center[-1] - center[0] if count else np.zeros(3)
     distance = float(np.hypot(moved[0], moved[1]))
     every = max(1, -(-count // MOST_LOOKED_AT))
     margin = spatial_zero_moment_point(run, np.arange(0, count, every)).margin
-    held = np.diff(run.time)
-    power = actuator_power(run)
-    scale = run.robot.weight * distance
-    if not (run.robot.weight > 0.0 and distance > SHORTEST_WAY):
-        scale = UNKNOWN
-    wall = run.timing.wall_s
+    common = common_figures(run, transport_over(run, distance))
+    duration = common["duration_s"]
     return SpatialSummary(
-        robot=run.robot.name,
-        status=run.status.value,
-        message=run.message,
-        duration_s=duration,
+        **common,
         forward_m=float(moved[0]),
         left_m=float(moved[1]),
         distance_m=distance,
@@ -133,21 +101,10 @@ def summarize_in_space(run: SpatialRun) -> SpatialSummary:
         touchdowns=sum(event.kind is EventKind.TOUCHDOWN for event in run.events),
         zmp_margin_min_m=round(float(np.fmin.reduce(margin, initial=UNKNOWN)), CERTAIN) + 0.0,
         friction_use_max=_friction_use(run),
-        slip_max_m=_slip(run),
-        penetration_max_m=run.certificates.penetration,
         residual_max=run.certificates.residual,
         uncertified=run.certificates.uncertified,
         halved=run.certificates.halved,
         relaxed=run.certificates.relaxed,
-        solver=run.solver,
-        torque_cost_N2m2s=float(((run.torque[:-1] ** 2).sum(axis=1) * held).sum()),
-        cost_of_transport=float((np.abs(power).sum(axis=1) * held).sum() / scale),
-        cost_of_transport_positive=float((np.maximum(power, 0.0).sum(axis=1) * held).sum() / scale),
-        saturations=run.saturations,
-        compile_s=run.timing.compile_s,
-        wall_s=wall,
-        real_time_factor=duration / wall if wall > 0.0 else UNKNOWN,
-        energy_gain_J=run.certificates.energy_gain,
     )
 
 
@@ -158,14 +115,6 @@ def _turn(run: SpatialRun) -> float:
     w, x, y, z = run.position[:, 3:7].T
     heading = np.unwrap(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
     return float(heading[-1] - heading[0])
-
-
-def _slip(run: SpatialRun) -> float:
-    """Largest distance that a contact point slid while it pushed."""
-    if len(run.time) < 2 or not run.robot.nc:
-        return 0.0
-    speed = np.where(pushing_in_space(run), np.linalg.norm(run.slip, axis=-1), 0.0)
-    return float((speed[:-1] * np.diff(run.time)[:, None]).sum(axis=0).max())
 
 
 def _friction_use(run: SpatialRun) -> float:
@@ -184,18 +133,12 @@ LINES = {
     "turn": "{s.turn_rad:.3} rad about the vertical",
     "touchdowns": "{s.touchdowns} of contact points",
     "zero moment point": "{s.zmp_margin_min_m:.3} m inside the support polygon at least",
-    "friction use": "{s.friction_use_max:.3} of the cone",
-    "slip": "{s.slip_max_m:.2} m",
-    "penetration": "{s.penetration_max_m:.2} m",
+    **FRICTION_LINES,
     "contact problems": "{s.solver.solves}, {s.solver.failures} not certified, "
     "{s.solver.fallbacks} needed another way; residual {s.residual_max:.2}",
     "steps not certified": "{s.uncertified} to 1e-9; {s.halved} halved; {s.relaxed} with a wedged "
     "point left in place, or an impact without bounce or left to the next step",
-    OF_A_GAIN: "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
+    **GAIN_LINE,
     "torque cost": "{s.torque_cost_N2m2s:.4} N²m²s",
-    "cost of transport": "{s.cost_of_transport:.3} "
-    "({s.cost_of_transport_positive:.3} by positive work alone)",
-    "torques at their limit": "{s.saturations}",
-    "computing time": "{s.wall_s:.3} s ({s.real_time_factor:.3} × real time), "
-    "compilation {s.compile_s:.3} s",
+    **COST_LINES,
 }

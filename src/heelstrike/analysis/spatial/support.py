@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.support import NOTHING
+from heelstrike.analysis.support import carrying
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats
 from heelstrike.robot.shapes.convex import convex_hull
 from heelstrike.sim.spatial.run import SpatialRun, tangents_of
-from heelstrike.tolerances import STANDING_GAP
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,21 +67,6 @@ def margin(corners: Floats, place: Floats) -> float:
         return -distance
     side = edge[:, 0] * away[:, 1] - edge[:, 1] * away[:, 0]
     return distance if np.all(side >= 0.0) or np.all(side <= 0.0) else -distance
-
-
-def pushing_in_space(run: SpatialRun) -> NDArray[np.bool_]:
-    """Tell which contact points push in each row, (nt, nc)."""
-    return np.asarray(run.contact_force[..., 0] > NOTHING * run.robot.weight)
-
-
-def on_ground(run: SpatialRun) -> Floats:
-    """Project the contact points onto the ground, (nt, nc, 3), in m."""
-    return np.asarray(run.contact_point - run.gap[..., None] * run.contact_normal)
-
-
-def carrying(run: SpatialRun) -> NDArray[np.bool_]:
-    """Tell which contact points touch the ground or push on it in each row, (nt, nc)."""
-    return np.asarray((run.gap <= STANDING_GAP) | pushing_in_space(run))
 
 
 def plane_of(run: SpatialRun, row: int, touching: NDArray[np.bool_]) -> tuple[Floats, Floats]:

@@ -14,8 +14,8 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.analysis.spatial.motion import centroidal_motion
-from heelstrike.analysis.spatial.support import carrying, plane_of, polygon_of
-from heelstrike.analysis.support import NOTHING
+from heelstrike.analysis.spatial.support import plane_of, polygon_of
+from heelstrike.analysis.support import NOTHING, carrying
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.spatial.run import SpatialRun

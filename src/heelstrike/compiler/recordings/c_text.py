@@ -27,6 +27,7 @@ _WRITTEN = {
     Operation.ROOT: "sqrt({})",
     Operation.MAGNITUDE: "fabs({})",
     Operation.LARGER: "{0} > {1} ? {0} : {1}",
+    Operation.SMALLER: "{0} < {1} ? {0} : {1}",
     Operation.INVERT_ABOVE: "{0} > {1} ? 1.0 / {0} : 0.0",
 }
 

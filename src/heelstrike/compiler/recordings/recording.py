@@ -33,9 +33,15 @@ def larger(one: float, other: float) -> float:
     return one if one > other else other
 
 
+@kernel
+def smaller(one: float, other: float) -> float:
+    """The smaller of two numbers; the second where the first is none."""
+    return one if one < other else other
+
+
 _RECORDED = {
     math.sin: tape.sine, math.cos: tape.cosine, math.sqrt: tape.root,
-    inverse_above: tape.inverse_above, larger: tape.larger,
+    inverse_above: tape.inverse_above, larger: tape.larger, smaller: tape.smaller,
 }  # fmt: skip
 """What takes the place of functions that kernels call; no other function may be asked for a
 number that is not known yet."""
@@ -166,8 +172,12 @@ class Recording:
 
     def written(self) -> Iterator[tuple[str, int, Any]]:
         """Array, index and value of every entry that the kernel writes for others to read."""
+        return (each for each in self.changed() if not self.program.leaves_unread(each[0]))
+
+    def changed(self) -> Iterator[tuple[str, int, Any]]:
+        """The same of all that it writes, whether somebody reads it or not."""
         for name, array in self.arrays.items():
-            if self.program.leaves_unread(name) or name.split(".")[0] == CONSTANT:
+            if name.split(".")[0] == CONSTANT:
                 continue
             for index, entry in enumerate(array.flat):
                 unchanged = isinstance(entry, Entry) and (entry.array, entry.index) == (name, index)

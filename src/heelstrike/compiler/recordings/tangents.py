@@ -35,13 +35,14 @@ _PARTIAL: dict[Operation, Callable[..., tuple[Any, ...]]] = {
     Operation.ROOT: lambda root, _: (0.5 / root,),
     Operation.MAGNITUDE: lambda magnitude, value: (value / magnitude,),
     Operation.LARGER: lambda _, one, other: _shares(one - other),
+    Operation.SMALLER: lambda _, one, other: _shares(other - one),
     Operation.INVERT_ABOVE: lambda inverse, *_: (-inverse * inverse, 0.0),
 }
 """Derivatives of a result by its operands, of the result and of these."""
 
 
 def _shares(difference: Any) -> tuple[Any, Any]:
-    """What the larger of two numbers changes with each, by what the first is larger."""
+    """What one of two numbers changes with each, by how clearly the first is chosen."""
     first = inverse_above(difference, 0.0) * difference
     return first, 1.0 - first
 

@@ -31,10 +31,11 @@ class Operation(Enum):
     ROOT = "square root"
     MAGNITUDE = "magnitude"
     LARGER = "the larger of both"
+    SMALLER = "the smaller of both"
     INVERT_ABOVE = "inverse of the first if it is more than the second, or else zero"
 
 
-_COMMUTATIVE = (Operation.ADD, Operation.MULTIPLY)
+COMMUTATIVE = (Operation.ADD, Operation.MULTIPLY)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -105,7 +106,7 @@ class Tape:
     def record(self, operation: Operation, *operands: Any) -> Result:
         """Return the result of an operation, new or done before."""
         known = [value if isinstance(value, Value) else float(value) for value in operands]
-        if operation in _COMMUTATIVE:  # the same sum, whichever term comes first
+        if operation in COMMUTATIVE:  # the same sum, whichever term comes first
             known.sort(key=_name)
         return self._only(Result, (operation, *map(_name, known)), operation, tuple(known))
 
@@ -153,10 +154,22 @@ def root(value: Any) -> Any:
 
 def larger(one: Any, other: Any) -> Any:
     """The larger of two numbers or values of a tape; the second where the first is none."""
-    for value in (one, other):
+    recorded = _record(Operation.LARGER, one, other)
+    return (one if one > other else other) if recorded is None else recorded
+
+
+def smaller(one: Any, other: Any) -> Any:
+    """The smaller of two numbers or values of a tape; the second where the first is none."""
+    recorded = _record(Operation.SMALLER, one, other)
+    return (one if one < other else other) if recorded is None else recorded
+
+
+def _record(operation: Operation, *operands: Any) -> Any:
+    """Record an operation on the tape of one of its operands, or return None if none has any."""
+    for value in operands:
         if _waits(value):
-            return value.tape.record(Operation.LARGER, one, other)
-    return one if one > other else other
+            return value.tape.record(operation, *operands)
+    return None
 
 
 def inverse_above(value: Any, least: Any) -> Any:

@@ -12,6 +12,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import separate_kernel
 from heelstrike.contact.certificate import certify
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
+from heelstrike.contact.cone_certificate import MOST_STOPS, certificate_programs
 from heelstrike.contact.modes import (
     COMBINATIONS,
     FISCHER_BURMEISTER,
@@ -37,7 +38,7 @@ from heelstrike.contact.solvers.gauss_seidel import gauss_seidel
 from heelstrike.contact.solvers.known_modes import AS_GOOD, CLEAN
 from heelstrike.contact.solvers.lemke import lemke
 from heelstrike.contact.solvers.reduction import reduce_problem, scale_matrix
-from heelstrike.contact.weighing import weighing_programs
+from heelstrike.contact.solvers.standing import CODES, standing_programs
 from heelstrike.contact.workspace import (
     Combinations,
     ContactAnswer,
@@ -327,19 +328,23 @@ def contact_workspace(
         Whether to see to it that the solvers are compiled. Those who say no call
         ``try_solvers.finish()`` before they solve.
     symmetric : bool
-        Whether matrices will be symmetric to the last digit, as certificates by programs take them.
+        Whether matrices will be symmetric to the last digit, as programs take them.
     """
     if ready:
         try_solvers.finish()
     contacts = max(int(capacity), 1)
     rows = 2 * contacts
-    programs = elimination_programs()
-    weighing = weighing_programs() if symmetric else np.zeros(1, np.int64)
+    certificates = certificate_programs() if symmetric else np.zeros((1, MOST_STOPS + 1), np.int64)
     work = ContactWorkspace.allocate(
         capacity=contacts,
-        scaling=Scaling.allocate(capacity=contacts, programs=weighing),
+        scaling=Scaling.allocate(capacity=contacts, most_stops=MOST_STOPS, programs=certificates),
         sticking=StickingRows.allocate(
-            capacity=contacts, half=LARGEST * (LARGEST + 1) // 2, programs=programs
+            capacity=contacts,
+            half=LARGEST * (LARGEST + 1) // 2,
+            programs=elimination_programs(),
+            standing=standing_programs()
+            if symmetric
+            else np.zeros((CODES, MOST_STOPS + 1), np.int64),
         ),
         equations=Equations.allocate(capacity=contacts, dual=Dictionary.allocate(pairs=rows)),
         lemke=Dictionary.allocate(pairs=2 * rows),

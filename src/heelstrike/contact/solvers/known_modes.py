@@ -12,10 +12,12 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
-from heelstrike.contact.certificate import REST_TOLERANCE, certify
+from heelstrike.contact.certificate import REST_TOLERANCE, certify, certify_at_once, cones_of
+from heelstrike.contact.cone_certificate import FASTEST
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.sets import EVERY_ROW, INTERVAL, LINE, projected, row_of
 from heelstrike.contact.solvers.elimination import POOR_PIVOT
+from heelstrike.contact.solvers.standing import EARLY_PIVOT, MOST_STANDING, SHARED_ROW, code_of
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -27,12 +29,6 @@ from heelstrike.contact.workspace import (
 )
 from heelstrike.dynamics.dense import solve_positive
 from heelstrike.tolerances import NO_PIVOT
-
-SHARED_ROW = 1e-14
-"""Two rows are one if the inverse mass along their difference is less than this, relative."""
-
-EARLY_PIVOT = 1e-2
-"""Pivots that keep more than this of their diagonal are good."""
 
 COSTLY_PIVOT = 1e-5
 """Pivots that keep less than this of their diagonal leave no clean answer: rounding of the numbers,
@@ -116,10 +112,11 @@ def solve_slipping(size: int, problem: ContactProblem, rows: StickingRows) -> in
     """Solve ``(G_n + G_t r) x = -b`` over the listed rows; return the rank, or -1 to give up.
 
     What slips rubs with r times what it presses with. No rows change places: pivots are held
-    against their diagonals, whatever the units of the rows.
+    against their diagonals, whatever the units of the rows. Of rows that depend on others the
+    solution is the one of least norm, as where both feet of parallel legs slip.
     """
     delassus, source, edge = problem.delassus, rows.row, rows.edge
-    matrix, x, inverse = rows.factor, rows.x, rows.pivot
+    matrix, x, inverse, rank = rows.factor, rows.x, rows.pivot, 0
     for i in range(size):
         row = row_of(i, source)
         for j in range(size):
@@ -133,14 +130,48 @@ def solve_slipping(size: int, problem: ContactProblem, rows: StickingRows) -> in
             x[i] -= ratio * x[k]
             for j in range(k + 1, size):
                 matrix[i, j] -= ratio * matrix[k, j]
-        if not matrix[i, i] > EARLY_PIVOT * delassus[row, row]:
+        pivot, diagonal = matrix[i, i], delassus[row, row]
+        if pivot > EARLY_PIVOT * diagonal:
+            inverse[i] = 1.0 / pivot
+            rank += 1
+        elif abs(pivot) <= NO_PIVOT * diagonal:
+            inverse[i] = 0.0
+        else:
             return -1
-        inverse[i] = 1.0 / matrix[i, i]
     for i in range(size - 1, -1, -1):
         for j in range(i + 1, size):
             x[i] -= matrix[i, j] * x[j]
         x[i] *= inverse[i]
-    return size
+    if rank < size:
+        leave_out_idle_slips(size, rows)
+    return rank
+
+
+@kernel
+def leave_out_idle_slips(size: int, rows: StickingRows) -> None:
+    """Take from a solution what lies along directions that change no velocity, U n = 0.
+
+    The norm is that of the impulses, friction included.
+    """
+    matrix, x, basis, inverse, share = rows.factor, rows.x, rows.square, rows.pivot, rows.spare
+    for i in range(size):
+        share[i] = rows.sharers[i] / (1.0 + rows.edge[i] * rows.edge[i])
+    found = 0
+    for row in range(size):
+        if inverse[row] != 0.0:
+            continue
+        direction = basis[found]
+        for i in range(size):
+            direction[i] = 0.0
+        direction[row] = 1.0
+        for i in range(row - 1, -1, -1):
+            for j in range(i + 1, row + 1):
+                direction[i] -= matrix[i, j] * direction[j]
+            direction[i] *= inverse[i]
+        for earlier in range(found):
+            remove_part(size, basis[earlier], share, direction)
+        remove_part(size, direction, share, x)
+        found += 1
 
 
 @dissolved_kernel
@@ -484,6 +515,106 @@ def name_by_velocity(
 
 
 @dissolved_kernel
+def stand(
+    problem: ContactProblem, settings: Settings, rows: StickingRows, scaling: Scaling,
+    answer: ContactAnswer,
+) -> bool:  # fmt: skip
+    """Solve the contact problem at once if few contacts make it, and all stick; return success.
+
+    None pulls or slides in the answer. Beside them there may be stops, pressed or not; those that
+    would pull are let go. After a failure the modes are what they were.
+    """
+    mode, count = answer.mode, problem.count
+    cones = cones_of(problem, settings, scaling)
+    stops = count - cones
+    code = code_of(cones, problem, mode) if 0 < cones <= MOST_STANDING else 0
+    program = rows.standing[code, stops] if code > 0 else 0
+    if program == 0:
+        return False
+    for stop in range(stops):
+        scaling.held[stop] = 0.0 if mode[cones + stop] == OPEN else 1.0
+    pulling = 1
+    while pulling > 0:  # each time fewer are held
+        play(
+            program,
+            (
+                rows.row, rows.equation, rows.order, problem.delassus, problem.free, scaling.held,
+                rows.lower_half, rows.x, rows.pivot, rows.margin, answer.impulse,
+            ),
+        )  # fmt: skip
+        good = rows.margin[0] > 0.0
+        if not good and not share_standing(code, cones, problem, scaling, rows, answer):
+            return False
+        pulling = let_go(2 * cones, stops, scaling.held, answer.impulse) if stops > 0 else 0
+    worst = certify_at_once(cones, problem, settings, scaling, answer)
+    still = answer.residual[1] == 0.0 and scaling.size[FASTEST] <= answer.rest
+    for row in range(2 * cones, 2 * cones + stops):
+        # What parts, however slowly, would pull if it were held.
+        parts = answer.velocity[row] > BARELY * scaling.unit * scaling.root[row]
+        still = still and (parts or scaling.held[row - 2 * cones] == 1.0)
+    if not still or not worst <= min(settings.tolerance, AS_GOOD):
+        return False
+    for stop in range(stops):
+        mode[cones + stop] = STICK if scaling.held[stop] == 1.0 else OPEN
+    return True
+
+
+@kernel
+def let_go(first: int, stops: int, held: Floats, impulse: Floats) -> int:
+    """Hold the stops no longer that pull; return how many.
+
+    What pulls no more than rounding may explain is left without an impulse. Stops begin in a row.
+    """
+    largest, pulling = 0.0, 0
+    for row in range(first + stops):
+        largest = max(largest, abs(impulse[row]))
+    for stop in range(stops):
+        if impulse[first + stop] < 0.0:
+            if impulse[first + stop] < -CLEAN * largest:
+                held[stop] = 0.0
+                pulling += 1
+            impulse[first + stop] = 0.0
+    return pulling
+
+
+@kernel
+def share_standing(
+    code: int, cones: int, problem: ContactProblem, scaling: Scaling, rows: StickingRows,
+    answer: ContactAnswer,
+) -> bool:  # fmt: skip
+    """Share impulses to the least norm where rows depend on others, as under straight legs.
+
+    False is returned where it is not clear whether one does.
+    """
+    x, sharers, edge = rows.x, rows.sharers, 2 * cones
+    stops = problem.count - cones
+    size = stops
+    for row in range(edge):
+        if row > 1 and row % 2 == 1 and (code >> (cones - 1 - row // 2)) & 1 == 1:
+            rows.equation[row] = rows.equation[row - 2]
+            sharers[rows.equation[row]] += 1.0
+        else:
+            rows.equation[row] = size
+            rows.row[size] = row
+            sharers[size] = 1.0
+            size += 1
+    for stop in range(stops):
+        rows.equation[edge + stop] = stop
+        rows.row[stop] = edge + stop
+        sharers[stop] = 1.0
+    for i in range(size):
+        row, pivot = rows.row[i], rows.pivot[i]
+        diagonal = 1.0 if i < stops and scaling.held[i] == 0.0 else problem.delassus[row, row]
+        if not pivot > EARLY_PIVOT * diagonal and not abs(pivot) <= NO_PIVOT * diagonal:
+            return False
+    leave_out_idle(size, rows)
+    for row in range(edge + stops):
+        place = row_of(row, rows.equation)
+        answer.impulse[row] = x[place] / sharers[place]
+    return True
+
+
+@dissolved_kernel
 def repeat(
     problem: ContactProblem,
     settings: Settings,
@@ -496,6 +627,8 @@ def repeat(
     After a success the answer is the one of least norm, certified as :data:`AS_GOOD`. Of contacts
     that pull or press although they should not, the modes are changed.
     """
+    if stand(problem, settings, rows, scaling, answer):
+        return True
     drifts = False
     for attempt in range(TRIES):
         size, slips = list_equations(attempt == 0, problem, answer.mode, rows)

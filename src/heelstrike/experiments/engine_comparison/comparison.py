@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Group
 
-from heelstrike.analysis.told_summary import plain
+from heelstrike.analysis.told_summary import PlainEntries
 from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.entries import ABSENT, entries_called
@@ -20,14 +20,14 @@ from heelstrike.experiments.engine_comparison.rows import EngineRow
 from heelstrike.experiments.engine_comparison.settings import (
     BEST,
     DEFAULTS,
-    best_settings,
+    has_best,
     settings_of,
 )
 from heelstrike.experiments.engine_comparison.tables import walk_table
 from heelstrike.experiments.engine_comparison.walk import TRUTH, Walk
 from heelstrike.experiments.engines.packages import peers
 from heelstrike.experiments.engines.peer import InvalidRunError
-from heelstrike.experiments.engines.served import EngineProcesses
+from heelstrike.experiments.engines.served import EngineProcesses, lent
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot
@@ -53,7 +53,7 @@ OURS: Mapping[str, Callable[[float], Method]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class EngineComparison:
+class EngineComparison(PlainEntries):
     """A gait walked in every engine."""
 
     robot: str
@@ -70,21 +70,6 @@ class EngineComparison:
     """Walks, engine by engine."""
     absent: Mapping[str, str]
     """Simulators that are not run here, and why."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain numbers and texts, NaN as None."""
-        found: dict[str, Any] = plain(
-            {
-                "robot": self.robot,
-                "steps": self.steps,
-                "control_period_s": self.control_period_s,
-                "truth": asdict(self.truth),
-                "versions": dict(self.versions),
-                "rows": [asdict(row) for row in self.rows],
-                "absent": dict(self.absent),
-            }
-        )
-        return found
 
     def plot(self, scenes: SceneTable | None = None) -> Figure:
         """Draw the error over the computing time of every engine.
@@ -189,21 +174,20 @@ def compare_engines(
     entries = entries_called(engines)
     if steps < 1:
         raise SimulationError(f"a walk has at least one step, got {steps}")
-    own = processes or EngineProcesses()
-    walk = Walk(robot, controller, gait, steps, control_period, friction, patience, own)
-    say = progress or (lambda text, share: None)  # noqa: ARG005
-    say("the truth, event by event", 0.0)
-    truth = walk.ours(TRUTH)
-    versions = peers(load=False)
-    kept = KeptRows(folder if walk.can_be_told else None, walk.entries())
-    asked = [("heelstrike", "heelstrike", DEFAULTS, step) for step in step_sizes]
-    for name, entry in entries.items():
-        for which in settings:
-            if which == BEST and not best_settings().get(name, {}).get("settings"):
-                continue  # none is better than the defaults
-            asked += [(name, entry.title, which, step) for step in step_sizes]
-    rows: list[EngineRow] = []
-    try:
+    with lent(processes) as own:
+        walk = Walk(robot, controller, gait, steps, control_period, friction, patience, own)
+        say = progress or (lambda text, share: None)  # noqa: ARG005
+        say("the truth, event by event", 0.0)
+        truth = walk.ours(TRUTH)
+        versions = peers(load=False)
+        kept = KeptRows(folder if walk.can_be_told else None, walk.entries())
+        asked = [("heelstrike", "heelstrike", DEFAULTS, step) for step in step_sizes]
+        for name, entry in entries.items():
+            for which in settings:
+                if which == BEST and not has_best(name):
+                    continue  # none is better than the defaults
+                asked += [(name, entry.title, which, step) for step in step_sizes]
+        rows: list[EngineRow] = []
         for k, (name, title, which, step) in enumerate(asked):
             say(f"{title}, {which}, {1e3 * step:g} ms", k / len(asked))
             row = EngineRow(
@@ -231,9 +215,6 @@ def compare_engines(
                 except (InvalidRunError, SimulationError) as error:
                     say(f"no film of {title}, {which}: {error}", k / len(asked))
             rows.append(found)
-    finally:
-        if processes is None:
-            own.end()
     return EngineComparison(
         robot=robot.name,
         steps=steps,

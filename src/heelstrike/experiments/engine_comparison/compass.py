@@ -24,7 +24,6 @@ from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.entries import Entry
 from heelstrike.experiments.engine_comparison.scenes import leaning
-from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.experiments.engines.served import EngineProcesses, served
 from heelstrike.experiments.passive import passive_walk
@@ -108,8 +107,8 @@ class InEngine:
         Seconds.
     given : mapping
         Its settings.
-    processes : EngineProcesses, optional
-        Where engines have been asked before; they are not ended.
+    processes : EngineProcesses
+        Where engines are asked; they are not ended.
 
     Raises
     ------
@@ -118,24 +117,17 @@ class InEngine:
     """
 
     def __init__(
-        self, entry: Entry, step: float, given: Mapping[str, Any],
-        processes: EngineProcesses | None = None,
-    ) -> None:  # fmt: skip
+        self, entry: Entry, step: float, given: Mapping[str, Any], processes: EngineProcesses
+    ) -> None:
         self.step = step
-        asked = processes or EngineProcesses()
-        self._owned = asked if processes is None else None
-        try:
-            self._peers = [
-                served(
-                    entry.package,
-                    Scenario("compass", robot, robot.reference_state(), step, friction=FRICTION),
-                    step, process=asked.of(entry.package, both), **given,
-                )
-                for both, robot in enumerate((compass(both=False), compass(both=True)))
-            ]  # fmt: skip
-        except InvalidRunError:
-            self.close()
-            raise
+        self._peers = [
+            served(
+                entry.package,
+                Scenario("compass", robot, robot.reference_state(), step, friction=FRICTION),
+                step, process=processes.of(entry.package, both), **given,
+            )
+            for both, robot in enumerate((compass(both=False), compass(both=True)))
+        ]  # fmt: skip
 
     def begin(self, both: bool, q: Floats, v: Floats) -> None:
         """Begin at a state."""
@@ -146,11 +138,6 @@ class InEngine:
     def more(self, steps: int) -> Floats:
         """Return position and velocity after each of the next steps."""
         return self._peer.record(steps)[:, :8]
-
-    def close(self) -> None:
-        """End both processes, if nobody else has them."""
-        if self._owned is not None:
-            self._owned.end()
 
 
 class ByOurs:

@@ -9,10 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from heelstrike.analysis.told_summary import plain
+from heelstrike.analysis.told_summary import PlainEntries, plain
 from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.compass import (
@@ -28,16 +27,17 @@ from heelstrike.experiments.engine_comparison.kept import KeptRows, asked_of_eng
 from heelstrike.experiments.engine_comparison.settings import (
     BEST,
     DEFAULTS,
-    best_settings,
+    has_best,
     settings_of,
 )
 from heelstrike.experiments.engine_comparison.tables import short
-from heelstrike.experiments.engines.packages import PACKAGES, compared, peers
+from heelstrike.experiments.engines.packages import peers, refuse_absent
 from heelstrike.experiments.engines.peer import InvalidRunError
-from heelstrike.experiments.engines.served import EngineProcesses
+from heelstrike.experiments.engines.served import EngineProcesses, lent
 from heelstrike.field_texts import dataclass
 from heelstrike.robot import State
 from heelstrike.sim import TimeStepping
+from heelstrike.view.terminal import bare_table
 
 STEPS = (1e-3, 2e-4)
 """Steps of the engines, in s."""
@@ -66,7 +66,7 @@ class CompassRow:
 
 
 @dataclass(frozen=True, eq=False)
-class CompassTable:
+class CompassTable(PlainEntries):
     """The compass gait in every engine."""
 
     strides: int
@@ -76,22 +76,8 @@ class CompassTable:
     rows: tuple[CompassRow, ...]
     """Engine by engine."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain numbers and texts."""
-        found: dict[str, Any] = plain(
-            {
-                "strides": self.strides,
-                "settings": self.settings,
-                "rows": [asdict(row) for row in self.rows],
-            }
-        )
-        return found
-
     def __rich__(self) -> Table:
-        table = Table(
-            title="compass gait on 3 degrees", title_justify="left", box=SIMPLE_HEAD,
-            show_edge=False,
-        )  # fmt: skip
+        table = bare_table("compass gait on 3 degrees")
         for heading in HEADINGS:
             table.add_column(heading)
         for row in self.to_dict()["rows"]:
@@ -197,12 +183,10 @@ def compare_compass(
     def made(name: str, entry: Entry, step: float, which: str) -> CompassRow:
         title = entry.title if which == settings else f"{entry.title}, {which}"
         row = CompassRow(name, title, step, None, "")
-        state = versions[entry.package]
-        if not compared({entry.package: state}):
-            return replace(row, reason=f"{PACKAGES[entry.package].title} is {state}")
         given = settings_of(name, entry, which)
         told = [name, step, begins, asked_of_engine(entry.package, given, versions)]
         try:
+            refuse_absent(entry.package, versions)
             found = kept.entries(
                 f"compass-{name}-{which}-{step:g}",
                 told,
@@ -220,7 +204,7 @@ def compare_compass(
                 own.append(made(name, entry, step, which))
             rows += own
             walks = any(row.walk is not None and not row.walk["ending"] for row in own)
-            if walks or not best_settings().get(name, {}).get("settings"):
+            if walks or not has_best(name):
                 break
     return CompassTable(STRIDES, settings, tuple(rows))
 
@@ -229,11 +213,8 @@ def _in_engine(
     entry: Entry, step: float, given: Mapping[str, Any], start: State,
     processes: EngineProcesses | None,
 ) -> dict[str, Any]:  # fmt: skip
-    mover = InEngine(entry, step, given, processes)
-    try:
-        return _told(compass_walk(mover, start))
-    finally:
-        mover.close()
+    with lent(processes) as own:
+        return _told(compass_walk(InEngine(entry, step, given, own), start))
 
 
 def _told(walk: CompassWalk) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from heelstrike.experiments.engine_comparison.entries import Entry
 from heelstrike.experiments.engine_comparison.walking import walk_in
 from heelstrike.experiments.engines.peer import flight
 from heelstrike.experiments.engines.scenario import Scenario
-from heelstrike.experiments.engines.served import EngineProcesses, ServedPeer, served
+from heelstrike.experiments.engines.served import EngineProcesses, ServedPeer, lent, served
 from heelstrike.experiments.laws import law_called
 from heelstrike.field_texts import dataclass
 from heelstrike.reader_process import ReaderProcess
@@ -91,18 +91,14 @@ def guard(
     ours = scenario.run(FLOW).position[-1]
     ends = []
     facts: dict[str, Any] = {}
-    own = processes or EngineProcesses()
-    process = own.of(entry.package)
-    try:
+    with lent(processes) as own:
+        process = own.of(entry.package)
         for step in FLIGHT_STEPS:
             settings = {**given, **entry.exact}
             peer = served(entry.package, scenario, step, process=process, **settings)
             ends.append(_end(peer))
             facts = peer.facts
         weight, sunk = _at_rest(entry, robot, given, process)
-    finally:
-        if processes is None:
-            own.end()
     errors = [float(np.max(np.abs(end - ours))) for end in ends]
     first, second, third = ends
     apart = [float(np.max(np.abs(a - b))) for a, b in ((first, second), (second, third))]

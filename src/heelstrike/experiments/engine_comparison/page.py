@@ -22,6 +22,7 @@ from heelstrike.experiments.engine_comparison.settings import (
     BEST,
     best_settings,
     found_for_others,
+    has_best,
 )
 from heelstrike.experiments.engine_comparison.tables import BY_ITSELF, WALKING, short
 from heelstrike.experiments.engine_comparison.whole import taken
@@ -246,11 +247,7 @@ def _creep(scenes: Mapping[str, Any], name: str) -> str:
 def _walks_at(found: Mapping[str, Any], name: str, which: str) -> str:
     rows = [r for r in found["rows"] if r["engine"] == name and r["settings"] == which]
     if not rows:
-        return (
-            "as defaults"
-            if which == "best" and not best_settings().get(name, {}).get("settings")
-            else "–"
-        )
+        return "as defaults" if which == BEST and not has_best(name) else "–"
     told = [f"{1e3 * r['step_s']:g}" for r in rows if r["figures"] and r["figures"]["walks"]]
     return ", ".join(told) or "none"
 

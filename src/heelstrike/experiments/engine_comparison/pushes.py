@@ -15,12 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from heelstrike.analysis import recovery
 from heelstrike.analysis.stability.largest import Largest, largest
-from heelstrike.analysis.told_summary import plain
+from heelstrike.analysis.told_summary import PlainEntries
 from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.comparison import CONTROL_PERIOD
@@ -31,7 +30,7 @@ from heelstrike.experiments.engine_comparison.walk import TRUTH, Start, Walk
 from heelstrike.experiments.engine_comparison.walking import seen
 from heelstrike.experiments.engines.packages import peers
 from heelstrike.experiments.engines.peer import InvalidRunError
-from heelstrike.experiments.engines.served import EngineProcesses
+from heelstrike.experiments.engines.served import EngineProcesses, lent
 from heelstrike.field_texts import dataclass
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot, State
@@ -40,6 +39,7 @@ from heelstrike.sim.controller.law import Law
 from heelstrike.sim.method import Method
 from heelstrike.sim.run import QUANTITIES
 from heelstrike.tolerances import SAME_ROW
+from heelstrike.view.terminal import bare_table
 
 STEP = 1e-3
 """Step of the engines (s)."""
@@ -84,7 +84,7 @@ class PushRow:
 
 
 @dataclass(frozen=True, eq=False)
-class PushTable:
+class PushTable(PlainEntries):
     """The largest pushes in every engine."""
 
     robot: str
@@ -92,20 +92,10 @@ class PushTable:
     rows: tuple[PushRow, ...]
     """Engine by engine."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain numbers and texts; a push that was never failed is None."""
-        found: dict[str, Any] = plain(
-            {"robot": self.robot, "rows": [asdict(row) for row in self.rows]}
-        )
-        return found
-
     def __rich__(self) -> Table:
-        table = Table(
-            title=f"{self.robot}: largest push that is stood, N s", title_justify="left",
-            box=SIMPLE_HEAD, show_edge=False,
-        )  # fmt: skip
-        for heading in ("engine", "settings", "direction", "largest push"):
-            table.add_column(heading)
+        title = f"{self.robot}: largest push that is stood, N s"
+        table = bare_table(title, ("engine", "settings", "direction"))
+        table.add_column("largest push")
         for row in self.rows:
             found = row.reason if row.largest is None else str(row.largest)
             if row.largest is not None and row.largest.failed == 0.0:
@@ -175,27 +165,26 @@ def compare_pushes(
         If there is no engine of a name, or a number is not positive.
     """
     entries = entries_called(engines)
-    own = processes or EngineProcesses()
-    walk = Walk(robot, controller, gait, UNDISTURBED, control_period, friction, 60.0, own)
-    versions = peers(load=False)
-    kept = KeptRows(
-        folder if walk.can_be_told else None, walk.entries(), ("walk", "walking", "pushes")
-    )
-    asked: list[tuple[str, str, str, Any, Callable[[float], bool]]] = []
-    for direction, sign in DIRECTIONS.items():
-        for name, method in OURS.items():
-            title = f"heelstrike, {'event-driven' if method is TRUTH else 'time stepping'}"
-            by_ours = partial(stands_by_ours, walk, method, sign)
-            asked.append((name, title, direction, [DEFAULTS], by_ours))
-        for name, entry in entries.items():
-            for which in settings:
-                given = settings_of(name, entry, which)
-                in_engine = partial(stands_in, walk, entry, given, versions, sign)
-                told = asked_of_engine(entry.package, given, versions)
-                asked.append((name, entry.title, direction, [which, told], in_engine))
-    say = progress or (lambda text, share: None)  # noqa: ARG005
-    rows = []
-    try:
+    with lent(processes) as own:
+        walk = Walk(robot, controller, gait, UNDISTURBED, control_period, friction, 60.0, own)
+        versions = peers(load=False)
+        kept = KeptRows(
+            folder if walk.can_be_told else None, walk.entries(), ("walk", "walking", "pushes")
+        )
+        asked: list[tuple[str, str, str, Any, Callable[[float], bool]]] = []
+        for direction, sign in DIRECTIONS.items():
+            for name, method in OURS.items():
+                title = f"heelstrike, {'event-driven' if method is TRUTH else 'time stepping'}"
+                by_ours = partial(stands_by_ours, walk, method, sign)
+                asked.append((name, title, direction, [DEFAULTS], by_ours))
+            for name, entry in entries.items():
+                for which in settings:
+                    given = settings_of(name, entry, which)
+                    in_engine = partial(stands_in, walk, entry, given, versions, sign)
+                    told = asked_of_engine(entry.package, given, versions)
+                    asked.append((name, entry.title, direction, [which, told], in_engine))
+        say = progress or (lambda text, share: None)  # noqa: ARG005
+        rows = []
         for k, (name, title, direction, told, recovers) in enumerate(asked):
             say(f"{title}, pushed {direction}", k / len(asked))
             search = {"most": most, "strides": strides, "halvings": halvings}
@@ -211,9 +200,6 @@ def compare_pushes(
             if found["failed"] is None:
                 found["failed"] = math.inf
             rows.append(PushRow(name, title, told[0], direction, Largest(**found), ""))
-    finally:
-        if processes is None:
-            own.end()
     return PushTable(robot.name, tuple(rows))
 
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Group
 from rich.table import Table
 
-from heelstrike.analysis.told_summary import plain
+from heelstrike.analysis.told_summary import PlainEntries
 from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.engine_comparison.entries import Entry, entries_called
@@ -26,12 +24,13 @@ from heelstrike.experiments.engine_comparison.scenes import (
 )
 from heelstrike.experiments.engine_comparison.settings import DEFAULTS, settings_of
 from heelstrike.experiments.engine_comparison.tables import short
-from heelstrike.experiments.engines.packages import PACKAGES, compared, peers
+from heelstrike.experiments.engines.packages import peers, refuse_absent
 from heelstrike.experiments.engines.peer import InvalidRunError
-from heelstrike.experiments.engines.served import PATIENCE, EngineProcesses
+from heelstrike.experiments.engines.served import PATIENCE, EngineProcesses, lent
 from heelstrike.field_texts import dataclass
 from heelstrike.sim import Compliant, EventDriven, TimeStepping
 from heelstrike.sim.method import Method
+from heelstrike.view.terminal import bare_table
 
 MODULES = ("scenes",)
 """Modules of this room that make errors."""
@@ -91,7 +90,7 @@ class StepRow:
 
 
 @dataclass(frozen=True, eq=False)
-class SceneTable:
+class SceneTable(PlainEntries):
     """The scenes in every engine."""
 
     scenes: tuple[tuple[str, float, str, str], ...]
@@ -105,29 +104,11 @@ class SceneTable:
     at_steps: tuple[StepRow, ...] = ()
     """Errors and computing times of `AT_STEPS`, engine by engine."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain numbers and texts."""
-        found: dict[str, Any] = plain(
-            {
-                "scenes": [list(each) for each in self.scenes],
-                "settings": self.settings,
-                "step_s": self.step_s,
-                "rows": [asdict(row) for row in self.rows],
-                "at_steps": [asdict(row) for row in self.at_steps],
-            }
-        )
-        return found
-
     def __rich__(self) -> Group:
         parts: list[Table | str] = []
         for name, exact, unit, words in self.scenes:
             value = f"{exact:.6g} {unit}".rstrip()
-            table = Table(
-                title=f"{name}: {value}, {words}", title_justify="left",
-                box=SIMPLE_HEAD, show_edge=False,
-            )  # fmt: skip
-            table.add_column("engine")
-            table.add_column(f"error {unit}", justify="right")
+            table = bare_table(f"{name}: {value}, {words}", ("engine",), (f"error {unit}",))
             for row in self.rows:
                 if row.scene == name:
                     error = row.reason if row.error is None else short(row.error)
@@ -199,11 +180,10 @@ def compare_scenes(
     entries = entries_called(engines)
     versions = peers(load=False)
     everything = scenes()
-    own = processes or EngineProcesses()
-    asked = _Engines(folder, settings, versions, own, patience)
-    rows, at_steps = [], []
-    say = progress or (lambda text, share: None)  # noqa: ARG005
-    try:
+    with lent(processes) as own:
+        asked = _Engines(folder, settings, versions, own, patience)
+        rows, at_steps = [], []
+        say = progress or (lambda text, share: None)  # noqa: ARG005
         for k, scene in enumerate(everything):
             for name, method in OURS.items():
                 error, _ = our_scene_error(scene, method)
@@ -232,9 +212,6 @@ def compare_scenes(
                     else:
                         row = StepRow(shows, entry.title, each, abs(found), seconds)
                     at_steps.append(row)
-    finally:
-        if processes is None:
-            own.end()
     told = tuple((s.name, s.exact, s.unit, s.source) for s in everything)
     return SceneTable(told, settings, step, tuple(rows), tuple(at_steps))
 
@@ -293,7 +270,5 @@ class _Engines:
 
     def _given(self, name: str, entry: Entry) -> dict[str, Any]:
         """Return the settings of an engine that is there."""
-        state = self._versions[entry.package]
-        if not compared({entry.package: state}):
-            raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
+        refuse_absent(entry.package, self._versions)
         return settings_of(name, entry, self._settings)

@@ -26,6 +26,11 @@ def best_settings() -> dict[str, Any]:
     return found
 
 
+def has_best(name: str) -> bool:
+    """Whether the search found settings for a row that are better than its defaults."""
+    return bool(best_settings().get(name, {}).get("settings"))
+
+
 def settings_of(name: str, entry: Entry, which: str) -> dict[str, Any]:
     """Return settings of a row's adapter.
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Group
 from rich.table import Table
 
 from heelstrike.experiments.engine_comparison.entries import ENTRIES
 from heelstrike.experiments.engine_comparison.settings import BEST, found_for_others
+from heelstrike.view.terminal import bare_table
 
 if TYPE_CHECKING:
     from heelstrike.experiments.engine_comparison.comparison import EngineComparison
@@ -70,15 +70,8 @@ def walk_table(comparison: EngineComparison) -> Group:
 def _table(
     comparison: EngineComparison, title: str, columns: Mapping[str, tuple[str, float]]
 ) -> Table:
-    table = Table(
-        title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0)
-    )
-    table.add_column("engine", no_wrap=True)
-    table.add_column("set", no_wrap=True)
-    table.add_column("h ms", justify="right", no_wrap=True)
-    table.add_column("walks", no_wrap=True)
-    for heading, _ in columns.values():
-        table.add_column(heading, justify="right")
+    headings = (heading for heading, _ in columns.values())
+    table = bare_table(title, ("engine", "set", "h ms", "walks"), headings)
     for row in comparison.rows:
         if row.figures is None:
             continue

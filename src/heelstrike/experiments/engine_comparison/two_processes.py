@@ -51,6 +51,18 @@ def begun(part: Part, case: Case) -> Beginning:
     return beginning(case.robot, case.gait, case.ground, law_called(part.law))
 
 
+def walk_of(case: Case, start: Beginning) -> dict[str, Any]:
+    """Return the robot, controller, gait and friction of a walk, as comparisons ask for them."""
+    assert start.controller is not None
+    assert case.followed is not None
+    return {
+        "robot": case.robot,
+        "controller": start.controller,
+        "gait": case.followed,
+        "friction": case.lowest_friction,
+    }
+
+
 def compare_part(
     work: Work, part: Part, case: Case, processes: EngineProcesses, progress: Progress
 ) -> EngineComparison:
@@ -74,19 +86,13 @@ def compare_part(
     EngineComparison
         A row each engine, settings and step.
     """
-    start = begun(part, case)
-    assert start.controller is not None
-    assert case.followed is not None
     return compare_engines(
-        case.robot,
-        start.controller,
-        case.followed,
+        **walk_of(case, begun(part, case)),
         engines=work.engines,
         steps=part.steps,
         step_sizes=part.step_sizes + (part.finer if work.fine else ()),
         settings=part.settings,
         control_period=part.control_period,
-        friction=case.lowest_friction,
         folder=work.folder,
         longest=LONGEST if work.fine else None,
         processes=processes,
@@ -148,14 +154,5 @@ def _fill(work: Work, enough: Event) -> None:
 
 
 def _push(part: Part, case: Case, shared: Any) -> None:
-    start = begun(part, case)
-    assert start.controller is not None
-    assert case.followed is not None
-    compare_pushes(
-        case.robot,
-        start.controller,
-        case.followed,
-        friction=case.lowest_friction,
-        control_period=part.control_period,
-        **shared,
-    )
+    walk = walk_of(case, begun(part, case))
+    compare_pushes(**walk, control_period=part.control_period, **shared)

@@ -12,8 +12,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.experiments.engine_comparison.entries import Entry
 from heelstrike.experiments.engine_comparison.figures import WalkFigures, walk_figures
 from heelstrike.experiments.engine_comparison.walking import asked_of, walk_in
-from heelstrike.experiments.engines.packages import PACKAGES, compared
-from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.experiments.engines.packages import refuse_absent
 from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.experiments.engines.served import EngineProcesses, served
 from heelstrike.experiments.walk import LAST_STEP
@@ -197,9 +196,7 @@ class Walk:
         InvalidRunError
             If the engine is missing, ends, hangs or refuses.
         """
-        state = versions[entry.package]
-        if not compared({entry.package: state}):
-            raise InvalidRunError(f"{PACKAGES[entry.package].title} is {state}")
+        refuse_absent(entry.package, versions)
         scenario, begins = self.scenario, 0.0
         if start is not None:
             scenario, begins = replace(scenario, state=start.state), start.time

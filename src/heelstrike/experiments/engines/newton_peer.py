@@ -146,14 +146,8 @@ class NewtonPeer(Peer):
 
     def simulate(self, steps: int) -> None:
         """Simulate some steps, each with a call from Python."""
-        feedback = self.scenario.feedback
-        joints = self.scenario.robot.model.actuator_joint
         for k in range(steps):
-            if feedback is not None:
-                row = self.commands[min(self.done + k, len(self.commands) - 1)]
-                q, v = self.coordinates()
-                law = feedback.parameters
-                self.hold(row - law.kp * q[joints] - law.kd * v[joints])
+            self.hold_by_law(k)
             self._motors[:] = self._force - self._damping * self._rows[self._now][1]
             wp.capture_launch(self._graphs[self._now])
             self._now = 1 - self._now

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from types import ModuleType
-from typing import TYPE_CHECKING
 
+from heelstrike.experiments.engines.peer import Engine, InvalidRunError
 from heelstrike.field_texts import dataclass
-
-if TYPE_CHECKING:
-    from heelstrike.experiments.engines.peer import Engine
 
 
 @dataclass(frozen=True)
@@ -126,6 +123,25 @@ def compared(found: dict[str, str]) -> list[str]:
         for name, state in found.items()
         if PACKAGES[name].adapter and not state.startswith(NOT_INSTALLED) and ", but " not in state
     ]
+
+
+def refuse_absent(name: str, versions: Mapping[str, str]) -> None:
+    """Refuse an engine that cannot be compared here.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    versions : mapping of str to str
+        What :func:`peers` says of the engines.
+
+    Raises
+    ------
+    InvalidRunError
+        That says why.
+    """
+    if not compared({name: versions[name]}):
+        raise InvalidRunError(f"{PACKAGES[name].title} is {versions[name]}")
 
 
 def raced(found: dict[str, str]) -> list[str]:

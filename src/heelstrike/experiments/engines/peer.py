@@ -187,6 +187,22 @@ class Peer(ABC):
         self.simulate(steps)
         self.done += steps
 
+    def hold_by_law(self, ahead: int) -> None:
+        """Hold the torques of the scenario's law of control, in an engine that has none itself.
+
+        Parameters
+        ----------
+        ahead : int
+            Steps that `simulate` has taken already.
+        """
+        feedback = self.scenario.feedback
+        if feedback is None:
+            return
+        row = self.commands[min(self.done + ahead, len(self.commands) - 1)]
+        joints = self.scenario.robot.model.actuator_joint
+        law, (q, v) = feedback.parameters, self.coordinates()
+        self.hold(row - law.kp * q[joints] - law.kd * v[joints])
+
     def state(self) -> State:
         """Where it is now."""
         q, v = self.coordinates()

@@ -140,15 +140,9 @@ class PhysxPeer(Peer):
 
     def simulate(self, steps: int) -> None:
         """Simulate some steps, each with a call from Python."""
-        feedback = self.scenario.feedback
-        joints = self.scenario.robot.model.actuator_joint
         damped = bool(np.any(self._damping))
         for k in range(steps):
-            if feedback is not None:
-                row = self.commands[min(self.done + k, len(self.commands) - 1)]
-                q, v = self.coordinates()
-                law = feedback.parameters
-                self.hold(row - law.kp * q[joints] - law.kd * v[joints])
+            self.hold_by_law(k)
             force = self._force
             if damped:
                 force = force.copy()

@@ -93,19 +93,13 @@ class PinocchioContactPeer(Peer):
 
     def hold(self, torque: Floats) -> None:
         """Apply torques from now on."""
-        self._torque = np.array(torque, dtype=np.float64)
+        model = self.scenario.robot.model
+        self._torque = np.clip(torque, model.torque_lower, model.torque_upper)
 
     def simulate(self, steps: int) -> None:
         """Simulate some steps in Python."""
-        feedback = self.scenario.feedback
-        robot = self.scenario.robot
-        joints = robot.model.actuator_joint
         for k in range(steps):
-            if feedback is not None:
-                row = self.commands[min(self.done + k, len(self.commands) - 1)]
-                law = feedback.parameters
-                wanted = row - law.kp * self._q[joints] - law.kd * self._v[joints]
-                self._torque = np.clip(wanted, robot.model.torque_lower, robot.model.torque_upper)
+            self.hold_by_law(k)
             self._take()
 
     def _take(self) -> None:

@@ -11,6 +11,8 @@ import json
 import shutil
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, cast
@@ -102,16 +104,11 @@ class ServedPeer(Peer):
 
     def simulate(self, steps: int) -> None:
         """Simulate some steps in one exchange; each with its own under a law of control."""
-        feedback = self.scenario.feedback
-        if feedback is None:
+        if self.scenario.feedback is None:
             self._go(steps)
             return
-        joints = self.scenario.robot.model.actuator_joint
         for k in range(steps):
-            row = self.commands[min(self.done + k, len(self.commands) - 1)]
-            q, v = self._now
-            law = feedback.parameters
-            self.hold(row - law.kp * q[joints] - law.kd * v[joints])
+            self.hold_by_law(k)
             self._go(1)
 
     def hold(self, torque: Floats) -> None:
@@ -345,6 +342,25 @@ class EngineProcesses:
         """End them all; who asks again starts others."""
         for process in self._started.values():
             process.end()
+
+
+@contextmanager
+def lent(processes: EngineProcesses | None) -> Iterator[EngineProcesses]:
+    """Lend the processes that were given, or others that are ended afterwards.
+
+    Parameters
+    ----------
+    processes : EngineProcesses or None
+        Where engines have been asked before.
+    """
+    if processes is not None:
+        yield processes
+        return
+    own = EngineProcesses()
+    try:
+        yield own
+    finally:
+        own.end()
 
 
 def served(name: str, scenario: Scenario, step: float, **settings: Any) -> ServedPeer:

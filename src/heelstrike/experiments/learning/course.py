@@ -69,6 +69,9 @@ class Course(ABC):
         What `names` says.
     """
 
+    _skipped: int
+    """Positions that are not observed."""
+
     def __init__(
         self, task: Task, batch: Batch, observed: int, names: tuple[str, ...], gear: Floats,
         scale: Floats | None = None,
@@ -126,7 +129,6 @@ class Course(ABC):
             In a person's words.
         """
 
-    @abstractmethod
     def network(
         self, layers: tuple[Layer, ...], mean: Floats, deviation: Floats, **more: Any
     ) -> Network:
@@ -146,6 +148,11 @@ class Course(ABC):
         Network
             The policy.
         """
+        task = self.task
+        return Network(
+            layers, task.decision_period, self.gear, mean, deviation, skipped=self._skipped,
+            velocity_limit=task.velocity_limit, robot=self.robot.name, **more,
+        )  # fmt: skip
 
     @abstractmethod
     def _assess(self, begun: Integers | None) -> None:

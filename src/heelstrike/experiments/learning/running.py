@@ -10,7 +10,6 @@ from numba import types
 
 from heelstrike.compiler.compilation import loop_for
 from heelstrike.contact.ground import Ground
-from heelstrike.control.policy.network import Layer, Network
 from heelstrike.experiments.learning.course import Course
 from heelstrike.experiments.learning.tasks import RunningTask
 from heelstrike.robot.model import Floats, Integers
@@ -115,22 +114,6 @@ class RunningCourse(Course):
                 if not low < value < high:
                     return f"{name} is {value:.3g}{unit}, out of {low:g} to {high:g}"
         return "it is healthy"
-
-    def network(
-        self, layers: tuple[Layer, ...], mean: Floats, deviation: Floats, **more: Any
-    ) -> Network:
-        """See :meth:`Course.network`."""
-        return Network(
-            layers,
-            self.task.decision_period,
-            self.gear,
-            mean,
-            deviation,
-            skipped=self._skipped,
-            velocity_limit=self.task.velocity_limit,
-            robot=self.robot.name,
-            **more,
-        )
 
     def _draw(self, lane: int) -> None:
         """Draw the noise of the next episodes of a lane."""

@@ -65,6 +65,7 @@ class WalkingCourse(Course):
         if step is None and task.randomise.delay is not None:
             raise SimulationError("a delay is a number of steps: use a method with a fixed step")
         self._step = step or task.step
+        self._skipped = SKIPPED
         size = robot.nq + robot.nv - SKIPPED + OBSERVED
         super().__init__(task, batch, size, TERMS, gear, np.ones(nu))
         self._speed, self._phase = batch.command[:, nu], batch.command[:, nu + 1]
@@ -183,12 +184,7 @@ class WalkingCourse(Course):
         self, layers: tuple[Layer, ...], mean: Floats, deviation: Floats, **more: Any
     ) -> Network:
         """See :meth:`Course.network`."""
-        task = self.task
-        return Network(
-            layers, task.decision_period, self.gear, mean, deviation, skipped=SKIPPED,
-            velocity_limit=task.velocity_limit, robot=self.robot.name,
-            reference=self.motion, **more,
-        )  # fmt: skip
+        return super().network(layers, mean, deviation, reference=self.motion, **more)
 
     def _assess(self, begun: Integers | None) -> None:
         """See :meth:`Course._assess`."""

@@ -110,16 +110,14 @@ def contact_scales(file: MujocoFile) -> dict[str, dict[str, float]]:
     """
     geoms = {file.given_name("geom", geom) for geom in range(file.model.ngeom)} - {""}
     found: dict[str, dict[str, float]] = {}
-    for numeric in range(file.model.nnumeric):
-        name, _, geom = file.given_name("numeric", numeric).partition(":")
-        if name not in SCALES:
-            continue
-        value = float(file.model.numeric_data[file.model.numeric_adr[numeric]])
-        if geom not in geoms:
-            raise file.error(f"{name}:{geom} in <custom>: there is no geom of that name.")
-        if not NUMBERS[name].least <= value <= NUMBERS[name].most:
-            raise file.error(f"{name}:{geom} in <custom> must be {bounds(name)}, got {value:g}.")
-        found.setdefault(geom, {})[name] = value
+    for name in SCALES:
+        for geom, (value, *_) in file.custom(name):
+            told = f"{name}:{geom} in <custom>"
+            if geom not in geoms:
+                raise file.error(f"{told}: there is no geom of that name.")
+            if not NUMBERS[name].least <= value <= NUMBERS[name].most:
+                raise file.error(f"{told} must be {bounds(name)}, got {value:g}.")
+            found.setdefault(geom, {})[name] = float(value)
     return found
 
 

@@ -8,6 +8,7 @@ about the normal put into the compiled robot; of a robot in space, all of it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -94,27 +95,22 @@ def put_back(
         Of tensors that say something about other axes which no body can have.
     """
     impossible = []
-    for body, tensor in taken:
-        name, place = body.name or f"body {body.id}", body.id
+    for name, place, tensor, share in _stand_ins(model, taken, least):
         normal = pose.ximat[place].reshape(3, 3)[1]
         moment = float(normal @ tensor @ normal)
-        if moment < -MOMENT_MARGIN * _size(tensor) - MASSLESS:
+        if _is_negative(moment, tensor):
             raise RobotError(
                 f"{label}: body {name!r} has the moment of inertia {moment:.6g} kg m² about the "
                 "normal of the plane in which the robot moves. It must not be negative."
             )
-        # What the parser made of the stand-in: a file may ask for another mass of the whole, and
-        # what is less than the least was lifted to it.
-        share = float(model.body_inertia[place, 0]) / max(_size(tensor), least)
         model.body_inertia[place] = max(moment, least) * share
         if not is_possible(tensor) and not _is_planar(tensor, normal, moment):
             impossible.append(name)
-    if impossible:
-        warn(
-            f"{label}: no body has the inertia that the file gives {', '.join(impossible)}: "
-            "moments are not negative, and none is more than the sum of the other two. Only the "
-            "moments about the normal of the plane act here; they are taken as they are."
-        )
+    _tell_of_impossible(
+        impossible,
+        label,
+        "Only the moments about the normal of the plane act here; they are taken as they are.",
+    )
 
 
 def put_back_whole(model: Any, taken: list[tuple[Any, Floats]], least: float, label: str) -> None:
@@ -144,10 +140,9 @@ def put_back_whole(model: Any, taken: list[tuple[Any, Floats]], least: float, la
     import mujoco
 
     impossible = []
-    for body, tensor in taken:
-        name, place = body.name or f"body {body.id}", body.id
+    for name, place, tensor, share in _stand_ins(model, taken, least):
         moments, axes = np.linalg.eigh(tensor)
-        if moments[0] < -MOMENT_MARGIN * _size(tensor) - MASSLESS:
+        if _is_negative(moments[0], tensor):
             raise RobotError(
                 f"{label}: body {name!r} has the principal moment of inertia {moments[0]:.6g} "
                 "kg m². It must not be negative."
@@ -157,17 +152,35 @@ def put_back_whole(model: Any, taken: list[tuple[Any, Floats]], least: float, la
         own, turned = np.zeros(4), np.zeros(4)
         mujoco.mju_mat2Quat(own, np.ascontiguousarray(axes).ravel())
         mujoco.mju_mulQuat(turned, np.array(model.body_iquat[place]), own)
-        share = float(model.body_inertia[place, 0]) / max(_size(tensor), least)
         model.body_iquat[place] = turned
         model.body_sameframe[place] = 0  # else its axes count as those of the body
         model.body_inertia[place] = np.maximum(moments, least) * share
         if not is_possible(tensor):
             impossible.append(name)
-    if impossible:
+    _tell_of_impossible(impossible, label, "They are taken as they are.")
+
+
+def _stand_ins(
+    model: Any, taken: list[tuple[Any, Floats]], least: float
+) -> Iterator[tuple[str, int, Floats, float]]:
+    """Yield name, number and tensor of bodies, and by how much the parser scaled its stand-in.
+
+    A file may ask for another mass of the whole, and what is less than the least was lifted to it.
+    """
+    for body, tensor in taken:
+        share = float(model.body_inertia[body.id, 0]) / max(_size(tensor), least)
+        yield body.name or f"body {body.id}", body.id, tensor, share
+
+
+def _is_negative(moment: float, tensor: Floats) -> bool:
+    return moment < -MOMENT_MARGIN * _size(tensor) - MASSLESS
+
+
+def _tell_of_impossible(names: list[str], label: str, taken_as: str) -> None:
+    if names:
         warn(
-            f"{label}: no body has the inertia that the file gives {', '.join(impossible)}: "
-            "moments are not negative, and none is more than the sum of the other two. They are "
-            "taken as they are."
+            f"{label}: no body has the inertia that the file gives {', '.join(names)}: moments are "
+            f"not negative, and none is more than the sum of the other two. {taken_as}"
         )
 
 

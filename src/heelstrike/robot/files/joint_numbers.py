@@ -11,8 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from heelstrike.robot.assembly import LARGEST_NUMBER
 from heelstrike.robot.files.mujoco_file import MujocoFile
-from heelstrike.robot.model import PROPERTIES, Floats, Number
+from heelstrike.robot.model import PROPERTIES, Floats
 from heelstrike.robot.warning import warn
 
 ATTRIBUTES = {
@@ -31,9 +32,6 @@ CUSTOM = [
     if number.shape in (("nq",), ("nv",)) and name not in ATTRIBUTES
 ]
 """Numbers of joints that MJCF has no word for."""
-
-LARGEST_NUMBER = 1e10
-"""Files that must give a number but mean none give one like this."""
 
 
 def read_joint_numbers(file: MujocoFile) -> dict[str, Floats]:
@@ -63,42 +61,67 @@ def read_joint_numbers(file: MujocoFile) -> dict[str, Floats]:
 
 
 def _custom(file: MujocoFile, name: str) -> Floats:
-    names = [one.name for one in file.coordinates]
-    index = {joint: place for place, joint in reversed(list(enumerate(names)))}
+    places = {one.name: [i] for i, one in reversed(list(enumerate(file.coordinates)))}
+    return custom_numbers(file, name, len(file.coordinates), places)
+
+
+def custom_numbers(file: MujocoFile, name: str, count: int, places: dict[str, list[int]]) -> Floats:
+    """Return a number that MJCF has no word for, of so many velocities.
+
+    Parameters
+    ----------
+    file : MujocoFile
+        The file.
+    name : str
+        What the number is called.
+    count : int
+        How many velocities there are.
+    places : dict of str to list of int
+        Velocities of the joints that move, by name.
+
+    Raises
+    ------
+    RobotError
+        If what the file tells is no number, or one too small.
+
+    Warns
+    -----
+    RobotWarning
+        Of numbers of joints that the file does not have.
+    """
     known = {file.given_name("joint", joint) for joint in range(file.model.njnt)}
     number = PROPERTIES[name]
-    values = np.full(len(names), number.default, dtype=np.float64)
-    for joint, value in written_numbers(file, name):
-        if joint not in index:
+    values = np.full(count, number.default, dtype=np.float64)
+    for joint, value in _written_numbers(file, name):
+        if joint not in places:
             if not file.is_urdf and joint not in known:  # fixed joints may have limits too
                 warn(f"{file.source}: {name}:{joint}: there is no joint of that name.")
             continue
-        values[index[joint]] = told_number(file, name, number, joint, value)
+        if not value >= number.least:
+            words = name.replace("_", " ")
+            raise file.error(
+                f"the {words} of joint {joint!r} is {value}, not a number >= {number.least:g}."
+            )
+        # Exporters write 0 for the limit that nobody told them.
+        none = number.infinite and not 0.0 < value < LARGEST_NUMBER
+        values[places[joint]] = math.inf if none else value
     return values
 
 
-def told_number(file: MujocoFile, name: str, number: Number, joint: str, value: float) -> float:
-    """Return a number of a joint as its file means it, or refuse what it cannot be."""
-    if not value >= number.least:
-        words = name.replace("_", " ")
-        raise file.error(
-            f"the {words} of joint {joint!r} is {value}, not a number >= {number.least:g}."
-        )
-    # Exporters write 0 for the limit that nobody told them.
-    none = number.infinite and not 0.0 < value < LARGEST_NUMBER
-    return math.inf if none else value
+def limits(values: Floats) -> Floats:
+    """Limits, of which a huge one is none: formats want numbers for both sides of a range."""
+    return np.where(np.abs(values) >= LARGEST_NUMBER, np.copysign(np.inf, values), values)
 
 
-def written_numbers(file: MujocoFile, name: str) -> Iterator[tuple[str, float]]:
+def _written_numbers(file: MujocoFile, name: str) -> Iterator[tuple[str, float]]:
     """Yield the joints of which a file says a number by custom data, and that number."""
     if file.is_urdf and name == "speed_limit":
         for joint in file.xml.iterfind("joint"):
             for limit in joint.iterfind("limit"):
                 yield joint.get("name", ""), _number(limit.get("velocity", "0"))
-    for numeric in range(file.model.nnumeric):
-        held, _, joint_name = file.given_name("numeric", numeric).partition(":")
-        if held == name and joint_name:
-            yield joint_name, float(file.model.numeric_data[file.model.numeric_adr[numeric]])
+    for joint_name, (value, *_) in file.custom(name):
+        if joint_name:
+            yield joint_name, float(value)
 
 
 def _number(text: str) -> float:

@@ -222,12 +222,8 @@ def _latches(file: MujocoFile, links: Links) -> Iterator[tuple[int, int, int]]:
         If there is no such joint or link, or no limit at that end.
     """
     place = {one.name: i for i, one in enumerate(file.coordinates)}
-    for numeric in range(file.model.nnumeric):
-        held, _, told = file.given_name("numeric", numeric).partition(":")
-        if held != LATCH:
-            continue
+    for told, (side, *_) in file.custom(LATCH):
         joint, _, release = told.partition(":")
-        side = float(file.model.numeric_data[file.model.numeric_adr[numeric]])
         bodies = [b for b in range(file.model.nbody) if release and file.name("body", b) == release]
         if joint not in place or side not in (1.0, -1.0) or (release and not bodies):
             raise file.error(
@@ -249,17 +245,13 @@ def _brakes(file: MujocoFile) -> Iterator[tuple[int, float]]:
         If there is no such joint, or the brake would hold nothing.
     """
     place = {one.name: i for i, one in enumerate(file.coordinates)}
-    for numeric in range(file.model.nnumeric):
-        held, _, joint = file.given_name("numeric", numeric).partition(":")
-        if held != BRAKE:
-            continue
+    for joint, (_, *told) in file.custom(BRAKE):
         if joint not in place:
             raise file.error(
                 f"the brake {joint!r} in <custom> is called brake:JOINT after a joint: there is no "
                 "such joint."
             )
-        first, size = file.model.numeric_adr[numeric], file.model.numeric_size[numeric]
-        limit = float(file.model.numeric_data[first + 1]) if size > 1 else math.inf
+        limit = float(told[0]) if told else math.inf
         if not limit > 0.0:
             raise file.error(
                 f"the brake {joint!r} in <custom> needs a positive limit: its data are 1 and, if "

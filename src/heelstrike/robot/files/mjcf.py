@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from heelstrike.robot.assembly import LARGEST_NUMBER, assembled
+from heelstrike.robot.assembly import assembled
 from heelstrike.robot.contact_points import of_model
 from heelstrike.robot.files.actuators import read_actuators
 from heelstrike.robot.files.contact_points import read_contact_points
-from heelstrike.robot.files.joint_numbers import read_joint_numbers
+from heelstrike.robot.files.joint_numbers import limits, read_joint_numbers
 from heelstrike.robot.files.links import read_links, read_loops
 from heelstrike.robot.files.mujoco_file import MujocoFile, parse
 from heelstrike.robot.files.options import AVERAGE, Options
@@ -67,8 +67,8 @@ def _robot(file: MujocoFile, name: str, options: Options) -> Robot:
         gravity=_gravity(file),
         **of_model(points),
         actuator_joint=actuators.joint,
-        torque_lower=_limits(actuators.lower),
-        torque_upper=_limits(actuators.upper),
+        torque_lower=limits(actuators.lower),
+        torque_upper=limits(actuators.upper),
         **read_loops(file, links),
         pivot=int(hinges[0]) if len(hinges) else 0,
     )
@@ -96,14 +96,9 @@ def _ranges(file: MujocoFile) -> dict[str, Floats]:
     high = file.of_joints(np.where(limited, high, np.inf), np.inf)
     other = np.array([one.sense < 0.0 for one in file.coordinates])
     return {
-        "lower": _limits(np.where(other, -high, low)),
-        "upper": _limits(np.where(other, -low, high)),
+        "lower": limits(np.where(other, -high, low)),
+        "upper": limits(np.where(other, -low, high)),
     }
-
-
-def _limits(values: Floats) -> Floats:
-    """Limits, of which a huge one is none: formats want numbers for both sides of a range."""
-    return np.where(np.abs(values) >= LARGEST_NUMBER, np.copysign(np.inf, values), values)
 
 
 def _gravity(file: MujocoFile) -> Floats:

@@ -93,6 +93,15 @@ class MujocoFile:
         """Name of a body, joint, geom, actuator …, or its kind and number if it has none."""
         return self.given_name(kind, index) or f"{kind} {index}"
 
+    def custom(self, kind: str) -> Iterator[tuple[str, Floats]]:
+        """Yield custom data called ``KIND:REST``: that rest, and their numbers."""
+        for one in range(self.model.nnumeric):
+            held, _, rest = self.given_name("numeric", one).partition(":")
+            if held == kind:
+                first = self.model.numeric_adr[one]
+                size = self.model.numeric_size[one]
+                yield rest, np.array(self.model.numeric_data[first : first + size])
+
     def error(self, message: str) -> RobotError:
         """Return an error that names the file."""
         return RobotError(f"{self.source}: {message}")

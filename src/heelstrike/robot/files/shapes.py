@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from itertools import product
 from typing import TypeVar
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.model import Integers
-from heelstrike.robot.shapes.convex import Floats, convex_hull, with_fewer_corners
+from heelstrike.robot.shapes.convex import Floats, circle, convex_hull, with_fewer_corners
 from heelstrike.robot.shapes.outlines import Outline, without_hidden
 from heelstrike.robot.warning import warn
 
@@ -30,8 +31,11 @@ Shape = TypeVar("Shape")
 FARTHEST = 1e6
 """Metres within which a shape is drawn."""
 
-TURN = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
-CIRCLE = np.column_stack((np.cos(TURN), np.sin(TURN)))
+AROUND = 24
+"""Corners round what is round, in the plane."""
+
+BOX_CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
+"""(8, 3) Corners of a box whose edges are two metres long."""
 
 
 def read_outlines(file: MujocoFile, links: Links) -> tuple[Outline, ...]:
@@ -103,23 +107,40 @@ def _shape(file: MujocoFile, geom: int, origin: Floats) -> tuple[Floats, float] 
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     turn = pose.geom_xmat[geom].reshape(3, 3)[::2]  # its axes in the plane, in columns
     middle = pose.geom_xpos[geom, ::2] - origin
-    if kind == SPHERE:
-        return middle[None], float(size[0])
-    if kind == CAPSULE:
-        return convex_hull(middle + np.outer((-size[1], size[1]), turn[:, 2])), float(size[0])
     if kind == ELLIPSOID:
         axes = np.linalg.cholesky((turn * size**2) @ turn.T)  # of the ellipse that it casts
-        return middle + CIRCLE @ axes.T, 0.0
+        return middle + circle(AROUND) @ axes.T, 0.0
+    corners = geom_corners(file, geom, AROUND)
+    if not len(corners):
+        return None
+    hull = convex_hull(middle + corners @ turn.T)
+    return with_fewer_corners(hull) if kind == MESH else hull, ball_radius(file, geom)
+
+
+def geom_corners(file: MujocoFile, geom: int, around: int) -> Floats:
+    """Corners (k, 3) of the hull that a geom is, in its own frame; none where there are none.
+
+    A sphere has one and a capsule has two, which balls of :func:`ball_radius` cover; a cylinder has
+    `around` of them round each end.
+    """
+    kind, size = int(file.model.geom_type[geom]), np.asarray(file.model.geom_size[geom])
+    ends = np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]])
+    if kind == SPHERE:
+        return np.zeros((1, 3))
+    if kind == CAPSULE:
+        return ends
     if kind == CYLINDER:
-        rim = size[0] * CIRCLE @ turn[:, :2].T
-        ends = np.outer((-size[1], size[1]), turn[:, 2])
-        return convex_hull(middle + (rim + ends[:, None]).reshape(-1, 2)), 0.0
+        rim = size[0] * np.column_stack((circle(around), np.zeros(around)))
+        return (ends[:, None] + rim).reshape(-1, 3)
     if kind == BOX:
-        signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
-        return convex_hull(middle + (signs * size) @ turn.T), 0.0
-    if kind == MESH:
-        return with_fewer_corners(convex_hull(middle + mesh_corners(file, geom) @ turn.T)), 0.0
-    return None
+        return size * BOX_CORNERS
+    return mesh_corners(file, geom) if kind == MESH else np.zeros((0, 3))
+
+
+def ball_radius(file: MujocoFile, geom: int) -> float:
+    """Radius of the balls about the corners of a geom, 0 of one that has none."""
+    round_ = file.model.geom_type[geom] in (SPHERE, CAPSULE)
+    return float(file.model.geom_size[geom, 0]) if round_ else 0.0
 
 
 def mesh_corners(file: MujocoFile, geom: int) -> Floats:
@@ -138,23 +159,17 @@ def _saved(file: MujocoFile) -> tuple[Outline, ...] | None:
     RobotError
         If one has numbers that are impossible.
     """
-    model = file.model
     link = {one.name: index for index, one in enumerate(file.coordinates)}
-    count = None
     found = []
-    for numeric in range(model.nnumeric):
-        held, _, name = file.given_name("numeric", numeric).partition(":")
+    for name, data in file.custom(PREFIX):
         joint = name.partition(":")[2]
-        first, size = int(model.numeric_adr[numeric]), int(model.numeric_size[numeric])
-        data = np.array(model.numeric_data[first : first + size])
-        if held == COUNT:
-            count = data[0]
-        elif held == PREFIX and joint in link and size % 2 and size > 1:
-            if not (np.all(np.isfinite(data)) and data[0] >= 0.0):
-                raise file.error(
-                    f"the {PREFIX}:{name} must be a radius >= 0 and places of corners."
-                )
-            found.append(Outline(link[joint], data[1:].reshape(-1, 2), float(data[0])))
-    if count is not None and count != len(found):
-        warn(f"{file.source}: {count:g} outlines were saved, of which {len(found)} are there.")
-    return None if count is None else tuple(found)
+        if joint not in link or len(data) < 3 or len(data) % 2 == 0:
+            continue
+        if not (np.all(np.isfinite(data)) and data[0] >= 0.0):
+            raise file.error(f"the {PREFIX}:{name} must be a radius >= 0 and places of corners.")
+        found.append(Outline(link[joint], data[1:].reshape(-1, 2), float(data[0])))
+    for _, (count, *_) in file.custom(COUNT):
+        if count != len(found):
+            warn(f"{file.source}: {count:g} outlines were saved, of which {len(found)} are there.")
+        return tuple(found)
+    return None

@@ -15,6 +15,12 @@ COARSE = 0.01
 """Share of its size by which an outline may be smaller where corners are left out."""
 
 
+def circle(around: int) -> Floats:
+    """So many corners (k, 2) on a circle of radius one."""
+    turn = np.arange(around) * (2.0 * np.pi / around)
+    return np.column_stack((np.cos(turn), np.sin(turn)))
+
+
 def convex_hull(points: Floats) -> Floats:
     """Corners (k, 2) of the least convex polygon around points (n, 2), from +x towards +z."""
     center = points.mean(axis=0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.field_texts import dataclass
-from heelstrike.robot.shapes.convex import Floats, convex_hull
+from heelstrike.robot.shapes.convex import Floats, circle, convex_hull
 from heelstrike.tolerances import ON_A_LINE
 
 ROUND = 16
@@ -28,8 +28,7 @@ class Outline:
         """Corners (m, 2) of a polygon around all of it, in the frame of the link (m)."""
         if self.radius == 0.0:
             return self.corners
-        turn = np.arange(ROUND) * (2.0 * np.pi / ROUND)
-        disc = self.radius * np.column_stack((np.cos(turn), np.sin(turn)))
+        disc = self.radius * circle(ROUND)
         return convex_hull((self.corners[:, None] + disc).reshape(-1, 2))
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heelstrike.errors import RobotError
-from heelstrike.robot.assembly import LARGEST_NUMBER, low_leaves
+from heelstrike.robot.assembly import low_leaves, refuse_idle_joint, refuse_impossible_numbers
 from heelstrike.robot.model import Floats
 from heelstrike.robot.named_tree import Foot
 from heelstrike.robot.spatial.model import BALL, FREE, HINGE, SPATIAL_NUMBERS, SpatialModel
@@ -53,8 +52,9 @@ def assembled_in_space(
     RobotError
         If a number is NaN or absurdly large, or a joint moves no mass.
     """
-    _refuse_impossible_numbers(model, source)
-    _refuse_joints_without_inertia(model, joint_names, origin, axes, source)
+    refuse_impossible_numbers(model, SPATIAL_NUMBERS, source)
+    for joint in idle_joints(model, origin, axes):
+        refuse_idle_joint(joint_names[joint], source)
     return SpatialRobot(
         name=name,
         model=model,
@@ -90,32 +90,6 @@ def _find_feet(
     drop = model.contact_radius + model.contact_rim * np.sqrt(np.maximum(0.0, 1.0 - along**2))
     bottom = origin[model.contact_link, 2] + place[:, 2] - drop
     return low_leaves(model, names, bottom, height)
-
-
-def _refuse_impossible_numbers(model: SpatialModel, source: str) -> None:
-    """Refuse NaN, and what is infinite or huge where only a limit may be."""
-    for name, values in model.members().items():
-        number = SPATIAL_NUMBERS[name]
-        bad = np.isnan(values) if number.infinite else ~(np.abs(values) <= LARGEST_NUMBER)
-        if np.any(bad):
-            words = number.label or name.replace("_", " ")
-            raise RobotError(
-                f"{source}: the {words} of the robot is not a number below {LARGEST_NUMBER:g}. "
-                "Look for NaN or a misplaced exponent in the file."
-            )
-
-
-def _refuse_joints_without_inertia(
-    model: SpatialModel, joint_names: tuple[str, ...], origin: Floats, axes: Floats, source: str
-) -> None:
-    """Refuse joints whose acceleration no mass resists: their equations of motion say 0 = 0."""
-    idle = idle_joints(model, origin, axes)
-    if idle:
-        raise RobotError(
-            f"{source}: joint {joint_names[idle[0]]!r} moves no mass and has no armature, so that "
-            "nothing resists it. Give the link that it moves a mass and moments of inertia, or "
-            "make it a fixed joint."
-        )
 
 
 def idle_joints(model: SpatialModel, origin: Floats, axes: Floats) -> list[int]:

@@ -9,18 +9,15 @@ import numpy as np
 
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.contact_points import (
-    BOX,
-    CAPSULE,
     CYLINDER,
     MESH,
     SMALLEST_RADIUS,
-    SPHERE,
     contact_scales,
     geoms_that_touch,
     not_too_many,
 )
 from heelstrike.robot.files.mujoco_file import MujocoFile
-from heelstrike.robot.files.shapes import mesh_corners
+from heelstrike.robot.files.shapes import ball_radius, geom_corners, mesh_corners
 from heelstrike.robot.model import SCALES, Floats
 from heelstrike.robot.shapes.solids import few_corners
 from heelstrike.robot.spatial.links import SpatialLinks
@@ -104,7 +101,8 @@ def read_spatial_points(file: MujocoFile, links: SpatialLinks, most: int) -> lis
     for geom in touching:
         own = scales.get(file.given_name("geom", geom), {})
         if file.model.geom_type[geom] == MESH:
-            link, place = _of_link(file, geom, links, mesh_corners(file, geom))
+            link = int(links.of_body[file.model.geom_bodyid[geom]])
+            place = links.within(file, geom, mesh_corners(file, geom))
             friction = float(file.model.geom_friction[geom, 0])
             surface = friction, *(own.get(name, 1.0) for name in SCALES)
             of_meshes.setdefault((link, surface), []).append(place)
@@ -156,39 +154,22 @@ def _tell_of_self_collision(file: MujocoFile, geoms: list[int]) -> None:
         )
 
 
-def _of_link(file: MujocoFile, geom: int, links: SpatialLinks, local: Floats) -> tuple[int, Floats]:
-    """Return the link of a geom, and points of the geom's frame in the link's."""
-    link = int(links.of_body[file.model.geom_bodyid[geom]])
-    world = file.pose.geom_xpos[geom] + local @ file.pose.geom_xmat[geom].reshape(3, 3).T
-    return link, (world - links.origin[link]) @ links.axes[link]
-
-
 def _shape(file: MujocoFile, geom: int, links: SpatialLinks) -> Iterator[SpatialPoint]:
     """Points of a geom, none if it has no shape that we know."""
     model, pose = file.model, file.pose
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
-    radius = float(size[0]) if kind in (SPHERE, CAPSULE) and size[0] > SMALLEST_RADIUS else 0.0
+    link = int(links.of_body[model.geom_bodyid[geom]])
+    radius = ball_radius(file, geom)
     axis, rim = np.zeros(3), 0.0
-    if kind == SPHERE:
-        local = np.zeros((1, 3))
-    elif kind == CAPSULE:
+    if kind == CYLINDER and abs(pose.geom_xmat[geom, 8]) <= UPRIGHT:
         local = np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]])
-    elif kind == BOX:
-        local = size * np.array(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij")).reshape(3, -1).T
-    elif kind == CYLINDER and abs(pose.geom_xmat[geom, 8]) <= UPRIGHT:
-        local = np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]])
-        axis = links.axes[links.of_body[model.geom_bodyid[geom]]].T @ pose.geom_xmat[geom, 2::3]
+        axis = links.axes[link].T @ pose.geom_xmat[geom, 2::3]
         rim = float(size[0])
-    elif kind == CYLINDER:
-        angle = np.arange(AROUND) * (2.0 * np.pi / AROUND)
-        around = size[0] * np.column_stack((np.cos(angle), np.sin(angle)))
-        ends = [np.column_stack((around, np.full(AROUND, end))) for end in (-size[1], size[1])]
-        local = np.concatenate(ends)
     else:
-        return
+        local = geom_corners(file, geom, AROUND)
     friction = float(model.geom_friction[geom, 0])
-    link, places = _of_link(file, geom, links, local)
-    for place in places:
+    radius = radius if radius > SMALLEST_RADIUS else 0.0
+    for place in links.within(file, geom, local):
         yield SpatialPoint(link, _triple(place), radius, friction, _triple(axis), rim)
 
 

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
-from heelstrike.robot.files.joint_numbers import LARGEST_NUMBER, told_number, written_numbers
+from heelstrike.robot.files.joint_numbers import custom_numbers, limits
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.posture import joint_name
 from heelstrike.robot.model import Floats
-from heelstrike.robot.spatial.model import BALL, FREE, SPATIAL_NUMBERS
+from heelstrike.robot.spatial.model import BALL, FREE
 from heelstrike.robot.warning import warn
 
 _CUSTOM = ("speed_limit", "stall_torque", "no_load_speed", "winding_resistance")
-_DEFAULTS = {"winding_resistance": 0.0}
 
 
 def read_spatial_numbers(file: MujocoFile) -> dict[str, Any]:
@@ -80,19 +78,12 @@ def _ranges(file: MujocoFile) -> dict[str, Floats]:
     return {"lower": limits(low), "upper": limits(high)}
 
 
-def limits(values: Floats) -> Floats:
-    """Limits, of which a huge one is none: formats want numbers for both sides of a range."""
-    return np.where(np.abs(values) >= LARGEST_NUMBER, np.copysign(np.inf, values), values)
-
-
 def _custom(file: MujocoFile, name: str) -> Floats:
     """Numbers of velocities by the names of their joints, one for all of a joint."""
     model = file.model
-    places = {joint_name(model, joint): joint for joint in reversed(range(model.njnt))}
-    number = SPATIAL_NUMBERS[name]
-    values = np.full(model.nv, _DEFAULTS.get(name, math.inf))
-    for joint, value in written_numbers(file, name):
-        if joint in places:
-            mine = np.asarray(model.dof_jntid) == places[joint]
-            values[mine] = told_number(file, name, number, joint, value)
-    return values
+    of_joint = np.asarray(model.dof_jntid)
+    places = {
+        joint_name(model, joint): np.flatnonzero(of_joint == joint).tolist()
+        for joint in reversed(range(model.njnt))
+    }
+    return custom_numbers(file, name, model.nv, places)

@@ -28,6 +28,12 @@ class SpatialLinks:
     of_body: Integers
     """(nbody,) Link that each body of the file belongs to; -1 for what is fixed to the world."""
 
+    def within(self, file: MujocoFile, geom: int, places: Floats) -> Floats:
+        """Return places (k, 3) of the frame of a geom in that of its link."""
+        link = self.of_body[file.model.geom_bodyid[geom]]
+        world = file.pose.geom_xpos[geom] + places @ file.pose.geom_xmat[geom].reshape(3, 3).T
+        return np.asarray((world - self.origin[link]) @ self.axes[link])
+
 
 def read_spatial_links(file: MujocoFile) -> SpatialLinks:
     """Turn the bodies of a file into links of one joint each, in the order of its joints.

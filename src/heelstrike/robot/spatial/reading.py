@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from heelstrike.robot.files.actuators import Actuators
+from heelstrike.robot.files.joint_numbers import limits
 from heelstrike.robot.files.mjcf import model_name
 from heelstrike.robot.files.mujoco_file import MujocoFile, parse_whole
 from heelstrike.robot.files.options import Options
@@ -22,7 +23,7 @@ from heelstrike.robot.spatial.contact_points import (
     of_spatial_model,
     read_spatial_points,
 )
-from heelstrike.robot.spatial.joint_numbers import limits, read_spatial_numbers
+from heelstrike.robot.spatial.joint_numbers import read_spatial_numbers
 from heelstrike.robot.spatial.links import SpatialLinks, read_spatial_links
 from heelstrike.robot.spatial.model import HINGE, SLIDE, SpatialModel
 from heelstrike.robot.spatial.robot import SpatialRobot

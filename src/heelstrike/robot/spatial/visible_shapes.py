@@ -6,14 +6,11 @@ import numpy as np
 
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.shapes import (
-    BOX,
-    CAPSULE,
-    CYLINDER,
     ELLIPSOID,
     FARTHEST,
     MESH,
-    SPHERE,
-    mesh_corners,
+    ball_radius,
+    geom_corners,
     shapes_to_see,
 )
 from heelstrike.robot.shapes.solids import few_corners
@@ -45,28 +42,12 @@ def read_solids(file: MujocoFile, links: SpatialLinks) -> tuple[Solid, ...]:
 
 def _solid(file: MujocoFile, geom: int, link: int, links: SpatialLinks) -> Solid | None:
     """Return the solid of a geom; none of one that has no shape, or no size."""
-    model, pose = file.model, file.pose
-    kind, size = int(model.geom_type[geom]), np.asarray(model.geom_size[geom])
-    radius = float(size[0]) if kind in (SPHERE, CAPSULE) else 0.0
-    if kind == SPHERE:
-        local = np.zeros((1, 3))
-    elif kind == CAPSULE:
-        local = np.array([[0.0, 0.0, -size[1]], [0.0, 0.0, size[1]]])
-    elif kind == ELLIPSOID:
-        local = size * ball()
-    elif kind == BOX:
-        local = size * np.array(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij")).reshape(3, -1).T
-    elif kind == CYLINDER:
-        angle = np.arange(AROUND) * (2.0 * np.pi / AROUND)
-        around = size[0] * np.column_stack((np.cos(angle), np.sin(angle)))
-        ends = [np.column_stack((around, np.full(AROUND, end))) for end in (-size[1], size[1])]
-        local = np.concatenate(ends)
-    elif kind == MESH:
-        local = mesh_corners(file, geom)
+    kind, radius = int(file.model.geom_type[geom]), ball_radius(file, geom)
+    if kind == ELLIPSOID:
+        local = np.asarray(file.model.geom_size[geom]) * ball()
     else:
-        return None
-    world = pose.geom_xpos[geom] + local @ pose.geom_xmat[geom].reshape(3, 3).T
-    place = np.asarray((world - links.origin[link]) @ links.axes[link])
+        local = geom_corners(file, geom, AROUND)
+    place = links.within(file, geom, local)
     if not (len(place) and np.all(np.abs(place) < FARTHEST) and radius < FARTHEST):
         return None
     if kind == MESH:

@@ -10,8 +10,6 @@ Sides are the points, and after them their second faces; `other` says which of t
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
@@ -26,6 +24,7 @@ from heelstrike.sim.contacts.faces import (
     NO_FACE,
     center_of,
     locate_on_face,
+    move_to_line,
     nearest_face,
     room_to,
     second_face,
@@ -273,12 +272,7 @@ def tell_resultants(model: Model, corners: Corners, impulse: Floats, place: Floa
             continue
         x, z = corners.force[point, 0], corners.force[point, 1]
         impulse[point, 0], impulse[point, 1] = into_frame(corners.frame[point], (x, z))
-        size = math.sqrt(x * x + z * z)
-        radius = model.contact_radius[point]
+        radius, frame = model.contact_radius[point], corners.frame[point]
         for i in range(2):
-            place[point, i] = corners.center[point, i] - radius * corners.frame[point, i]
-        if size > 0.0:
-            lever = corners.moment[point] / size
-            depth = math.sqrt(max(radius * radius - lever * lever, 0.0))
-            place[point, 0] = corners.center[point, 0] + (lever * z - depth * x) / size
-            place[point, 1] = corners.center[point, 1] + (-lever * x - depth * z) / size
+            place[point, i] = corners.center[point, i] - radius * frame[i]
+        move_to_line(x, z, corners.moment[point], radius, frame, place[point])

@@ -30,7 +30,6 @@ from heelstrike.compiler.bundle_type import address_of
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.compiler.words import copy_words
-from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.dense import solve_to_rank, substitute, triangulate
 from heelstrike.dynamics.kernels import (
     bias_force,
@@ -63,6 +62,7 @@ from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.motors import motor_damping, try_torque
+from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Directions, Equations, Loops, Memory, Tally
 from heelstrike.sim.push import add_pushes
 
@@ -364,28 +364,17 @@ def find_gains(
 
 @kernel
 def evaluate(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    how: int,
-    time: float,
-    memory: Memory,
-    laws: Laws,
-    corners: Corners,
-    now: Rates,
-    own_rows: Floats,
-    force: Floats,
-) -> None:
+    scene: Scene, how: int, time: float, control: Control, memory: Memory, laws: Laws,
+    corners: Corners, now: Rates, own_rows: Floats, force: Floats,
+) -> None:  # fmt: skip
     """Forces and rates of the state in ``memory.q``, ``memory.v`` and ``now.friction.bend``.
 
     A controller that acts continuously is called, unless its torques are ``HELD``: to see what it
     would do (``TRIED``), for good (``DECIDED``), or for good with the contact forces of this very
     state, which is ``ACCEPTED``.
     """
-    equations, contacts, rows, loops = (
-        memory.equations, memory.contacts, memory.rows, memory.loops,
-    )  # fmt: skip
+    model, ground, equations, rows = scene.model, scene.ground, memory.equations, memory.rows
+    contacts, loops = memory.contacts, memory.loops
     q, v, tree, acting = memory.q, memory.v, equations.tree, equations.force
     directions, first = memory.assembly.directions, memory.assembly.problem.first
     observe_sides(model, ground, q, v, tree, contacts, memory.surface, corners)
@@ -403,9 +392,9 @@ def evaluate(
         if how == ACCEPTED:
             show_forces(force, corners, contacts)
         if how == TRIED:
-            consult(controller, time, q, v, model, tree, contacts, control, command)
+            consult(scene.controller, time, q, v, model, tree, contacts, control, command)
         else:
-            ask(controller, time, q, v, model, tree, contacts, control, command)
+            ask(scene.controller, time, q, v, model, tree, contacts, control, command)
     try_torque(model, control.voltage, q, v, memory.tally, command, torque)
     mass_matrix(model, tree, equations.mass_matrix)
     factorize(model, equations.mass_matrix, equations.factor)
@@ -717,21 +706,14 @@ def keep_loops(
 
 @kernel
 def attempt_step(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    time: float,
-    h: float,
-    held: bool,
-    memory: Memory,
+    scene: Scene, time: float, h: float, held: bool, control: Control, memory: Memory,
     work: CompliantWorkspace,
-) -> float:
+) -> float:  # fmt: skip
     """Go from the start of the step, at `time`, to its end; return the error over the tolerance.
 
     A controller that acts continuously is asked within it, unless its torques are `held`.
     """
-    rtol, atol, now, base = work.rtol, work.atol, work.now, work.base
+    model, rtol, atol, now, base = scene.model, work.rtol, work.atol, work.now, work.base
     start, stages, loops = work.start, work.stages, memory.loops
     q, v, bend = memory.q, memory.v, now.friction.bend
     how = DECIDED if h <= DECISIVE else TRIED
@@ -757,8 +739,8 @@ def attempt_step(
                 for k in range(stage):
                     bend[i] += A[stage, k] * stages.bristle[k, i]
             evaluate(
-                controller, control, model, ground, how, time + TIMES[stage] * h, memory, work.laws,
-                work.corners, now, work.now_rows, work.force,
+                scene, how, time + TIMES[stage] * h, control, memory, work.laws, work.corners, now,
+                work.now_rows, work.force,
             )  # fmt: skip
         for i in range(nv):
             stages.right_q[i] = start.v[i] if stage == 0 else v[i]

@@ -12,7 +12,7 @@ where the force really changes fast, after an impact.
 from __future__ import annotations
 
 from dataclasses import field
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -277,18 +277,18 @@ def note_crossings(
 
 @kernel
 def accept_step(
-    controller: Any, control: Control, model: Model, ground: GroundModel, how: int, since: float,
-    h: float, evaluated: Evaluated, memory: Memory, work: CompliantWorkspace,
+    scene: Scene, how: int, since: float, h: float, evaluated: Evaluated, control: Control,
+    memory: Memory, work: CompliantWorkspace,
 ) -> None:  # fmt: skip
     """Evaluate the end of a step of length h, begun at time `since`, and begin the next there.
 
     The step is added to impulses, extremes, crossings and counts.
     """
-    now, base, sums, corners = work.now, work.base, work.sums, work.corners
+    model, now, base = scene.model, work.now, work.base
+    sums, corners = work.sums, work.corners
     evaluate(
-        controller, control, model, ground, how, since + h, memory, work.laws, corners, now,
-        work.now_rows, work.force,
-    )  # fmt: skip
+        scene, how, since + h, control, memory, work.laws, corners, now, work.now_rows, work.force
+    )
     add_impulse(h, base.stop_force, now.stop_force, sums.stop)
     add_impulse(h, base.dry_force, now.dry_force, sums.dry)
     add_impulse(h, base.loop, now.loop, sums.loop)
@@ -349,10 +349,10 @@ def cone_residual(sides: int, friction: Floats, force: Floats) -> float:
 
 @kernel
 def sample(
-    controller: Any, control: Control, model: Model, ground: GroundModel, start: float,
-    memory: Memory, work: CompliantWorkspace,
-) -> int:  # fmt: skip
+    scene: Scene, start: float, control: Control, memory: Memory, work: CompliantWorkspace
+) -> int:
     """Integrate from one sample to the next; return DONE or what was in the way."""
+    model, ground, controller = scene.model, scene.ground, scene.controller
     span, corners, holding, gains = work.step, work.corners, work.holding, work.gains
     q, v, tree, contacts = memory.q, memory.v, memory.equations.tree, memory.contacts
     start_of_step, gap_before = work.start, work.base.normal.gap
@@ -377,9 +377,7 @@ def sample(
         remaining = (held_until if held else span) - elapsed
         final = h >= remaining * (1.0 - NEARLY_OVER)
         taken = remaining if final else h
-        error = attempt_step(
-            controller, control, model, ground, start + elapsed, taken, held, memory, work
-        )
+        error = attempt_step(scene, start + elapsed, taken, held, control, memory, work)
         tries += 1
         shortest = taken <= SHORTEST
         if not (error <= 1.0 or (shortest and error < np.inf)):
@@ -388,9 +386,7 @@ def sample(
                 held_from = elapsed
                 held_until = min(elapsed + HELD_PART * span, span)
                 h = held_until - elapsed
-                make_up_mind(
-                    controller, control, model, ground, start + elapsed, evaluated, memory, work
-                )
+                make_up_mind(scene, start + elapsed, evaluated, control, memory, work)
                 continue
             if control.continuous == 1 and (gains.age > 0 or shortest):
                 find_gains(
@@ -429,7 +425,7 @@ def sample(
         before = work.stages.right_v
         copy_words(work.now.acceleration, before)
         since = start + elapsed
-        accept_step(controller, control, model, ground, how, since, taken, evaluated, memory, work)
+        accept_step(scene, how, since, taken, evaluated, control, memory, work)
         if held and final:
             note_held(held_from, held_until, before, work.now.acceleration, holding)
         elapsed = reached
@@ -447,16 +443,16 @@ def sample(
 
 @kernel
 def make_up_mind(
-    controller: Any, control: Control, model: Model, ground: GroundModel, time: float,
-    evaluated: Evaluated, memory: Memory, work: CompliantWorkspace,
+    scene: Scene, time: float, evaluated: Evaluated, control: Control, memory: Memory,
+    work: CompliantWorkspace,
 ) -> None:  # fmt: skip
     """Ask the controller for good at the start of the step, for torques that will be held."""
     copy_words(work.start.q, memory.q)
     copy_words(work.start.v, memory.v)
     copy_words(work.base.friction.bend, work.now.friction.bend)
     evaluate(
-        controller, control, model, ground, DECIDED, time, memory, work.laws, work.corners,
-        work.now, work.now_rows, work.force,
+        scene, DECIDED, time, control, memory, work.laws, work.corners, work.now, work.now_rows,
+        work.force,
     )  # fmt: skip
     begin_step(work.corners.sides, evaluated, work.base_words, work.start)
 
@@ -671,8 +667,8 @@ def decide(
     """Forces and rates at this sample, under the torques that the frame asked for."""
     share_over_step(clock.time, work.step, memory.pushes)
     evaluate(
-        scene.controller, control, scene.model, scene.ground, HELD, clock.time, memory, work.laws,
-        work.corners, work.now, work.now_rows, work.force,
+        scene, HELD, clock.time, control, memory, work.laws, work.corners, work.now, work.now_rows,
+        work.force,
     )  # fmt: skip
     return DONE
 
@@ -713,10 +709,10 @@ def move(
     if awaits_hold(loops.braked):
         brake(model, clock.time, memory.q, memory.v, rows, memory.equations, loops, sums.loop, told)
         evaluate(
-            scene.controller, control, model, scene.ground, HELD, clock.time, memory, work.laws,
-            corners, work.now, work.now_rows, work.force,
+            scene, HELD, clock.time, control, memory, work.laws, corners, work.now, work.now_rows,
+            work.force,
         )  # fmt: skip
-    code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work)
+    code = sample(scene, clock.time, control, memory, work)
     if code != DONE:
         return code
     step, first, tally = work.step, told.events, memory.tally

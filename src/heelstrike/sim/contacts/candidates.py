@@ -53,20 +53,42 @@ class Listing(NamedTuple):
 
 
 @dissolved_kernel
+def place_candidate(
+    entry: int, place: int, components: int, candidate: Integers, first: Integers
+) -> int:
+    """Put an entry at its place among the candidates; return the first of its rows.
+
+    Candidates are listed one after the other; `components` tells how many rows this one has.
+    """
+    row = row_of(place, first)
+    first[place + 1] = row + components
+    candidate[place] = entry
+    return row
+
+
+@dissolved_kernel
 def list_candidate(entry: int, place: int, components: int, listing: Listing) -> int:
     """List an entry as a candidate, with its set, its friction and its mode before.
 
-    Candidates are listed one after the other; `components` tells how many rows this one has.
-    Returns the first of them.
+    Returns the first of its rows, as :func:`place_candidate` does.
     """
     problem, place, entry = listing.problem, place & EVERY_ROW, entry & EVERY_ROW
-    first = row_of(place, problem.first)
-    problem.first[place + 1] = first + components
     problem.set[place] = listing.set[entry]
     problem.friction[place] = listing.friction[entry]
     listing.mode[place] = listing.guess[entry]
-    listing.candidate[place] = entry
-    return first
+    return place_candidate(entry, place, components, listing.candidate, problem.first)
+
+
+@dissolved_kernel
+def part_of(place: int, first: Integers, values: Floats) -> tuple[float, float]:
+    """Normal and tangential part of what a candidate has a number a row of.
+
+    What has one row has no tangential part.
+    """
+    row = row_of(place, first)
+    if row_of(place + 1, first) == row + 1:
+        return values[row], 0.0
+    return values[row], values[row + 1]
 
 
 @dissolved_kernel
@@ -255,11 +277,12 @@ def keep_constraints(
         force[rows.owner[entry], 0] = 0.0
         force[rows.owner[entry], 1] = 0.0
     for place in range(assembly.begin[CONSTRAINT], assembly.until[CONSTRAINT]):
-        entry, row = assembly.candidate[place], problem.first[place]
-        its, rubs = force[rows.owner[entry]], problem.set[place] == INTERVAL
-        its[0] = impulse[row + (1 if rubs else 0)] / span
-        alone = rubs or problem.first[place + 1] == row + 1
-        its[1] = 0.0 if alone else impulse[row + 1] / span
+        entry = assembly.candidate[place]
+        its = force[rows.owner[entry]]
+        normal, tangent = part_of(place, problem.first, impulse)
+        if problem.set[place] == INTERVAL:  # what rubs has one force, and it is no normal one
+            normal, tangent = tangent, 0.0
+        its[0], its[1] = normal / span, tangent / span
         mode[entry] = assembly.answer.mode[place]
 
 

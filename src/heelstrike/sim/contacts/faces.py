@@ -158,6 +158,25 @@ class Located(NamedTuple):
 
 
 @kernel
+def move_to_line(
+    x: float, z: float, moment: float, radius: float, normal: Floats, place: Floats
+) -> bool:
+    """Move a contact point of a disc to where the line of action of a force (x, z) leaves it.
+
+    `moment` is its moment about the centre of the disc, `normal` that at the contact point. The
+    line of forces that nearly cancel may miss the disc: then it is where the line is nearest.
+    Returns whether there is a force.
+    """
+    size = math.sqrt(x * x + z * z)
+    if size > 0.0:
+        lever = moment / size
+        depth = math.sqrt(max(radius * radius - lever * lever, 0.0))
+        place[0] += radius * normal[0] + (lever * z - depth * x) / size
+        place[1] += radius * normal[1] + (-lever * x - depth * z) / size
+    return bool(size > 0.0)
+
+
+@kernel
 def center_of(model: Model, contacts: Contacts | Rows | Located, point: int) -> tuple[float, float]:
     """Where the centre of the disc of a contact point is."""
     position, normal = contacts.position[point], contacts.normal[point]

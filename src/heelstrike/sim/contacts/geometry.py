@@ -7,7 +7,6 @@ import math
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel, path_curvature
-from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.contact.workspace import ContactProblem
 from heelstrike.dynamics.articulated import articulate, carry_along, solve_articulated
 from heelstrike.dynamics.frames import into_frame
@@ -224,8 +223,7 @@ def assemble_delassus(
     for place in range(count):
         alone = first[place + 1] == first[place] + 1
         if alone or leaf[place] == EVERYWHERE:
-            rubs = problem.set[place] in (CONE, INTERVAL)
-            for row in range(first[place], first[place] + (2 if rubs else 1)):
+            for row in range(first[place], first[place + 1]):
                 if straight:
                     halve_all_by_factor(model, factor, row, directions)
                 else:

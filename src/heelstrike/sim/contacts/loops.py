@@ -125,13 +125,10 @@ def leave_one(loop: int, loops: Loops) -> None:
 
 
 @dissolved_kernel
-def append_loops(count: int, components: int, loops: Loops, assembly: Assembly) -> int:
-    """Append the rows of the loops to the candidates; return how many there are with them.
-
-    A second component of each would be empty.
-    """
+def append_loops(count: int, loops: Loops, assembly: Assembly) -> int:
+    """Append the rows of the loops to the candidates; return how many there are with them."""
     for row in range(rows_of(loops)):
-        append_loop(row, count, components, loops, assembly)
+        append_loop(row, count, loops, assembly)
         count += 1
     return count
 
@@ -152,17 +149,13 @@ def free_loops(count: int, loops: Loops, rate: Floats, time: float, assembly: As
 
 
 @kernel
-def append_loop(row: int, count: int, components: int, loops: Loops, assembly: Assembly) -> None:
+def append_loop(row: int, count: int, loops: Loops, assembly: Assembly) -> None:
     """Write what a row of the loops brings to the contact problem, but for its free term."""
     jacobian, problem = assembly.directions.jacobian, assembly.problem
     first = problem.first[count]
-    problem.first[count + 1] = first + components
+    problem.first[count + 1] = first + 1
     for j in range(jacobian.shape[1]):
         jacobian[first, j] = loops.rows.jacobian[row, j]
-    if components == 2:
-        problem.free[first + 1] = 0.0
-        for j in range(jacobian.shape[1]):
-            jacobian[first + 1, j] = 0.0
     problem.set[count] = LINE
     problem.friction[count] = 0.0
     assembly.directions.leaf[count] = EVERYWHERE

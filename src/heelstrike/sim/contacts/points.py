@@ -6,6 +6,8 @@ before tangent. Arrays of (nc, 2) have an entry for every contact point of the r
 
 from __future__ import annotations
 
+from math import sqrt
+
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel, ground_contact
 from heelstrike.dynamics.frames import into_frame, out_of_frame
@@ -45,7 +47,7 @@ def point_delassus(
 ) -> None:  # fmt: skip
     """Delassus matrix G = J A⁻¹ Jᵀ of the points, (2 k, 2 k); `rows` (2 k, nv) is scratch.
 
-    With A = Lᵀ D L it is Y D⁻¹ Yᵀ, where Y = J L⁻¹.
+    With A = Lᵀ D L it is Z Zᵀ, where Z = J L⁻¹ D^(-1/2): symmetric to the last digit.
     """
     for place in range(points.shape[0]):
         contact, first = points[place], 2 * place
@@ -53,13 +55,16 @@ def point_delassus(
         write_point_rows(model, tree, model.contact_link[contact], position, normal, first, rows)
         solve_upper(model, factor, rows[first])
         solve_upper(model, factor, rows[first + 1])
+    for j in range(model.nv):
+        root = sqrt(factor[j, j])
+        for row in range(rows.shape[0]):
+            rows[row, j] *= root
     for row in range(rows.shape[0]):
-        for column in range(row + 1):
+        for column in range(rows.shape[0]):
             total = 0.0
             for j in range(model.nv):
-                total += rows[row, j] * factor[j, j] * rows[column, j]
+                total += rows[row, j] * rows[column, j]
             delassus[row, column] = total
-            delassus[column, row] = total
 
 
 @kernel

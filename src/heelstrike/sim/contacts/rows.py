@@ -107,12 +107,12 @@ def dry_joints(model: Model) -> Integers:
     return np.union1d(np.flatnonzero(model.dry_friction > 0.0), slipping).astype(np.int64)
 
 
-def contact_count(robot: Robot) -> int:
-    """Return how many entries there are but for those that never let go, which come last."""
+def contact_components(robot: Robot) -> list[int]:
+    """Return the components of all entries but those that never let go, which come last."""
     model = robot.model
     stops = np.isfinite(model.lower).sum() + np.isfinite(model.upper).sum()
-    let_go = sum(not is_line(each) for each in robot.constraints)
-    return 2 * model.nc + int(stops) + let_go + len(dry_joints(model))
+    let_go = [components_of(each.set) for each in robot.constraints if not is_line(each)]
+    return 2 * model.nc * [2] + int(stops) * [1] + let_go + len(dry_joints(model)) * [2]
 
 
 def most_rows(robot: Robot) -> int:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from heelstrike.compiler.recordings.recording import Program
 from heelstrike.compiler.straight_line import straight_line_code
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.workspace import PROGRAM_ROWS
 from heelstrike.dynamics.kernels import (
     acceleration_without_contact,
     solve_factorized,
@@ -48,7 +49,7 @@ KERNELS: tuple[Callable[..., None], ...] = (
     locate_points,
 )
 
-SIDE_BY_SIDE = (point_delassus,)
+SIDE_BY_SIDE = (point_delassus, point_velocities, locate_points)
 """Those that do the same with many numbers."""
 
 MOST_COORDINATES = 12
@@ -56,6 +57,11 @@ MOST_COORDINATES = 12
 
 MOST_POINTS = 8
 """The same for contact points, which straight-line code takes all together."""
+
+
+def room_of(points: int) -> int:
+    """Rows of the Delassus matrix of so many usual points: there is room for stops beside them."""
+    return max(PROGRAM_ROWS, 2 * points)
 
 
 def usual_points(robot: Robot) -> NDArray[np.int64]:
@@ -100,7 +106,7 @@ def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
         "tree": Workspace.allocate(extents),
         "matrix": np.zeros((nv, nv)), "factor": np.zeros((nv, nv)), "bias": np.zeros(nv),
         "points": points, "contacts": Contacts.allocate(extents),
-        "rows": np.zeros((2 * size, nv)), "delassus": np.zeros((2 * size, 2 * size)),
+        "rows": np.zeros((2 * size, nv)), "delassus": np.zeros((room_of(size), room_of(size))),
         "velocity": pairs, "impulse": pairs, "force": np.zeros(nv), "torque": np.zeros(model.nu),
         "v_dot": np.zeros(nv), "ground": Ground().model(), "friction": np.zeros(model.nc),
         "restitution": np.zeros(model.nc),

@@ -21,6 +21,7 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.contact.workspace import ContactProblem
@@ -28,6 +29,7 @@ from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.brakes import share_friction
+from heelstrike.sim.contacts.candidates import place_candidate
 from heelstrike.sim.contacts.faces import NO_FACE, Located
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
@@ -46,12 +48,16 @@ from heelstrike.sim.contacts.rows import (
 )
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.impact import heading
-from heelstrike.sim.event_driven.phase import Bridge, HeldRows, Impact, Modes, Motion, Phase
+from heelstrike.sim.event_driven.phase import Bridge, HeldRows, Modes, Motion, Phase
 from heelstrike.sim.event_driven.rows import write_row
-from heelstrike.sim.event_driven.smooth.candidates import free_acceleration, solve_candidates
+from heelstrike.sim.event_driven.smooth.candidates import (
+    free_acceleration,
+    hold_row,
+    solve_candidates,
+    tell_parts,
+)
 from heelstrike.sim.event_driven.smooth.corners import IMPACT, report_joints, report_points
 from heelstrike.sim.event_driven.smooth.dynamics import (
-    copy_state,
     evaluate,
     observe_rows,
     solve_constraints,
@@ -98,7 +104,7 @@ def gather_near(
     Returns how many candidates there are.
     """
     v, after = begin[model.nq :], free_end[model.nq :]
-    free, count = problem.free, 0
+    free, first, count = problem.free, problem.first, 0
     for contact in range(modes.watched):
         kind, owner, gap = rows.kind[contact], rows.owner[contact], rows.gap[contact]
         is_dry = kind == DRY_JOINT
@@ -107,26 +113,26 @@ def gather_near(
         passes = is_of_ground(contact, rows) and modes.passing[owner] == 1
         if passes or (kind == SECOND_FACE and gap == np.inf):
             continue
-        gap_rows(contact, count, model, tree, rows, problem.first, leaf, jacobian)
-        normal = row_product(jacobian, 2 * count, after)
+        row = place_candidate(contact, count, rows.components[contact], candidate, first)
+        gap_rows(contact, count, model, tree, rows, first, leaf, jacobian)
+        normal = row_product(jacobian, row, after)
         if not is_dry and gap > length * max(CLOSING_SPEED, -2.0 * normal):
             continue
         free_gap_acceleration(
-            contact, count, model, tree, rows, modes.face, modes.curvature, rate, jacobian, free
+            contact, row, model, tree, rows, modes.face, modes.curvature, rate, jacobian, free
         )
-        for row in range(2 * count, 2 * count + 2):
-            free[row] = row_product(jacobian, row, v) + length * free[row]
+        came = row_product(jacobian, row, v)
+        for each in range(row, first[count + 1]):
+            free[each] = row_product(jacobian, each, v) + length * free[each]
         added[count] = 0.0
         if is_dry:
             problem.bound[count] = length * modes.breakaway[owner]
         elif gap > CLOSED_GAP:
             added[count] = gap / length
-        free[2 * count] += added[count]
-        came = row_product(jacobian, 2 * count, v)
+        free[row] += added[count]
         if bouncing and not is_dry and gap <= CLOSED_GAP and came < -SLOW:
             added[count] = restitution[contact] * came
-            free[2 * count] += added[count]
-        candidate[count] = contact
+            free[row] += added[count]
         count += 1
     return count
 
@@ -157,37 +163,37 @@ def leave_faces(model: Model, closed: Integers, face: Integers) -> None:
 
 @kernel
 def collect_impulses(
-    count: int, assembly: Assembly, added: Floats, mode: Integers, impact: Impact
+    count: int, watched: int, assembly: Assembly, added: Floats, mode: Integers, impulse: Floats
 ) -> None:
     """Write what the bridge found: impulses, and modes of what does not leave by its end.
 
     Its velocity then is that of the problem, which knows how the ground turns under the robot in
     this time, but for restitution and gaps that close.
     """
-    impulse, velocity = assembly.answer.impulse, assembly.answer.velocity
+    answer, first = assembly.answer, assembly.problem.first
+    tell_parts(count, watched, assembly, answer.impulse, impulse)
     for place in range(count):
-        contact = assembly.candidate[place]
-        impact.impulse[contact, 0] = impulse[2 * place]
-        impact.impulse[contact, 1] = impulse[2 * place + 1]
-        if not velocity[2 * place] - added[place] > CLOSED_GAP:
-            mode[contact] = assembly.answer.mode[place]
+        if not answer.velocity[first[place]] - added[place] > CLOSED_GAP:
+            mode[assembly.candidate[place]] = answer.mode[place]
 
 
 @kernel
 def made_energy(count: int, assembly: Assembly, added: Floats) -> bool:
     """Whether the impulses, beside what the known forces did, made energy."""
     delassus, impulse = assembly.problem.delassus, assembly.answer.impulse
+    first = assembly.problem.first
     made = 0.0
     through = 0.0
-    for row in range(2 * count):
-        before = assembly.problem.free[row]
-        if row % 2 == 0:
-            before -= added[row // 2]
-        after = before
-        for column in range(2 * count):
-            after += delassus[row, column] * impulse[column]
-        made += impulse[row] * (before + after)
-        through += abs(impulse[row]) * (abs(before) + abs(after))
+    for place in range(count):
+        for row in range(first[place], first[place + 1]):
+            before = assembly.problem.free[row]
+            if row == first[place]:
+                before -= added[place]
+            after = before
+            for column in range(first[count]):
+                after += delassus[row, column] * impulse[column]
+            made += impulse[row] * (before + after)
+            through += abs(impulse[row]) * (abs(before) + abs(after))
     return made > NOTICEABLE_ENERGY * through
 
 
@@ -237,34 +243,33 @@ def put_in_place(
         modes.face, equations.tree, assembly.candidate, assembly.directions,
     )  # fmt: skip
     impulse, velocity = assembly.answer.impulse, assembly.answer.velocity
-    for row in range(2 * total):
+    first = assembly.problem.first
+    for row in range(first[total]):
         kept[row] = impulse[row]
     for _ in range(2):
         observe_rows(end, model, ground, tree, rows, modes, surface, loops)
         size = 0
         for place in range(count):
             contact = candidate[place]
-            leaves = velocity[2 * place] - added[place] > CLOSED_GAP
-            pressed = kept[2 * place] > 0.0 and not leaves
+            leaves = velocity[first[place]] - added[place] > CLOSED_GAP
+            pressed = kept[first[place]] > 0.0 and not leaves
             if pressed and keeps_face(contact, ground, rows, face):
-                held.row[size] = 2 * place
-                size += 1
+                size = hold_row(place, first[place], 0.0, size, held)
         contacts = size
         for place in range(count, total):
-            held.row[size] = 2 * place
-            size += 1
+            size = hold_row(place, first[place], 0.0, size, held)
         for i in range(size):
-            contact = candidate[held.row[i] // 2]
+            contact = candidate[held.place[i]]
             off = rows.gap[contact] if i < contacts else loops.rows.displacement[i - contacts]
             held.system[i, size] = -off
         observe_rows(begin, model, ground, tree, rows, modes, surface, loops)
         solve_constraints(size, 0.0, assembly.problem.delassus, held)
-        for row in range(2 * total):
+        for row in range(first[total]):
             impulse[row] = 0.0
         for i in range(size):
             impulse[held.row[i]] = held.unknown[i]
-        add_impulse(model, 2 * total, impulse, directions, equations, end[: model.nq])
-    for row in range(2 * total):
+        add_impulse(model, first[total], impulse, directions, equations, end[: model.nq])
+    for row in range(first[total]):
         impulse[row] = kept[row]
 
 
@@ -276,17 +281,20 @@ def turn_rows(
 ) -> None:  # fmt: skip
     """Let the free terms be those with which velocities at the end are what the problem says."""
     v, free, velocity = end[model.nq :], assembly.problem.free, assembly.answer.velocity
+    first = assembly.problem.first
     observe_rows(end, model, ground, tree, rows, modes, surface, loops)
     for place in range(count, total):
-        free[2 * place] += speed_along(place - count, loops, v) - velocity[2 * place]
+        row = first[place]
+        free[row] += speed_along(place - count, loops, v) - velocity[row]
     for place in range(count):
         contact = assembly.candidate[place]
         if not keeps_face(contact, ground, rows, modes.face):
             continue
+        row = first[place]
         normal, tangent = gap_velocity(contact, model, tree, rows, v)
-        free[2 * place] += normal - (velocity[2 * place] - added[place])
+        free[row] += normal - (velocity[row] - added[place])
         if is_of_ground(contact, rows):
-            free[2 * place + 1] += tangent - velocity[2 * place + 1]
+            free[row + 1] += tangent - velocity[row + 1]
     observe_rows(begin, model, ground, tree, rows, modes, surface, loops)
 
 
@@ -315,8 +323,9 @@ def solve_bridge(
         note_residual(assembly.answer.residual, memory.tally)
         if status != SOLVED or made_energy(total, assembly, added):
             return False
-        copy_state(bridge.free_end, end)
-        add_impulse(model, 2 * total, impulse, directions, equations, end[model.nq :])
+        copy_words(bridge.free_end, end)
+        size = assembly.problem.first[total]
+        add_impulse(model, size, impulse, directions, equations, end[model.nq :])
         move_on(model, length, begin, end)
         put_in_place(
             count, total, model, ground, begin, added, equations, rows, surface, assembly, loops,
@@ -342,7 +351,7 @@ def find_impulses(
     phase, step, impact, bridge = work.phase, work.step, work.impact, work.bridge
     model, ground, modes, rows = scene.model, scene.ground, phase.modes, memory.rows
     equations, assembly, loops = memory.equations, memory.assembly, memory.loops
-    directions = assembly.directions
+    directions, first = assembly.directions, assembly.problem.first
     begin, end, free_end, after = step.begin, bridge.end, bridge.free_end, bridge.after
     mode, impulse, closed, face = memory.reaction.mode, impact.impulse, modes.closed, modes.face
     leave_faces(model, closed, face)
@@ -359,17 +368,16 @@ def find_impulses(
     find_faces(model, ground, equations.tree, closed, seconds, located, face, memory.surface)
     for contact in range(modes.watched):
         mode[contact] = OPEN
-        impulse[contact, 0], impulse[contact, 1] = 0.0, 0.0
     count = gather_near(
         length, bouncing, model, begin, free_end, equations.rate, memory.surface.restitution,
         equations.tree, rows, modes, assembly.candidate, directions.leaf, directions.jacobian,
         assembly.problem, bridge.added,
     )  # fmt: skip
-    total = append_loops(count, 2, loops, assembly)
+    total = append_loops(count, loops, assembly)
     free_loops(total, loops, free_end[model.nq :], 0.5 * length, assembly)
     for place in range(count, total):
         bridge.added[place] = 0.0
-    copy_state(free_end, end)
+    copy_words(free_end, end)
     move_on(model, length, begin, end)
     if total > 0:
         assemble_delassus(model, total, equations, directions, assembly.problem)
@@ -378,18 +386,18 @@ def find_impulses(
         return_faces(rows, modes, bridge.lent)
         if not solved:
             return False
-    collect_impulses(count, assembly, bridge.added, mode, impact)
+    collect_impulses(count, modes.watched, assembly, bridge.added, mode, impulse)
     for place in range(count):
         if rows.kind[assembly.candidate[place]] == DRY_JOINT:  # a finite force works on the way
-            assembly.answer.impulse[2 * place] = 0.0
-            assembly.answer.impulse[2 * place + 1] = 0.0
+            for row in range(first[place], first[place + 1]):
+                assembly.answer.impulse[row] = 0.0
     finite = True
     for i in range(model.nv):
         finite = finite and np.isfinite(end[i])
-    copy_state(begin, after)
+    copy_words(begin, after)
     if total > 0:
         moved = after[model.nq :]
-        add_impulse(model, 2 * total, assembly.answer.impulse, directions, equations, moved)
+        add_impulse(model, first[total], assembly.answer.impulse, directions, equations, moved)
     return finite
 
 
@@ -400,12 +408,12 @@ def end_of_parts(
 ) -> None:  # fmt: skip
     """Write where so many bridges end that take some time together; where they begin without."""
     begin, here, found = work.step.begin, work.bridge.here, True
-    copy_state(begin, here)
+    copy_words(begin, here)
     for _ in range(parts):
         found = found and find_impulses(scene, length / parts, bouncing, control, memory, work)
-        copy_state(work.bridge.end, begin)
-    copy_state(begin if found else here, end)
-    copy_state(here, begin)
+        copy_words(work.bridge.end, begin)
+    copy_words(begin if found else here, end)
+    copy_words(here, begin)
 
 
 @kernel
@@ -505,7 +513,7 @@ def cross_bridge(
     for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
         friction_torque[rows.owner[dry]] = impact.impulse[dry, 1] / series.length
     share_friction(model, modes.breakaway, friction_torque, record.brake_torque[row])
-    copy_state(bridge.end, begin)
+    copy_words(bridge.end, begin)
     for point in range(model.nc):
         impact.meets[point] = 0
     adopt_end(

@@ -7,6 +7,7 @@ so the problem is put a moment ahead; where it has no solution velocities jump w
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.sets import INTERVAL, LINE
 from heelstrike.contact.workspace import ContactProblem
@@ -21,7 +22,7 @@ from heelstrike.sim.event_driven.impact import collide
 from heelstrike.sim.event_driven.phase import Modes, Motion, Watch
 from heelstrike.sim.event_driven.rows import write_row
 from heelstrike.sim.event_driven.smooth.corners import report_joints, report_points
-from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate
+from heelstrike.sim.event_driven.smooth.dynamics import evaluate
 from heelstrike.sim.event_driven.smooth.faces import begin_with_first, choose_faces, locate
 from heelstrike.sim.event_driven.smooth.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.smooth.projection import is_in_place, project
@@ -98,7 +99,7 @@ def jump(model: Model, nudge: float, memory: Memory, work: Motion, record: Recor
     """Let velocities jump without a collision (Painlevé's paradox); return success."""
     modes, step, impact, plastic = work.phase.modes, work.step, work.impact, work.bounces.plastic
     rows = memory.rows
-    copy_state(step.begin, impact.before)
+    copy_words(step.begin, impact.before)
     for contact in range(modes.watched):
         impact.hit[contact] = 0
         plastic[contact] = modes.closed[contact]
@@ -113,7 +114,7 @@ def jump(model: Model, nudge: float, memory: Memory, work: Motion, record: Recor
         )  # fmt: skip
         report_joints(step.time, rows, impact.impulse, closed, record.told)
     else:
-        copy_state(impact.before, step.begin)
+        copy_words(impact.before, step.begin)
     return bool(solved)
 
 
@@ -126,16 +127,17 @@ def leave_if_possible(
 
     `mode` are those of the candidates, `owner` of what each entry of the table is.
     """
-    free, delassus = problem.free, problem.delassus
+    free, delassus, first = problem.free, problem.delassus, problem.first
     several = False
     apart = True
     for place in range(count):
-        contact, row = candidate[place], 2 * place
+        contact, row = candidate[place], first[place]
         if problem.set[place] == INTERVAL:
             continue
         apart = apart and free[row] >= 0.0
         ratio = -slide[contact] * friction[contact]
-        if delassus[row, row] + ratio * delassus[row, row + 1] <= 0.0:
+        across = delassus[row, first[place + 1] - 1]
+        if delassus[row, row] + ratio * across <= 0.0:
             # Pressing it harder would push it into the ground: there are other solutions.
             several = True
             log_event(time, PAINLEVE, owner[contact], 0.0, 0.0, record.told)
@@ -173,7 +175,7 @@ def begin_phase(
     choose_faces(model, ground, tree, modes.closed, modes.face, rows)
     locate(q, v, model, ground, tree, rows, modes, surface)
     form_groups(model, tree.angle, q, surface.friction, rows, modes)
-    copy_state(begin, before)
+    copy_words(begin, before)
     step.left, strayed, fastest = project(
         model, ground, equations, rows, surface, assembly, loops, phase, begin
     )
@@ -184,7 +186,7 @@ def begin_phase(
     for i in range(begin.shape[0]):
         fits = fits and abs(begin[i] - before[i]) <= slip * (1.0 + abs(before[i]))
     if not fits:
-        copy_state(before, begin)
+        copy_words(before, begin)
         step.left = strayed
         if not is_in_place(strayed, fastest):
             return False

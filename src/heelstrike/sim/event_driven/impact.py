@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.candidates import part_of, place_candidate
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -18,17 +20,18 @@ from heelstrike.sim.contacts.geometry import (
 from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
 from heelstrike.sim.contacts.rows import DRY_JOINT, SECOND_FACE, Rows, second_of
 from heelstrike.sim.event_driven.phase import Modes, Motion
-from heelstrike.sim.event_driven.smooth.candidates import free_acceleration
+from heelstrike.sim.event_driven.smooth.candidates import free_acceleration, tell_parts
 from heelstrike.sim.event_driven.smooth.corners import (
     IMPACT,
     log_impulse,
     report_joints,
     report_points,
 )
-from heelstrike.sim.event_driven.smooth.dynamics import copy_state, list_closed
+from heelstrike.sim.event_driven.smooth.dynamics import list_closed
 from heelstrike.sim.event_driven.smooth.faces import locate
 from heelstrike.sim.event_driven.smooth.gaps import (
     free_gap_acceleration,
+    free_gap_accelerations,
     gap_rows,
     gap_velocity,
     write_candidates,
@@ -70,13 +73,13 @@ def clear_rounding(first: int, end: int, free: Floats) -> None:
 
     Loops that say the same twice would not agree on it.
     """
-    for place in range(first, end):
-        if abs(free[2 * place]) <= ROUNDING:
-            free[2 * place] = 0.0
+    for row in range(first, end):
+        if abs(free[row]) <= ROUNDING:
+            free[row] = 0.0
 
 
 @kernel
-def list_hit(rows: Rows, modes: Modes, hit: Integers, candidate: Integers) -> int:
+def list_hit(rows: Rows, modes: Modes, hit: Integers, candidate: Integers, first: Integers) -> int:
     """List the contacts of an impact, closed or hit, as candidates; return their number.
 
     Dry friction of the joints is a finite force, and takes no part.
@@ -85,7 +88,7 @@ def list_hit(rows: Rows, modes: Modes, hit: Integers, candidate: Integers) -> in
     for contact in range(modes.watched):
         takes_part = modes.closed[contact] == 1 or hit[contact] != 0
         if takes_part and rows.kind[contact] != DRY_JOINT:
-            candidate[count] = contact
+            place_candidate(contact, count, rows.components[contact], candidate, first)
             count += 1
     return count
 
@@ -108,57 +111,51 @@ def collide(model: Model, nudge: float, memory: Memory, work: Motion) -> tuple[b
     equations, assembly, loops = memory.equations, memory.assembly, memory.loops
     candidate, problem, directions = assembly.candidate, assembly.problem, assembly.directions
     jacobian, free, impulse = directions.jacobian, problem.free, assembly.answer.impulse
-    for contact in range(modes.watched):
-        impact.impulse[contact, 0] = 0.0
-        impact.impulse[contact, 1] = 0.0
-    count = list_hit(rows, modes, impact.hit, candidate)
+    first, speed = problem.first, assembly.answer.velocity
+    count = list_hit(rows, modes, impact.hit, candidate, first)
+    tell_parts(0, modes.watched, assembly, impulse, impact.impulse)
     if count + rows_of(loops) == 0:
         return True, 0.0, 0.0
     write_candidates(
-        count, candidate, model, equations.tree, rows, problem.first, directions.leaf, jacobian
+        count, candidate, model, equations.tree, rows, first, directions.leaf, jacobian
     )
+    for row in range(first[count]):
+        free[row] = row_product(jacobian, row, v)
     for place in range(count):
-        contact = candidate[place]
-        normal = row_product(jacobian, 2 * place, v)
-        if normal < 0.0 and plastic[contact] == 0:
-            normal += memory.surface.restitution[contact] * normal
-        free[2 * place] = normal - nudge
-        free[2 * place + 1] = row_product(jacobian, 2 * place + 1, v)
+        contact, row = candidate[place], first[place]
+        if free[row] < 0.0 and plastic[contact] == 0:
+            free[row] += memory.surface.restitution[contact] * free[row]
+        free[row] -= nudge
     find_loops(model, begin[: model.nq], v, equations.tree, loops)
-    total = append_loops(count, 2, loops, assembly)
+    total = append_loops(count, loops, assembly)
     free_loops(total, loops, v, 0.0, assembly)
-    clear_rounding(count, total, free)
+    clear_rounding(first[count], first[total], free)
     assemble_delassus(model, total, equations, directions, problem)
     status = solve_contacts(count, False, model, memory, phase)
     note_residual(assembly.answer.residual, memory.tally)
     made = 0.0
     through = 0.0
-    for row in range(2 * total):
+    for row in range(first[total]):
         added = impulse[row] * row_product(jacobian, row, v)
         made += added
         through += abs(added)
-    note_loops(rows, total, 1.0, problem.first, impulse, loops)
+    note_loops(rows, total, 1.0, first, impulse, loops)
     if saddle.used == 1:
         for j in range(model.nv):
             v[j] += saddle.unknown[j]
     else:
-        add_impulse(model, 2 * total, impulse, directions, equations, v)
+        add_impulse(model, first[total], impulse, directions, equations, v)
+    for row in range(first[total]):  # with what brakes take, which contacts at rest do not make
+        speed[row] = row_product(jacobian, row, v)
+        made += impulse[row] * speed[row]
+        through += abs(impulse[row] * speed[row])
+    tell_parts(count, modes.watched, assembly, impulse, impact.impulse)
     for place in range(count):
         contact = candidate[place]
-        normal = row_product(jacobian, 2 * place, v)
-        tangent = row_product(jacobian, 2 * place + 1, v)
-        pressing, rubbing = impulse[2 * place] * normal, impulse[2 * place + 1] * tangent
-        made += pressing + rubbing
-        through += abs(pressing) + abs(rubbing)
-        impact.impulse[contact, 0] = impulse[2 * place]
-        impact.impulse[contact, 1] = impulse[2 * place + 1]
+        normal, tangent = part_of(place, first, speed)
         rests = normal <= max(REST, 2.0 * nudge) or plastic[contact] == AT_REST
         modes.closed[contact] = 1 if rests else 0
         modes.slide[contact] = heading(tangent) if rests else 0
-    for row in range(2 * count, 2 * total):  # what brakes take is not made by contacts at rest
-        added = impulse[row] * row_product(jacobian, row, v)
-        made += added
-        through += abs(added)
     for dry in range(rows.first[DRY_JOINT], rows.end[DRY_JOINT]):
         modes.slide[dry] = modes.closed[dry] * heading(v[rows.owner[dry]])
     return status == SOLVED, 0.5 * made, 0.5 * through
@@ -186,20 +183,18 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
         saddle.force,
     )  # fmt: skip
     find_loops(model, q, v, tree, loops)
-    count = list_closed(rows, modes, candidate, problem.bound)
+    count = list_closed(rows, modes, candidate, first, problem.bound)
     write_candidates(count, candidate, model, tree, rows, first, directions.leaf, jacobian)
-    for place in range(count):
-        contact = candidate[place]
-        free_gap_acceleration(
-            contact, place, model, tree, rows, face, curvature, rate, jacobian, free
-        )
-    total = append_loops(count, 2, loops, assembly)
+    free_gap_accelerations(
+        count, candidate, first, model, tree, rows, face, curvature, rate, jacobian, free
+    )
+    total = append_loops(count, loops, assembly)
     free_loops(total, loops, rate, 1.0, assembly)
     if total > 0:  # the forces of what is closed act on the rest
         assemble_delassus(model, total, equations, directions, problem)
         solve_contacts(count, True, model, memory, phase)
         if saddle.used == 0:
-            add_impulse(model, 2 * total, assembly.answer.impulse, directions, equations, rate)
+            add_impulse(model, first[total], assembly.answer.impulse, directions, equations, rate)
         for i in range(model.nv if saddle.used == 1 else 0):
             rate[i] = saddle.unknown[i]
     found = False
@@ -207,12 +202,13 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
         touched = hit[contact] == 1 or was_closed[contact] == 1
         if modes.closed[contact] == 1 or not touched:
             continue
+        row = place_candidate(contact, total, rows.components[contact], candidate, first)
         gap_rows(contact, total, model, tree, rows, first, directions.leaf, jacobian)
         free_gap_acceleration(
-            contact, total, model, tree, rows, face, curvature, rate, jacobian, free
+            contact, row, model, tree, rows, face, curvature, rate, jacobian, free
         )
         normal, _ = gap_velocity(contact, model, tree, rows, v)
-        pull = -free[2 * total]
+        pull = -free[row]
         if not (pull > 0.0 and 0.0 < 2.0 * normal <= SHORTEST_BOUNCE * pull):
             continue
         bounce = 2.0 * normal / pull
@@ -231,7 +227,7 @@ def short_bounces(model: Model, ground: GroundModel, memory: Memory, work: Motio
 @kernel
 def restore(before: Floats, reported: Reported, rows: Rows, modes: Modes, begin: Floats) -> None:
     """Go back to the state and the modes before an impact."""
-    copy_state(before, begin)
+    copy_words(before, begin)
     for contact in range(modes.watched):
         if rows.kind[contact] != DRY_JOINT:
             modes.closed[contact] = reported.closed[contact]
@@ -247,7 +243,7 @@ def strike(model: Model, ground: GroundModel, memory: Memory, work: Motion, reco
     modes, impact, bounces = work.phase.modes, work.impact, work.bounces
     rows, hit, reported = memory.rows, impact.hit, memory.reported
     state, before, time = work.step.begin, impact.before, work.step.time
-    copy_state(state, before)
+    copy_words(state, before)
     made = through = 0.0
     for attempt in range(2):
         solved, made, through = collide(model, 0.0, memory, work)

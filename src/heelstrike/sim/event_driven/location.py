@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.contacts.faces import center_of, nearest_face
 from heelstrike.sim.event_driven.dormand_prince import interpolate
@@ -57,9 +58,8 @@ A_DISC = 1.0
 @kernel
 def copy_events(value: Floats, rate: Floats, kept_value: Floats, kept_rate: Floats) -> None:
     """Keep event functions and their rates."""
-    for i in range(value.shape[0]):
-        kept_value[i] = value[i]
-        kept_rate[i] = rate[i]
+    copy_words(value, kept_value)
+    copy_words(rate, kept_rate)
 
 
 @kernel

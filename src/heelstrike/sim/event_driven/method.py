@@ -27,7 +27,7 @@ from heelstrike.sim.clock import Clock
 from heelstrike.sim.contacts.brakes import awaits_hold
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import evaluate_equations
-from heelstrike.sim.contacts.rows import SECOND_FACE, contact_count
+from heelstrike.sim.contacts.rows import SECOND_FACE, contact_components
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.deciding import LOOKS, ON_THE_GROUND, decide_modes
 from heelstrike.sim.event_driven.events import meet_event
@@ -138,7 +138,7 @@ class EventDriven(Method):
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
         others = 2 * robot.model.latches + robot.model.brakes
-        contacts = contact_count(robot)
+        contacts = len(contact_components(robot))
         return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contacts + others + 8
 
     def check(self, setting: Setting) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
@@ -18,7 +19,7 @@ from heelstrike.sim.event_driven.location import EVENT_TIME
 from heelstrike.sim.event_driven.phase import Decision, Integration, Motion
 from heelstrike.sim.event_driven.rows import NO_ROOM, TOO_FAR, write_row, write_rows_within
 from heelstrike.sim.event_driven.smooth.corners import show_forces
-from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate
+from heelstrike.sim.event_driven.smooth.dynamics import evaluate
 from heelstrike.sim.event_driven.steps import ALMOST, integrate, longest_turn, shortest_step
 from heelstrike.sim.frame import DONE, FORK, RECORD_FULL, SOLVER_FAILED, Scene
 from heelstrike.sim.memory import Memory
@@ -191,7 +192,7 @@ def move(
         return DONE
     stop = next_stop(watched, accumulation, decision.next_push, clock)
     step.time, decision.allowance = pass_time(step.time, step.length, stop, decision.allowance)
-    copy_state(step.end, step.begin)
+    copy_words(step.end, step.begin)
     show_forces(step.end_force, rows, impact.meets, memory.contacts.force)
     end_bounces(rows, watched, step.time, accumulation, record.told)
     step.finished = 0

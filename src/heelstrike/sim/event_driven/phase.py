@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
+from heelstrike.contact.workspace import ContactAnswer
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
-from heelstrike.sim.contacts.rows import contact_count, most_rows
+from heelstrike.sim.contacts.rows import contact_components, most_rows
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.continuous_extension import Extension
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
@@ -116,8 +117,10 @@ class Forces(Bundle):
 class HeldRows(Bundle):
     """Rows along which closed contacts and loops are held, and the equations of their forces."""
 
+    place: Integers = array("rows", of=int)
     row: Integers = array("rows", of=int)
-    """Row of the Jacobian that each unknown force acts along."""
+    """place, row: Candidate that each unknown force acts on, and row of the Jacobian that it acts
+    along."""
     friction_ratio: Floats = array("rows")
     """Tangential force per normal force of a point that slides, of either sign; zero of others."""
     scale: Floats = array("rows")
@@ -143,14 +146,11 @@ class SaddlePoint(Bundle):
     """The equations, the right-hand side last; their solution, the unit of each unknown, and their
     order. The coordinates come first, then forces."""
     force: Floats = array("nv")
-    bias: Floats = array("2 capacity")
+    bias: Floats = array("rows")
     """Known force of the state that was evaluated last, and acceleration of the rows of the
     candidates without any of the coordinates."""
-    mode: Integers = array("capacity", of=int)
-    impulse: Floats = array("2 capacity")
-    velocity: Floats = array("2 capacity")
-    residual: Floats = array(3)
-    """An answer of the contact solvers that is kept while a better one is looked for."""
+    answer: ContactAnswer = part(ContactAnswer)
+    """That of the contact solvers, kept while a better one is looked for."""
     needed: int = cell(int)
     used: int = cell(int)
     """needed, used: Whether the last evaluation took these equations; whether the answer of the
@@ -250,7 +250,7 @@ class Bridge(Bundle):
     """Velocities at its end without impulses."""
     added: Floats = array("capacity")
     """What is no velocity of the normal free term of each candidate."""
-    kept: Floats = array("2 capacity")
+    kept: Floats = array("rows")
     """Scratch of :func:`~heelstrike.sim.event_driven.bridge.put_in_place`."""
     lent: Integers = array("contacts", of=int)
     """Second faces that are kept until the bridge is found."""
@@ -345,8 +345,8 @@ class Integration(NamedTuple):
 def allocate_motion(robot: Robot) -> Motion:
     """Allocate the memory of an event-driven simulation of `robot`."""
     model = robot.model
-    contacts, loops = contact_count(robot), most_rows(robot)
-    rows = 2 * contacts + loops
+    components, loops = contact_components(robot), most_rows(robot)
+    contacts, rows = len(components), sum(components) + loops
     extents = model.extents | {
         "contacts": contacts, "components": 2, "rows": rows, "unknowns": model.nv + rows,
         "capacity": contacts + loops, "functions": 2 * contacts + robot.nc,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.brakes import share_friction
@@ -28,9 +29,9 @@ from heelstrike.sim.event_driven.continuous_extension import (
 from heelstrike.sim.event_driven.dormand_prince import interpolate
 from heelstrike.sim.event_driven.location import EVENT_TIME, TOGETHER
 from heelstrike.sim.event_driven.phase import Integration, Motion, Output, Phase, Samples, Step
-from heelstrike.sim.event_driven.smooth.candidates import slides
+from heelstrike.sim.event_driven.smooth.candidates import slides, tell_parts
 from heelstrike.sim.event_driven.smooth.corners import record_corner
-from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate
+from heelstrike.sim.event_driven.smooth.dynamics import evaluate
 from heelstrike.sim.event_driven.smooth.gaps import gap_velocity
 from heelstrike.sim.event_driven.smooth.projection import (
     INTERPOLATED,
@@ -65,13 +66,13 @@ def put_right(
 
     Returns whether the error of the dense output explains how far it is moved. If not it stays.
     """
-    copy_state(state, trial)
+    copy_words(state, trial)
     _, strayed, fastest = project(
         model, ground, equations, rows, surface, assembly, loops, phase, trial
     )
     if explained(state, trial, INTERPOLATED, step.relative, step.absolute):
         return True
-    copy_state(state, trial)
+    copy_words(state, trial)
     return is_in_place(strayed, fastest)
 
 
@@ -91,8 +92,9 @@ def show_who_carries(
             return
     for place in range(count):
         contact = assembly.candidate[place]
-        for k in range(2):
-            assembly.answer.impulse[2 * place + k] = force[contact, k]
+        row, end = assembly.problem.first[place], assembly.problem.first[place + 1]
+        for k in range(end - row):
+            assembly.answer.impulse[row + k] = force[contact, k]
 
 
 @kernel
@@ -124,11 +126,11 @@ def write_right(
     evaluate(scene, time, trial, control, memory, phase, output.slope)
     for k in range(3):
         residual[k] = 0.0
-    count, loop_rows = phase.forces.count, rows_of(loops)
+    count, loop_rows, first = phase.forces.count, rows_of(loops), assembly.problem.first
     if not lawful:
         count = 0
         for place in range(loop_rows):
-            impulse[2 * place] = 0.0
+            impulse[first[place]] = 0.0
     elif count + loop_rows > 0:
         solve_contacts(count, True, model, memory, phase)
         note_residual(residual, memory.tally)
@@ -137,13 +139,8 @@ def write_right(
                 count, memory.surface.friction, modes.slide, phase.watch.value, force, assembly
             )
     if loop_rows > 0:
-        first = assembly.problem.first
         note_loops(rows, count + loop_rows, 1.0, first, impulse, loops)
-    for contact in range(modes.watched):
-        force[contact, 0], force[contact, 1] = 0.0, 0.0
-    for place in range(count):
-        contact = assembly.candidate[place]
-        force[contact, 0], force[contact, 1] = impulse[2 * place], impulse[2 * place + 1]
+    tell_parts(count, modes.watched, assembly, impulse, force)
     row = record.rows
     note_row(time, memory, record)
     stop_torque, friction_torque = record.stop_torque[row], record.friction_torque[row]
@@ -268,7 +265,7 @@ def write_rows_within(meets: Integers, output: Output, record: Record, within: I
                 is_extended = True
             interpolate_corrected(part, step.begin, step.dense, step.extension.correction, state)
         else:  # the end has been put on its constraints, and on the event
-            copy_state(step.end, state)
+            copy_words(step.end, state)
         fits = put_right(
             state, scene.model, scene.ground, step, memory.equations, memory.rows, memory.surface,
             memory.assembly, memory.loops, phase, output.state,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.faces import Located
@@ -26,7 +27,7 @@ from heelstrike.sim.event_driven.location import (
     noise,
 )
 from heelstrike.sim.event_driven.phase import Integration, Modes, Phase, Step, Watch
-from heelstrike.sim.event_driven.smooth.dynamics import copy_state, evaluate, look
+from heelstrike.sim.event_driven.smooth.dynamics import evaluate, look
 from heelstrike.sim.event_driven.smooth.faces import has_corners, rate_corners
 from heelstrike.sim.event_driven.smooth.projection import EXPLAINED, explained, project
 from heelstrike.sim.memory import Assembly, Equations, Loops, Surface
@@ -94,11 +95,8 @@ def take_step(length: float, taken: Integration) -> float:
             if not error <= 1.0:
                 return error
             copy_events(watch.value, watch.rate, samples.end_value, samples.end_rate)
-            for contact in range(phase.modes.watched):
-                step.end_force[contact, 0] = force[contact, 0]
-                step.end_force[contact, 1] = force[contact, 1]
-            for i in range(memory.torque.shape[0]):
-                step.torque[i] = memory.torque[i]
+            copy_words(force, step.end_force)
+            copy_words(memory.torque, step.torque)
     fit_dense(length, step.begin, step.end, step.slopes, step.dense)
     return error
 
@@ -109,7 +107,7 @@ def settle(
     assembly: Assembly, loops: Loops, phase: Phase, step: Step,
 ) -> bool:  # fmt: skip
     """Put the end of the step on its constraints; return whether its error explains how far."""
-    copy_state(step.end, step.unsettled)
+    copy_words(step.end, step.unsettled)
     left, _, _ = project(model, ground, equations, rows, surface, assembly, loops, phase, step.end)
     fits = explained(step.unsettled, step.end, EXPLAINED, step.relative, step.absolute)
     return left <= max(TOGETHER, 2.0 * step.left) and fits

@@ -33,6 +33,7 @@ from heelstrike.sim.compliant.law import FrictionForces
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.controller.law import controller_in
+from heelstrike.sim.frame import Scene
 from heelstrike.sim.linearized.collocation import collocation, stage_equations
 from heelstrike.sim.linearized.inputs import TORQUE, Inputs
 from heelstrike.sim.linearized.law import AskedAlong
@@ -87,10 +88,8 @@ def act(
     corners: Corners, now: Rates, own_rows: Floats, force: Floats,
 ) -> None:  # fmt: skip
     """Find forces and rates of the state in `memory`, under the commands that are there."""
-    evaluate(
-        controller_in(control.function), control, model, ground, HELD, time, memory, laws, corners,
-        now, own_rows, force,
-    )  # fmt: skip
+    scene = Scene(controller_in(control.function), model, ground)
+    evaluate(scene, HELD, time, control, memory, laws, corners, now, own_rows, force)
 
 
 @kernel

@@ -10,8 +10,6 @@ Convex ground has no such corners.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, cell
@@ -21,6 +19,7 @@ from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
+from heelstrike.sim.contacts.faces import move_to_line
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import Surface
 
@@ -72,10 +71,5 @@ def join_forces(model: Model, second_faces: Contacts, contacts: Contacts) -> Non
         x, z = out_of_frame(second_faces.normal[i], (other[0], other[1]))
         x, z = own_x + x, own_z + z
         moment = radius * (force[1] + other[1])
-        size = math.sqrt(x * x + z * z)
-        if size > 0.0:
-            lever = moment / size
-            depth = math.sqrt(max(radius * radius - lever * lever, 0.0))
-            point[0] += radius * normal[0] + (lever * z - depth * x) / size
-            point[1] += radius * normal[1] + (-lever * x - depth * z) / size
+        move_to_line(x, z, moment, radius, normal, point)
         force[0], force[1] = into_frame(normal, (x, z))

@@ -41,7 +41,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import EVERY_ROW, INTERVAL, ImpulseSet, row_of
-from heelstrike.contact.workspace import ContactProblem, ContactWorkspace
+from heelstrike.contact.workspace import PROGRAM_ROWS, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.kernels import integrate, passive_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
@@ -647,29 +647,16 @@ def last_row(place: int, first: Integers) -> int:
 
 
 @dissolved_kernel
-def gather_points(
-    model: Model, contacts: Contacts, tree: Workspace, factor: Floats, near: int,
-    candidate: Integers, usual: UsualPoints, delassus: Floats,
-) -> None:  # fmt: skip
-    """Delassus matrix of all usual points; that of the points among the candidates, too."""
+def pick_points(near: int, candidate: Integers, usual: UsualPoints, delassus: Floats) -> None:
+    """Copy what belongs to the candidates from the Delassus matrix of all usual points."""
     usual_place, whole = usual.usual_place, usual.usual_problem.delassus
-    if near > 0:
-        play(
-            usual.programs[DELASSUS],
-            (model, usual.usual_points, tree, contacts, factor, usual.point_rows, whole),
-        )
-    if near == usual.usual_points.shape[0]:  # they are listed in the same order
-        for row in range(2 * near):
-            for column in range(2 * near):
-                delassus[row, column] = whole[row, column]
-    else:
-        for place in range(near):
-            row = 2 * usual_place[candidate[place]]
-            for other in range(near):
-                column = 2 * usual_place[candidate[other]]
-                for i in range(2):
-                    for j in range(2):
-                        delassus[2 * place + i, 2 * other + j] = whole[row + i, column + j]
+    for place in range(near):
+        row = 2 * row_of(candidate[place], usual_place)
+        for other in range(near):
+            column = 2 * row_of(candidate[other], usual_place)
+            for i in range(2):
+                for j in range(2):
+                    delassus[2 * place + i, 2 * other + j] = whole[row + i, column + j]
 
 
 @dissolved_kernel
@@ -763,18 +750,23 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     joints = count - rows_of(loops)
     others = are_there(SECOND_FACE, assembly) or are_there(CONSTRAINT, assembly)
     straight = not others and are_usual(candidate, near, DELASSUS, usual)
-    if straight and near == count == points.shape[0]:
-        play(
-            usual.programs[DELASSUS],
-            (
-                model, points, tree, contacts, equations.factor, usual.point_rows,
-                usual.usual_problem.delassus,
-            ),
-        )  # fmt: skip
-        problem = usual.usual_problem
-    elif straight:
-        factor, delassus = equations.factor, problem.delassus
-        gather_points(model, contacts, tree, factor, near, candidate, usual, delassus)
+    if straight:
+        all_points = near == points.shape[0]  # they are listed in the same order
+        if near > 0:
+            play(
+                usual.programs[DELASSUS],
+                (
+                    model, points, tree, contacts, equations.factor, usual.point_rows,
+                    usual.usual_problem.delassus,
+                ),
+            )  # fmt: skip
+        if all_points and first[count] <= usual.usual_problem.delassus.shape[0]:
+            problem = usual.usual_problem
+        else:
+            if first[count] <= PROGRAM_ROWS:
+                problem = memory.small_problem
+            pick_points(near, candidate, usual, problem.delassus)
+        delassus = problem.delassus
         for place in range(near, count):  # the rows of loops are there
             row = last_row(place, first)
             change = directions.jacobian[row]
@@ -792,7 +784,7 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         write_joint_rows(rows, assembly)
         write_contact_rows(SECOND_FACE, model, tree, second_faces, rows.owner, assembly)
         assemble_delassus(model, count, equations, directions, problem)
-    problem.count = count
+    problem.count = assembly.problem.count = count
     if work.scheme == MOREAU_JEAN:
         status = solve_restitution(work.order, problem, memory.solver, impact, answer)
     else:
@@ -999,7 +991,7 @@ def solve_step(model: Model, curved: bool, time: float, work: Stepping, memory: 
                 gap, restitution, assembly.directions, impact.bounce, listing,
             )  # fmt: skip
         first = note_group(SECOND_FACE, first, count, assembly)
-        count = append_loops(count, 1, loops, assembly)
+        count = append_loops(count, loops, assembly)
         note_group(LOOP, first, count, assembly)
         free_loops(count, loops, next_v, 0.5 * step, assembly)
         if at_once:

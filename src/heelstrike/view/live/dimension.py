@@ -77,14 +77,6 @@ class LiveDimension(ABC):
         """Return level and words of the light that says whether contact forces are proven."""
 
     @abstractmethod
-    def words_of(self, event: Any) -> str:
-        """Return the kind of an event as people write it."""
-
-    @abstractmethod
-    def place_of(self, event: Any, robot: Any) -> str:
-        """Name the contact point or joint at which an event happened; nothing if at none."""
-
-    @abstractmethod
     def shown_at(self, event: Any, robot: Any) -> int:
         """Index of what the picture marks for an event, -1 for nothing."""
 

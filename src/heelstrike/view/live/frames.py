@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from heelstrike.analysis.friction import friction_use
-from heelstrike.analysis.intervals import event_impulse, mean_over_intervals
+from heelstrike.analysis.intervals import event_impulse, mean_between, mean_over_intervals
 from heelstrike.analysis.motion import Motion, in_world, run_motion
 from heelstrike.analysis.support import foot_sums
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
@@ -21,15 +20,17 @@ from heelstrike.robot.named_tree import legs
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
-from heelstrike.sim.run import QUANTITIES, Run
+from heelstrike.sim.run import Run
 from heelstrike.view.live.layout import (
     MOST_PUSHES,
     FrameLayout,
     acting_pushes,
+    only,
     slider,
 )
-from heelstrike.view.page.curves import DASHED, Plot, Trace, alike, limits_in_words, side_of
+from heelstrike.view.page.curves import DASHED, Plot, Trace, alike, side_of
 from heelstrike.view.page.motion import frames as drawn
+from heelstrike.view.style import limits_in_words
 
 ROOM = 0.15
 """Share of a sole's length that its plot shows beyond either end."""
@@ -59,7 +60,8 @@ class Layout(FrameLayout):
     def frames(self, run: Run, rows: Sequence[int], pushes: Iterable[Push]) -> Floats:
         """Return the frames of some rows but the first; see `FrameLayout`."""
         rows_shown = np.asarray(rows[1:], dtype=np.int64)
-        each = _only(run, rows_shown, mean_forces(run, np.asarray(rows, dtype=np.int64)))
+        forces = mean_forces(run, np.asarray(rows, dtype=np.int64))
+        each = only(run, rows_shown, contact_force=forces)
         every = np.arange(len(rows_shown))
         motion = run_motion(each)
         zmp = zero_moment_point(each, motion=motion)
@@ -185,11 +187,6 @@ def mean_forces(run: Run, rows: Integers) -> Floats:
 
     Where no time lies between two rows, those of the later one.
     """
-    found = run.contact_force[rows[1:]].copy()
-    elapsed = np.diff(run.time[rows])
-    lasting = np.flatnonzero(elapsed > 0.0)
-    if not len(lasting):
-        return found
     held = np.diff(run.time)[:, None, None]
     gained = mean_over_intervals(run, run.contact_force) * held
     if run.method.impulses_in_events:
@@ -197,13 +194,4 @@ def mean_forces(run: Run, rows: Integers) -> Floats:
         nx, nz = run.contact_normal[:-1, :, 0], run.contact_normal[:-1, :, 1]
         along = jumps[..., 0] * nx + jumps[..., 1] * nz, jumps[..., 0] * nz - jumps[..., 1] * nx
         gained = gained + np.stack(along, axis=-1)
-    impulse = np.concatenate((np.zeros((1, *gained.shape[1:])), np.cumsum(gained, axis=0)))
-    total = impulse[rows[lasting + 1]] - impulse[rows[lasting]]
-    found[lasting] = total / elapsed[lasting, None, None]
-    return found
-
-
-def _only(run: Run, rows: Integers, forces: Floats) -> Run:
-    """Return a run of some rows, with forces (n, nc, 2) of its own."""
-    kept = {name: getattr(run, name)[rows] for name in ("time", *QUANTITIES)}
-    return replace(run, **kept | {"contact_force": forces}, pushes=())
+    return mean_between(run.time, gained, rows, run.contact_force[rows], since=True)[1:]

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 
-from heelstrike.robot.model import Floats
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
+from heelstrike.sim.run import AnyRun, quantities_of
 from heelstrike.tolerances import SAME_ROW
 from heelstrike.view.page.curves import DASHED, Plot, Trace, side_of
 from heelstrike.view.style import in_words
+
+AnyRunType = TypeVar("AnyRunType", bound=AnyRun)
 
 MOST_PUSHES = 4
 """Pushes that are drawn at once."""
@@ -144,6 +148,12 @@ def slider(name: str, *, hinge: bool, ends: tuple[float, float], at: int) -> dic
         "name": name, "label": in_words(name).removesuffix(" joint"),
         "unit": "rad" if hinge else "m", "low": low, "high": high, "at": at,
     }  # fmt: skip
+
+
+def only(run: AnyRunType, rows: Integers, **replaced: Floats) -> AnyRunType:
+    """Return some rows of a run, without events and pushes, with some arrays replaced."""
+    kept = {name: getattr(run, name)[rows] for name in ("time", *quantities_of(type(run)))}
+    return replace(run, **kept | replaced, events=(), pushes=())
 
 
 def acting_pushes(

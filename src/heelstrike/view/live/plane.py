@@ -19,7 +19,7 @@ from heelstrike.sim.simulation import Simulation
 from heelstrike.view.live.dimension import LiveDimension
 from heelstrike.view.live.frames import Layout
 from heelstrike.view.live.light import light_of
-from heelstrike.view.page.events import contact_of, kind_in_words, place_of
+from heelstrike.view.page.events import contact_of
 from heelstrike.view.page.scene import scene
 
 SEEN_TO_STAND = 1e-3
@@ -69,14 +69,6 @@ class Plane(LiveDimension):
     def light(self, run: Run) -> dict[str, str]:
         """Return the light of a run."""
         return light_of(run)
-
-    def words_of(self, event: Event) -> str:
-        """Return the kind of an event as people write it."""
-        return kind_in_words(event)
-
-    def place_of(self, event: Event, robot: Robot) -> str:
-        """Name the contact point or joint at which an event happened."""
-        return place_of(event, robot)
 
     def shown_at(self, event: Event, robot: Robot) -> int:  # noqa: ARG002 - each point is drawn
         """Index of the contact point at which an event happened."""

@@ -516,12 +516,12 @@ class Session:
         places: dict[str, list[str]] = {}
         for event in self.history.events:
             if abs(event.time - time) <= SAME_ROW:
-                places.setdefault(self.dimension.words_of(event), []).append(self._where(event))
+                places.setdefault(event.kind_in_words, []).append(self._where(event))
         told = [f"{kind} ({', '.join(filter(None, each))})" for kind, each in places.items()]
         return f"at {time:.6g} s: {'; '.join(told)}".replace(" ()", "")
 
     def _where(self, event: AnyEvent) -> str:
-        return "" if self._layout is None else self.dimension.place_of(event, self._layout.robot)
+        return "" if self._layout is None else in_words(event.place(self._layout.robot))
 
     def _tell_busy(self, what: str) -> None:
         self._busy = what

@@ -181,6 +181,12 @@ def friction_control(value: float, *, boxes_apart: bool = False) -> Control:
     return Control(FRICTION, label, value, low=0.0, high=max(1.5, value), step=0.01, at_once=True)
 
 
+def slope_control(usual: float, steepest: float) -> Control:
+    """Return the control of the ground's slope (degrees), at least as steep as usual."""
+    end = max(steepest, abs(usual))
+    return Control("slope", "slope", usual, low=-end, high=end, step=0.5, unit="°")
+
+
 MILLISECONDS = " ms"
 STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 """Steps that are offered, in ms."""

@@ -22,7 +22,7 @@ from heelstrike.view.contact_figures import ROOM_ABOUT_POINTS
 from heelstrike.view.energy_figure import ALWAYS
 from heelstrike.view.page.rows import Rows, means
 from heelstrike.view.panels import impact_rows
-from heelstrike.view.style import in_words
+from heelstrike.view.style import in_words, limits_in_words
 
 DASHED, DOTTED = 1, 2
 SIDES = ("left", "right")
@@ -165,12 +165,6 @@ def _on_joints(
             )
         )
     return found
-
-
-def limits_in_words(limits: Sequence[float], unit: str = "") -> str:
-    """Say which limits there are."""
-    text = " … ".join(f"{limit:g}" for limit in limits).replace("-", "−")
-    return f"limits {text} {unit}".rstrip() if limits else ""
 
 
 def side_of(name: str) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from heelstrike.analysis.friction import friction_coefficient
 from heelstrike.analysis.motion import Motion, in_world
-from heelstrike.analysis.support import pushing
+from heelstrike.analysis.support import carrying, on_ground
 from heelstrike.analysis.zero_moment_point import ZeroMomentPoint
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import center_of_mass_velocity
@@ -16,7 +16,6 @@ from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Run
-from heelstrike.tolerances import STANDING_GAP
 from heelstrike.view.page.rows import Rows, means
 
 
@@ -67,13 +66,12 @@ def support_ends(run: Run) -> Floats:
     """First and last of the points on the ground in every row, (nt, 4): x, z, x, z in m."""
     if not run.robot.nc:
         return np.full((len(run.time), 4), np.nan)
-    touching = (run.gap <= STANDING_GAP) | pushing(run)
-    on_ground = run.contact_point - run.gap[..., None] * run.contact_normal
+    touching, place = carrying(run), on_ground(run)
     row = np.arange(len(run.time))
-    x = on_ground[..., 0]
+    x = place[..., 0]
     first = np.where(touching, x, np.inf).argmin(axis=1)
     last = np.where(touching, x, -np.inf).argmax(axis=1)
-    ends = np.concatenate((on_ground[row, first], on_ground[row, last]), axis=-1)
+    ends = np.concatenate((place[row, first], place[row, last]), axis=-1)
     return np.where(touching.any(axis=1, keepdims=True), ends, np.nan)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,14 +13,15 @@ from heelstrike.analysis.support import support_phases
 from heelstrike.analysis.zero_moment_point import zero_moment_point
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
-from heelstrike.sim.run import Event, Run
+from heelstrike.robot.model import Floats
+from heelstrike.sim.run import AnyRun, Run
 from heelstrike.view.page.columns import TOLERANCE, packed
-from heelstrike.view.page.curves import plots
-from heelstrike.view.page.events import contact_of, impulse_of, kind_in_words, place_of
+from heelstrike.view.page.curves import Plot, plots
+from heelstrike.view.page.events import described
 from heelstrike.view.page.markup import escaped, player, shipped, table
 from heelstrike.view.page.motion import frames
 from heelstrike.view.page.provenance import provenance
-from heelstrike.view.page.rows import IMPACTS, shown_rows
+from heelstrike.view.page.rows import Rows, shown_rows
 from heelstrike.view.page.scene import scene
 from heelstrike.view.page.verdict import judge
 from heelstrike.view.style import view_errors
@@ -124,43 +126,57 @@ def certificates(run: Run) -> dict[str, str]:
     }
 
 
-def contents(run: Run, gait: Gait | None = None, *, shown: float | None = None) -> dict[str, Any]:
-    """Return what the script of a page shows, as JSON has it; `shown` is when it begins (s).
+def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
+    """Return what the script of a page shows, as JSON has it.
 
-    Numbers of the rows shown are those of the run to `TOLERANCE` of their range, times are exact.
     Forces are means from each row shown to the next.
     """
     rows = shown_rows(run)
     motion = run_motion(run)
     zmp = zero_moment_point(run, motion=motion)
-    panels = plots(run, gait, rows, zmp)
     columns = frames(run, rows, motion, zmp)
-    for i, panel in enumerate(panels):
-        for k, trace in enumerate(panel.traces):
-            assert trace.values is not None
-            columns[f"curve {i} {k}"] = trace.values
+    return recorded(run, rows, scene(run.robot, run.ground), columns, plots(run, gait, rows, zmp))
+
+
+def recorded(
+    run: AnyRun,
+    rows: Rows,
+    drawn: dict[str, Any],
+    columns: dict[str, Floats],
+    panels: Sequence[Plot],
+) -> dict[str, Any]:
+    """Return what the script of a page shows of some rows of a run, as JSON has it.
+
+    Numbers are those of the run to `TOLERANCE` of their range, times are exact.
+
+    Parameters
+    ----------
+    run : AnyRun
+        The run.
+    rows : (k,) int
+        The rows.
+    drawn : dict
+        What is drawn: the robot and its ground.
+    columns : dict of (k, ...) float
+        What moves, by its name.
+    panels : sequence of Plot
+        Panels of curves.
+    """
+    curves = {
+        f"curve {i} {k}": trace.values
+        for i, panel in enumerate(panels)
+        for k, trace in enumerate(panel.traces)
+        if trace.values is not None
+    }
     events = run.events[:MOST_EVENTS]
     phases = support_phases(run)[:MOST_PHASES]
     return {
-        "scene": scene(run.robot, run.ground),
-        "data": packed(run.time[rows], columns),
+        "scene": drawn,
+        "data": packed(run.time[rows], columns | curves),
         "plots": [panel.described() for panel in panels],
-        "events": [_described(event, run) for event in events],
+        "events": [described(event, run.robot) for event in events],
         "phases": [[phase.start, phase.end, *phase.feet] for phase in phases],
         "left_out": len(run.events) - len(events),
         "recorded": len(run.time),
         "tolerance": TOLERANCE,
-    } | ({} if shown is None else {"shown": shown})
-
-
-def _described(event: Event, run: Run) -> dict[str, Any]:
-    impulse, unit = impulse_of(event, run.robot)
-    return {
-        "time": event.time,
-        "kind": kind_in_words(event),
-        "where": place_of(event, run.robot),
-        "contact": contact_of(event),
-        "impulse": impulse,
-        "unit": unit,
-        "impact": event.kind in IMPACTS,
     }

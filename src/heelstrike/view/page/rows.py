@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from heelstrike.analysis.intervals import mean_over_intervals
+from heelstrike.analysis.intervals import mean_between, mean_over_intervals
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import AnyRun, Run
 
 Rows = Integers
 
@@ -25,7 +25,7 @@ MOST_ROWS = 6000
 IMPACTS = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.JOINT_STOP, EventKind.PAINLEVE)
 
 
-def shown_rows(run: Run) -> Rows:
+def shown_rows(run: AnyRun, *, most: int = MOST_ROWS) -> Rows:
     """Choose the rows of a run that a page shows, as indices in the order of time.
 
     Rows some `INTERVAL` apart, closer about impacts, the first and the last, and those on both
@@ -33,7 +33,7 @@ def shown_rows(run: Run) -> Rows:
     then events.
     """
     impacts = [event.time for event in run.events if event.kind in IMPACTS]
-    return rows_about(run.time, [event.time for event in run.events], impacts)
+    return rows_about(run.time, [event.time for event in run.events], impacts, most=most)
 
 
 def rows_about(
@@ -72,14 +72,6 @@ def means(run: Run, values: Floats, rows: Rows) -> Floats:
     What pushes for one step between two rows is seen with its impulse. The last row, and one that
     has the time of the next, has its own value.
     """
-    if len(run.time) < 2:
-        return values[rows]
-    held = np.diff(run.time).reshape(-1, *([1] * (values.ndim - 1)))
-    impulse = np.zeros_like(values)
-    impulse[1:] = np.cumsum(mean_over_intervals(run, values) * held, axis=0)
-    found = values[rows].copy()
-    elapsed = np.diff(run.time[rows])
-    lasting = np.flatnonzero(elapsed > 0.0)
-    gained = impulse[rows[lasting + 1]] - impulse[rows[lasting]]
-    found[lasting] = gained / elapsed[lasting].reshape(-1, *([1] * (values.ndim - 1)))
-    return found
+    held = np.diff(run.time).reshape(-1, *[1] * (values.ndim - 1))
+    gained = mean_over_intervals(run, values) * held
+    return mean_between(run.time, gained, rows, values[rows])

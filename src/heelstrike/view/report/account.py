@@ -58,10 +58,6 @@ class Account(ABC):
         """Measure the run."""
 
     @abstractmethod
-    def is_slide(self, actuator: int) -> bool:
-        """Whether an actuator drives a slide."""
-
-    @abstractmethod
     def summary(self) -> dict[str, str]:
         """Return label and value of the lines of its summary."""
 

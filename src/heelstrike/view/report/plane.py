@@ -59,11 +59,6 @@ class InPlane(Account):
         """Measure the walk."""
         return measures(self.run, self.gait)
 
-    def is_slide(self, actuator: int) -> bool:
-        """Whether an actuator drives a slide."""
-        model = self.run.robot.model
-        return bool(model.axis[model.actuator_joint[actuator], 0] == 0.0)
-
     def summary(self) -> dict[str, str]:
         """Return label and value of the lines of its summary."""
         return dict(summarize(self.run, gait=self.gait).lines())

@@ -47,12 +47,6 @@ class InSpace(Account):
         """Measure the run."""
         return measures_in_space(self.run)
 
-    def is_slide(self, actuator: int) -> bool:
-        """Whether an actuator drives a slide."""
-        model = self.run.robot.model
-        joint = model.velocity_joint[model.actuator_velocity[actuator]]
-        return int(model.joint_kind[joint]) == SLIDE
-
     def summary(self) -> dict[str, str]:
         """Return label and value of the lines of its summary."""
         return dict(summarize_in_space(self.run).lines())

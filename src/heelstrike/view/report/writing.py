@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
+from heelstrike.analysis.actuation import turning
 from heelstrike.analysis.diagnosis.changes import Tried
 from heelstrike.analysis.diagnosis.limits import REACHED, Limit
 from heelstrike.analysis.diagnosis.measures import motor_loads
@@ -239,8 +240,8 @@ def _measures(named: Mapping[str, Account]) -> Iterator[str]:
             for load in motor_loads(account.run)
         ]  # fmt: skip
         if loads:
-            has_slides = any(map(account.is_slide, range(len(loads))))
-            slides = " (N and m/s of slides)" if has_slides else ""
+            robot = account.run.robot
+            slides = "" if turning(robot)[robot.driven].all() else " (N and m/s of slides)"
             heading = ("", "peak torque (N m)", "rms (N m)", "peak speed (rad/s)",
                        "mean power (W)", "peak power (W)")  # fmt: skip
             yield f'<div class="wide">{grid(heading, loads, f"Motors{slides}{of}")}</div>'

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,10 +17,10 @@ from heelstrike.robot.model import Floats
 from heelstrike.sim.files.spatial import IN_SPACE
 from heelstrike.sim.run import Run
 from heelstrike.sim.spatial.run import RECORDED, SpatialRun
-from heelstrike.view.comparison_figure import COLORS, STROKES
-from heelstrike.view.panels import THIN, Curve, Excerpt, Panel, draw_panels, rows_within
+from heelstrike.view.figures import unknown_figure
+from heelstrike.view.panels import Curve, Excerpt, Panel, draw_panels, rows_within
+from heelstrike.view.quantity_figure import look
 from heelstrike.view.style import foot_color, in_words, save_figure, styled
-from heelstrike.wording import meant
 
 AXES = ("x", "y", "z")
 COMPONENTS = {
@@ -65,7 +65,7 @@ def _gaps(run: SpatialRun) -> tuple[str, list[Panel]]:
         Curve(
             np.nanmin(run.gap[:, links == link], axis=1),
             in_words(robot.link_names[link]),
-            _look(number),
+            look(number),
         )
         for number, link in enumerate(np.unique(links).tolist())
     ]
@@ -137,7 +137,7 @@ def plot_in_space(
         If there is no such figure, nothing to show, or the file cannot be written.
     """
     if what not in _DRAWINGS and what not in RECORDED:
-        raise ViewError(_unknown(what))
+        raise unknown_figure(what, "figure of a run in space", _DRAWINGS, RECORDED)
     rows = rows_within(run, span)
     with styled():
         drawing = _DRAWINGS.get(what)
@@ -194,7 +194,7 @@ def _quantity(run: SpatialRun, name: str) -> tuple[str, list[Panel]]:
         Panel(
             unit,
             [
-                Curve(table[:, i, k], in_words(along[i]), _look(i - first))
+                Curve(table[:, i, k], in_words(along[i]), look(i - first))
                 for i in range(first, min(first + together, len(along)))
             ],
             title=component,
@@ -203,18 +203,3 @@ def _quantity(run: SpatialRun, name: str) -> tuple[str, list[Panel]]:
         for first in range(0, len(along), together)
     ]
     return quantity.label, panels
-
-
-def _look(number: int) -> dict[str, Any]:
-    """Look of a curve: a colour of the palette, and other strokes when all have been used."""
-    stroke = STROKES[number // len(COLORS) % len(STROKES)]
-    return {"linewidth": THIN, "color": COLORS[number % len(COLORS)], "linestyle": stroke}
-
-
-def _unknown(what: str) -> str:
-    guess = meant(str(what).lower(), (*FIGURES, *RECORDED))
-    names = " ".join(f"{name}: {drawing.__doc__}" for name, drawing in _DRAWINGS.items())
-    return (
-        f"there is no figure of a run in space called {what!r}.{guess} There are: {names} And what "
-        f"is recorded: {', '.join(RECORDED)}."
-    )

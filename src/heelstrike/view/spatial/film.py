@@ -5,30 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.lines import Line2D
 
 from heelstrike.analysis.spatial.links import link_motion
 from heelstrike.analysis.spatial.zero_moment_point import spatial_zero_moment_point
-from heelstrike.robot.model import Floats, Integers
-from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.view.arrows import draw_scale
 from heelstrike.view.canvas import Canvas
-from heelstrike.view.film import evened
+from heelstrike.view.film import evened, instants, legend_of
 from heelstrike.view.spatial.body import SpatialBody
 from heelstrike.view.spatial.camera import FAR_AWAY, Camera
 from heelstrike.view.spatial.forces import middle_of_pressure, shown_forces
 from heelstrike.view.spatial.stage import Instant, Stage
-from heelstrike.view.style import (
-    FORCE_COLOR,
-    ORANGE,
-    ZERO_MOMENT_POINT_COLOR,
-    foot_color,
-    in_words,
-)
 
 LOOKED_AT = 60
 """Frames in which it is looked at how much room the robot takes."""
+
+
+PRESSURE = "zero moment point, support"
+"""What is told by the diamond and what lies about it."""
 
 
 class SpatialFilm:
@@ -51,7 +45,7 @@ class SpatialFilm:
     def __init__(self, run: SpatialRun, size: tuple[int, int], fps: float, speed: float) -> None:
         self.size = size
         interval = speed / fps
-        self._time, rows = _instants(run, interval)
+        self._time, rows = instants(run, interval)
         self._canvas = canvas = Canvas(size, speed)
         axes, scale, font = canvas.axes, canvas.scale, canvas.font
         self._stage = Stage(axes, run.robot, run.ground, width=scale)
@@ -71,8 +65,8 @@ class SpatialFilm:
             )  # fmt: skip
         scale_of_forces = [each for each in axes.get_children() if each not in before]
         canvas.figure.legend(
-            handles=legend_of(run.robot, forces=bool(run.robot.nc)), loc="upper right",
-            fontsize=0.85 * font, labelspacing=0.35, frameon=False,
+            handles=legend_of(run.robot, forces=run.robot.nc > 0, pressure=PRESSURE),
+            loc="upper right", fontsize=0.85 * font, labelspacing=0.35, frameon=False,
         )  # fmt: skip
         canvas.begin([*self._stage.artists, *scale_of_forces])
 
@@ -129,29 +123,3 @@ class SpatialFilm:
             xlim=(-0.5 * height * aspect, 0.5 * height * aspect),
             ylim=(middle - 0.5 * height, middle + 0.5 * height),
         )
-
-
-def _instants(run: SpatialRun, interval: float) -> tuple[Floats, Integers]:
-    """Times of the frames, `interval` (s) apart, and the row of the run that each shows."""
-    count = int(np.floor((run.time[-1] - run.time[0]) / interval + 1e-9)) + 1
-    time = run.time[0] + interval * np.arange(count)
-    return time, np.maximum(np.searchsorted(run.time, time + 1e-9, side="right") - 1, 0)
-
-
-def legend_of(robot: SpatialRobot, *, forces: bool) -> list[Line2D]:
-    """What the colours of a picture mean."""
-    several = len(robot.feet) > 1
-    lines = (
-        [(foot_color(i), in_words(foot.name)) for i, foot in enumerate(robot.feet)]
-        if several
-        else []
-    )
-    dots = [("o", ORANGE, "centre of mass")]
-    if forces:
-        lines.append((FORCE_COLOR, "contact force"))
-        dots.insert(0, ("D", ZERO_MOMENT_POINT_COLOR, "zero moment point, support"))
-    handles = [Line2D([], [], color=color, lw=4.0, label=label) for color, label in lines]
-    return handles + [
-        Line2D([], [], marker=marker, color=color, mec="white", ls="", ms=8, label=label)
-        for marker, color, label in dots
-    ]

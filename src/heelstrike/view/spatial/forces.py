@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from heelstrike.analysis.spatial.support import on_ground
+from heelstrike.analysis.intervals import mean_between
+from heelstrike.analysis.support import on_ground
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.spatial.robot import SpatialRobot
@@ -70,15 +71,8 @@ def shown_forces(run: SpatialRun, rows: Integers, *, since: bool = False) -> Sho
         acting[:, g, 3] = pressed[:, group].sum(axis=1)
         acting[:, g, 4:] = np.einsum("tc,tck->tk", pressed[:, group], places[:, group])
         middle[:, g] = places[rows][:, group].mean(axis=1)
-    impulse = np.zeros_like(acting)
-    impulse[1:] = np.cumsum(acting[:-1] * np.diff(run.time)[:, None, None], axis=0)
-    first, last = (
-        (np.append(rows[:1], rows[:-1]), rows) if since else (rows, np.append(rows[1:], rows[-1:]))
-    )
-    elapsed = run.time[last] - run.time[first]
-    lasting = elapsed > 0.0
-    mean = acting[rows].copy()
-    mean[lasting] = (impulse[last] - impulse[first])[lasting] / elapsed[lasting, None, None]
+    gained = acting[:-1] * np.diff(run.time)[:, None, None]
+    mean = mean_between(run.time, gained, rows, acting[rows], since=since)
     floor = 1e-6 * max(run.robot.weight, 1e-300)
     loaded = mean[..., 3] > floor
     place = np.where(

@@ -20,11 +20,10 @@ from heelstrike.sim.spatial.space import SPACE
 from heelstrike.view.live.dimension import LiveDimension
 from heelstrike.view.live.light import certified_light
 from heelstrike.view.live.plane import SEEN_TO_STAND
-from heelstrike.view.spatial.events import OF_POINTS
+from heelstrike.view.page.events import contact_of
 from heelstrike.view.spatial.forces import force_groups
 from heelstrike.view.spatial.live_frames import SpatialLayout
 from heelstrike.view.spatial.scene import scene_in_space
-from heelstrike.view.style import in_words
 
 MOST_LIFTS, ON_GROUND = 40, 1e-10
 """How often a robot is lifted or lowered, and the gap (m) with which it is on the ground."""
@@ -82,19 +81,10 @@ class Space(LiveDimension):
             residual=run.certificates.residual, failed=run.status is RunStatus.SOLVER_FAILED,
         )  # fmt: skip
 
-    def words_of(self, event: SpatialEvent) -> str:
-        """Return the kind of an event as people write it."""
-        return event.kind_in_words
-
-    def place_of(self, event: SpatialEvent, robot: SpatialRobot) -> str:
-        """Name the contact point or joint at which an event happened."""
-        return in_words(event.place(robot))
-
     def shown_at(self, event: SpatialEvent, robot: SpatialRobot) -> int:
-        """Index of the force that is drawn of the contact point of an event."""
-        if event.kind not in OF_POINTS:
-            return -1
-        return next(g for g, group in enumerate(force_groups(robot)) if event.contact in group)
+        """Index of the force that is drawn of the contact point of an event, -1 for none."""
+        contact = contact_of(event)
+        return next((g for g, group in enumerate(force_groups(robot)) if contact in group), -1)
 
 
 def stands(simulation: SpatialSimulation) -> bool:

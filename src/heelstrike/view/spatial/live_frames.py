@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,9 @@ from heelstrike.robot.spatial.model import HINGE, SLIDE
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push, pushes_on
-from heelstrike.sim.spatial.run import RECORDED, SpatialRun
+from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.sim.spatial.space import SpatialLook
-from heelstrike.view.live.layout import MOST_PUSHES, FrameLayout, acting_pushes, slider
+from heelstrike.view.live.layout import MOST_PUSHES, FrameLayout, acting_pushes, only, slider
 from heelstrike.view.page.curves import Plot, Trace
 from heelstrike.view.spatial.forces import (
     ShownForces,
@@ -66,7 +65,7 @@ class SpatialLayout(FrameLayout):
         shown = every[1:]
         since = shown_forces(run, every, since=True)
         forces = ShownForces(since.place[1:], since.force[1:], since.normal[1:])
-        each = _only(run, shown)
+        each = only(run, shown)
         motion, found = centroidal_motion(each), spatial_zero_moment_point(each)
         normal = each.contact_normal[:, self._first]
         friction = face_friction(run, shown)[:, self._first]
@@ -166,9 +165,3 @@ class SpatialLayout(FrameLayout):
             at = motion.origin[row, link] + motion.rotation[row, link] @ numbers.point[0]
             table[row, place] = (*at, *push.force)
         return table
-
-
-def _only(run: SpatialRun, rows: Any) -> SpatialRun:
-    """Return a run of some rows."""
-    kept = {name: getattr(run, name)[rows] for name in ("time", *RECORDED)}
-    return replace(run, **kept, events=(), pushes=())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from importlib.resources import files
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +12,15 @@ import numpy as np
 from heelstrike.analysis.spatial.summary import summarize_in_space
 from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
-from heelstrike.sim.spatial.record import SpatialEventKind
-from heelstrike.sim.spatial.run import SpatialEvent, SpatialRun
-from heelstrike.view.page.columns import TOLERANCE, packed
+from heelstrike.sim.spatial.run import SpatialRun
 from heelstrike.view.page.markup import data_block, escaped, player, shipped, table
-from heelstrike.view.page.page import MOST_EVENTS, MOST_PHASES, check_page
+from heelstrike.view.page.page import check_page, recorded
 from heelstrike.view.page.provenance import method_in_words, versions
-from heelstrike.view.page.rows import MOST_ROWS, Rows, rows_about
+from heelstrike.view.page.rows import MOST_ROWS, shown_rows
 from heelstrike.view.page.verdict import Verdict, happened
-from heelstrike.view.spatial.events import OF_POINTS
 from heelstrike.view.spatial.scene import moving_columns, scene_in_space, spatial_plots
 from heelstrike.view.spatial.verdict import judge_in_space
-from heelstrike.view.style import in_words, view_errors
+from heelstrike.view.style import view_errors
 from heelstrike.whole_file import write_whole
 
 LARGEST = 1_400_000
@@ -34,8 +30,6 @@ FEWEST_ROWS = 100
 
 MOST_LIMITS = 12
 """Limits that a page lists."""
-
-IMPACTS = (SpatialEventKind.TOUCHDOWN, SpatialEventKind.JOINT_STOP)
 
 CAMERA = (
     " Dragging turns the picture, with Shift it moves; the wheel, + and − come nearer and go away; "
@@ -136,61 +130,11 @@ def _limits(verdict: Verdict) -> str:
 
 def contents(run: SpatialRun, *, most: int = MOST_ROWS) -> dict[str, Any]:
     """Return what the script of a page shows, as JSON has it, of at most so many rows."""
-    rows = _shown_rows(run, most)
-    panels = spatial_plots(run, rows)
-    columns = moving_columns(run, rows)
-    for i, panel in enumerate(panels):
-        for k, trace in enumerate(panel.traces):
-            assert trace.values is not None
-            columns[f"curve {i} {k}"] = trace.values
-    events = run.events[:MOST_EVENTS]
-    return {
-        "scene": scene_in_space(run.robot, run.ground),
-        "data": packed(run.time[rows], columns),
-        "plots": [panel.described() for panel in panels],
-        "events": [_described(event, run) for event in events],
-        "phases": _phases(run),
-        "left_out": len(run.events) - len(events),
-        "recorded": len(run.time),
-        "tolerance": TOLERANCE,
-    }
-
-
-def _shown_rows(run: SpatialRun, most: int) -> Rows:
-    impacts = [event.time for event in run.events if event.kind in IMPACTS]
-    rows = rows_about(run.time, [event.time for event in run.events], impacts, most=most)
-    if len(rows) <= most:
-        return rows
-    return np.unique(rows[np.linspace(0, len(rows) - 1, most).round().astype(np.int64)])
-
-
-def _phases(run: SpatialRun) -> list[list[float]]:
-    """Spans of time in which the same feet press: begin, end, feet."""
-    pressed = run.contact_force[..., 0] > 1e-9 * run.robot.weight
-    feet = [pressed[:, list(foot.contacts)].any(axis=1) for foot in run.robot.feet]
-    if not feet or len(run.time) < 2:
-        return []
-    table_of_feet = np.stack(feet, axis=1)
-    changes = np.flatnonzero((table_of_feet[1:] != table_of_feet[:-1]).any(axis=1)) + 1
-    edges = [0, *changes.tolist(), len(run.time) - 1]
-    return [
-        [float(run.time[a]), float(run.time[b]), *np.flatnonzero(table_of_feet[a]).tolist()]
-        for a, b in pairwise(edges)
-        if b > a
-    ][:MOST_PHASES]
-
-
-def _described(event: SpatialEvent, run: SpatialRun) -> dict[str, Any]:
-    of_a_point = event.kind in OF_POINTS
-    return {
-        "time": event.time,
-        "kind": event.kind_in_words,
-        "where": in_words(event.place(run.robot)),
-        "contact": event.contact if of_a_point else -1,
-        "impulse": event.impulse[0] if of_a_point else 0.0,
-        "unit": "N s" if of_a_point else "",
-        "impact": event.kind in IMPACTS,
-    }
+    rows = shown_rows(run, most=most)
+    if len(rows) > most:
+        rows = np.unique(rows[np.linspace(0, len(rows) - 1, most).round().astype(np.int64)])
+    drawn = scene_in_space(run.robot, run.ground)
+    return recorded(run, rows, drawn, moving_columns(run, rows), spatial_plots(run, rows))
 
 
 def certificates_in_space(run: SpatialRun) -> dict[str, str]:

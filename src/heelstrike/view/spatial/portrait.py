@@ -12,8 +12,8 @@ from heelstrike.contact.spatial.ground import SpatialGround
 from heelstrike.dynamics import spatial
 from heelstrike.robot.spatial.robot import SpatialRobot
 from heelstrike.robot.state import State
+from heelstrike.view.film import legend_of
 from heelstrike.view.spatial.camera import FAR_AWAY, Camera
-from heelstrike.view.spatial.film import legend_of
 from heelstrike.view.spatial.stage import Instant, Stage
 from heelstrike.view.style import INK, new_figure, save_figure, styled
 

@@ -16,7 +16,7 @@ from heelstrike.robot.named_tree import legs
 from heelstrike.robot.spatial.model import HINGE, SLIDE
 from heelstrike.robot.spatial.robot import SpatialRobot, quaternion_places
 from heelstrike.sim.spatial.run import SpatialRun
-from heelstrike.view.page.curves import DASHED, Plot, Trace, alike, limits_in_words, side_of
+from heelstrike.view.page.curves import DASHED, Plot, Trace, alike, side_of
 from heelstrike.view.page.rows import Rows
 from heelstrike.view.page.scene import DIGITS
 from heelstrike.view.spatial.body import SpatialBody, body_in_space
@@ -27,7 +27,7 @@ from heelstrike.view.spatial.forces import (
     shown_forces,
 )
 from heelstrike.view.spatial.stage import corners_of_boxes
-from heelstrike.view.style import in_words
+from heelstrike.view.style import in_words, limits_in_words
 
 MOST_EDGES = 16
 """Corners of a support polygon that a page shows; of more every second or third."""

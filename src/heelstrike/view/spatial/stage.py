@@ -71,6 +71,12 @@ class Instant:
     """(k, 3) Corners of the support polygon, in m."""
 
 
+def grid_spacing(size: float) -> float:
+    """Distance (m) of the lines of the ground: a round number, above 0.3 times a robot's size."""
+    spread = 10.0 ** np.floor(np.log10(size))
+    return float(next(n * spread for n in (0.5, 1.0, 2.0, 5.0) if n * spread > 0.3 * size))
+
+
 class Stage:
     """What shows a robot on axes whose units are those of a camera's picture.
 
@@ -97,10 +103,7 @@ class Stage:
         self._height = float(ground.height)
         self._boxes = corners_of_boxes(ground)[:, BOX_SIDES]
         size = self.body.size
-        spread = 10.0 ** np.floor(np.log10(size))
-        self._spacing = float(
-            next(n * spread for n in (0.2, 0.5, 1.0, 2.0) if n * spread > 0.3 * size)
-        )
+        self._spacing = grid_spacing(size)
         self._soil = Polygon(np.zeros((1, 2)), closed=True, facecolor=SOIL, edgecolor="none")
         axes.add_patch(self._soil)
         self._grid = LineCollection([], colors=LINE, linewidths=width)

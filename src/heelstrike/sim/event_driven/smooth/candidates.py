@@ -8,12 +8,13 @@ from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.workspace import ContactWorkspace
 from heelstrike.dynamics.kernels import passive_force
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.candidates import part_of
 from heelstrike.sim.contacts.dry_friction import add_dry_force
 from heelstrike.sim.contacts.geometry import solve_mass_matrix
 from heelstrike.sim.contacts.latches import hold
 from heelstrike.sim.contacts.loops import rows_of
 from heelstrike.sim.contacts.rows import Rows
-from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.event_driven.phase import HeldRows, Phase
 from heelstrike.sim.memory import Assembly, Equations, Loops
 from heelstrike.sim.push import Pushes, add_pushes
 
@@ -38,6 +39,29 @@ def free_acceleration(
         force[i] -= equations.bias[i]
         rate[i] = force[i]
     solve_mass_matrix(model, equations, rate)
+
+
+@dissolved_kernel
+def hold_row(place: int, row: int, ratio: float, size: int, held: HeldRows) -> int:
+    """List a row of a candidate after the `size` that are held; return how many there are then.
+
+    `ratio` is the friction that its force brings along.
+    """
+    held.place[size], held.row[size], held.friction_ratio[size] = place, row, ratio
+    return size + 1
+
+
+@kernel
+def tell_parts(count: int, watched: int, assembly: Assembly, values: Floats, told: Floats) -> None:
+    """Tell the normal and tangential parts of numbers of the candidates' rows by their entries.
+
+    Those of other entries are zero.
+    """
+    for entry in range(watched):
+        told[entry, 0], told[entry, 1] = 0.0, 0.0
+    for place in range(count):
+        its = told[assembly.candidate[place]]
+        its[0], its[1] = part_of(place, assembly.problem.first, values)
 
 
 @kernel
@@ -122,8 +146,8 @@ def share_redundant(
             return
     for place in range(count):
         contact = assembly.candidate[place]
-        for k in range(2):
-            phase.forces.force[contact, k] = assembly.answer.impulse[2 * place + k]
+        force = phase.forces.force[contact]
+        force[0], force[1] = part_of(place, assembly.problem.first, assembly.answer.impulse)
         if watch.value[2 * contact] < 0.0:
             watch.value[2 * contact] = 1.0
         if modes.holder[contact] == 1 and watch.value[2 * contact + 1] < 0.0:

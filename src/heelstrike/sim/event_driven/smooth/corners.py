@@ -8,12 +8,11 @@ row of their instant.
 
 from __future__ import annotations
 
-import math
-
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.faces import move_to_line
 from heelstrike.sim.contacts.rows import CONSTRAINT, STOP, Rows, second_of
 from heelstrike.sim.event_driven.phase import Impact
 from heelstrike.sim.event_driven.steps import shortest_step
@@ -129,13 +128,8 @@ def record_corner(
     own_x, own_z = out_of_frame(normal[point], (own[0], own[1]))
     x, z = out_of_frame(normal[second], (other[0], other[1]))
     x, z = own_x + x, own_z + z
-    size = math.sqrt(x * x + z * z)
-    if size > 0.0:
-        lever = radius * (own[1] + other[1]) / size
-        depth = math.sqrt(max(radius * radius - lever * lever, 0.0))
-        place[0] += radius * normal[point, 0] + (lever * z - depth * x) / size
-        place[1] += radius * normal[point, 1] + (-lever * x - depth * z) / size
-    elif met:
+    moment = radius * (own[1] + other[1])
+    if not move_to_line(x, z, moment, radius, normal[point], place) and met:
         place[0], place[1] = position[second, 0], position[second, 1]
     if met:
         for i in range(2):

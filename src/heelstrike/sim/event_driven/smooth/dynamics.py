@@ -16,6 +16,7 @@ from heelstrike.dynamics.dense import raise_to_zero, shorten, solve_to_rank
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, mass_matrix
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.candidates import place_candidate
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -28,9 +29,14 @@ from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.motors import try_torque
 from heelstrike.sim.event_driven.phase import HeldRows, Modes, Phase, SaddlePoint, Watch
-from heelstrike.sim.event_driven.smooth.candidates import free_acceleration, share_redundant
+from heelstrike.sim.event_driven.smooth.candidates import (
+    free_acceleration,
+    hold_row,
+    share_redundant,
+    tell_parts,
+)
 from heelstrike.sim.event_driven.smooth.faces import locate
-from heelstrike.sim.event_driven.smooth.gaps import free_gap_acceleration, write_candidates
+from heelstrike.sim.event_driven.smooth.gaps import free_gap_accelerations, write_candidates
 from heelstrike.sim.event_driven.smooth.saddle_point import (
     is_delicate,
     solve_saddle_point,
@@ -49,14 +55,9 @@ from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, Surface
 
 
 @kernel
-def copy_state(source: Floats, state: Floats) -> None:
-    """Copy a state (q, v)."""
-    for i in range(source.shape[0]):
-        state[i] = source[i]
-
-
-@kernel
-def list_closed(rows: Rows, modes: Modes, candidate: Integers, bound: Floats) -> int:
+def list_closed(
+    rows: Rows, modes: Modes, candidate: Integers, first: Integers, bound: Floats
+) -> int:
     """List the closed contacts as candidates, and the bounds of dry joints; return their number.
 
     Dry joints that move are none of them: their friction is known.
@@ -69,15 +70,16 @@ def list_closed(rows: Rows, modes: Modes, candidate: Integers, bound: Floats) ->
             if modes.slide[contact] != 0:
                 continue
             bound[count] = modes.breakaway[rows.owner[contact]]
-        candidate[count] = contact
+        place_candidate(contact, count, rows.components[contact], candidate, first)
         count += 1
     return count
 
 
 @kernel
 def list_unknowns(
-    count: int, total: int, candidate: Integers, friction: Floats, modes: Modes, held: HeldRows
-) -> int:
+    count: int, total: int, candidate: Integers, first: Integers, friction: Floats, modes: Modes,
+    held: HeldRows,
+) -> int:  # fmt: skip
     """List the Jacobian rows along which contacts are held, and friction per normal force.
 
     Open contacts among the `count` are held along their normals, and so are the rows of the loops,
@@ -88,14 +90,10 @@ def list_unknowns(
         contact = candidate[place]
         is_loop = place >= count
         if is_loop or modes.carrier[contact] == 1 or modes.closed[contact] == 0:
-            held.row[size] = 2 * place
             ratio = 0.0 if is_loop else -modes.slide[contact] * friction[contact]
-            held.friction_ratio[size] = ratio
-            size += 1
+            size = hold_row(place, first[place], ratio, size, held)
         if not is_loop and modes.holder[contact] == 1:
-            held.row[size] = 2 * place + 1
-            held.friction_ratio[size] = 0.0
-            size += 1
+            size = hold_row(place, first[place] + 1, 0.0, size, held)
     return size
 
 
@@ -128,13 +126,8 @@ def share_forces(
     count: int, assembly: Assembly, friction: Floats, modes: Modes, force: Floats
 ) -> None:
     """Write the force of every contact point, that of a group split like its normal forces."""
-    candidate, impulse = assembly.candidate, assembly.answer.impulse
-    for contact in range(modes.watched):
-        force[contact, 0] = 0.0
-        force[contact, 1] = 0.0
-    for place in range(count):
-        force[candidate[place], 0] = impulse[2 * place]
-        force[candidate[place], 1] = impulse[2 * place + 1]
+    candidate, first, impulse = assembly.candidate, assembly.problem.first, assembly.answer.impulse
+    tell_parts(count, modes.watched, assembly, impulse, force)
     for place in range(count):
         leader = candidate[place]
         if modes.holder[leader] == 0:
@@ -145,20 +138,22 @@ def share_forces(
             for other in range(place, count):
                 contact = candidate[other]
                 if modes.group[contact] == leader:
-                    force[contact, 1] = friction[contact] * impulse[2 * other] / limit * tangential
+                    share = friction[contact] * impulse[first[other]] / limit
+                    force[contact, 1] = share * tangential
 
 
 @kernel
 def list_pressing(
-    size: int, count: int, candidate: Integers, latched: Integers, rows: Rows, held: HeldRows
-) -> None:
+    size: int, count: int, candidate: Integers, first: Integers, latched: Integers, rows: Rows,
+    held: HeldRows,
+) -> None:  # fmt: skip
     """Write to ``held.presses`` which unknown forces can press only.
 
     These are the normal forces but for those of latches that hold.
     """
     for k in range(size):
-        place = held.row[k] // 2
-        held.presses[k] = 1 if held.row[k] % 2 == 0 and place < count else 0
+        place = held.place[k]
+        held.presses[k] = 1 if held.row[k] == first[place] and place < count else 0
         if held.presses[k] == 1:
             contact = candidate[place]
             for latch in range(latched.shape[0]):
@@ -169,8 +164,9 @@ def list_pressing(
 @kernel
 def hold_by_saddle_point(
     size: int, count: int, total: int, model: Model, rows: Rows, face: Integers, curvature: Floats,
-    loop_bias: Floats, latched: Integers, candidate: Integers, jacobian: Floats, tree: Workspace,
-    matrix: Floats, rate: Floats, answer: ContactAnswer, held: HeldRows, saddle: SaddlePoint,
+    loop_bias: Floats, latched: Integers, candidate: Integers, first: Integers, jacobian: Floats,
+    tree: Workspace, matrix: Floats, rate: Floats, answer: ContactAnswer, held: HeldRows,
+    saddle: SaddlePoint,
 ) -> bool:  # fmt: skip
     """Contact forces that keep the modes, and the acceleration, from the full equations.
 
@@ -179,7 +175,7 @@ def hold_by_saddle_point(
     """
     nv, impulse, velocity = model.nv, answer.impulse, answer.velocity
     state_accelerations(
-        count, total, candidate, model, tree, rows, face, curvature, loop_bias, jacobian,
+        count, total, candidate, first, model, tree, rows, face, curvature, loop_bias, jacobian,
         saddle.bias,
     )  # fmt: skip
     mass_matrix(model, tree, matrix)
@@ -194,7 +190,7 @@ def hold_by_saddle_point(
             nv, nv + size, rank, saddle.scale, held.friction_ratio, saddle.order, saddle.system,
             saddle.unknown,
         )  # fmt: skip
-        list_pressing(size, count, candidate, latched, rows, held)
+        list_pressing(size, count, candidate, first, latched, rows, held)
         raise_to_zero(nv, nv + size, rank, held.presses, saddle.system, saddle.unknown)
     saddle.needed = 1
     for i in range(nv):
@@ -204,7 +200,7 @@ def hold_by_saddle_point(
         impulse[row] += force
         if held.friction_ratio[k] != 0.0:
             impulse[row + 1] += held.friction_ratio[k] * force
-    for row in range(2 * total):
+    for row in range(first[total]):
         velocity[row] = saddle.bias[row] + row_product(jacobian, row, rate)
     return rank < nv + size
 
@@ -220,40 +216,38 @@ def hold_closed(
     """
     candidate, free, impulse = assembly.candidate, assembly.problem.free, assembly.answer.impulse
     directions, jacobian = assembly.directions, assembly.directions.jacobian
-    for place in range(count):
-        contact = candidate[place]
-        free_gap_acceleration(
-            contact, place, model, equations.tree, rows, modes.face, modes.curvature,
-            equations.rate, jacobian, free,
-        )  # fmt: skip
-        impulse[2 * place] = 0.0
-        impulse[2 * place + 1] = 0.0
-        if rows.kind[contact] == DRY_JOINT:
-            impulse[2 * place] = assembly.problem.bound[place]
-    free_loops(total, loops, equations.rate, 1.0, assembly)
-    for row in range(2 * count, 2 * total):
+    first, rate = assembly.problem.first, equations.rate
+    free_gap_accelerations(
+        count, candidate, first, model, equations.tree, rows, modes.face, modes.curvature, rate,
+        jacobian, free,
+    )  # fmt: skip
+    free_loops(total, loops, rate, 1.0, assembly)
+    for row in range(first[total]):
         impulse[row] = 0.0
-    size = list_unknowns(count, total, candidate, friction, modes, held)
+    for place in range(count):
+        if rows.kind[candidate[place]] == DRY_JOINT:
+            impulse[first[place]] = assembly.problem.bound[place]
+    size = list_unknowns(count, total, candidate, first, friction, modes, held)
     for i in range(size):
         held.system[i, size] = -free[held.row[i]]
     rank = solve_constraints(size, 1.0, assembly.problem.delassus, held)
     if is_delicate(size, rank, held.system):
         return hold_by_saddle_point(
             size, count, total, model, rows, modes.face, modes.curvature, loops.rows.bias,
-            loops.held, candidate, jacobian, equations.tree, equations.mass_matrix, equations.rate,
+            loops.held, candidate, first, jacobian, equations.tree, equations.mass_matrix, rate,
             assembly.answer, held, saddle,
         )  # fmt: skip
     if rank < size:
         shorten(
             0, size, rank, held.scale, held.friction_ratio, held.column, held.system, held.unknown
         )
-        list_pressing(size, count, candidate, loops.held, rows, held)
+        list_pressing(size, count, candidate, first, loops.held, rows, held)
         raise_to_zero(0, size, rank, held.presses, held.system, held.unknown)
     for i in range(size):
         impulse[held.row[i]] += held.unknown[i]
         if held.friction_ratio[i] != 0.0:
             impulse[held.row[i] + 1] += held.friction_ratio[i] * held.unknown[i]
-    add_impulse(model, 2 * total, impulse, directions, equations, equations.rate)
+    add_impulse(model, first[total], impulse, directions, equations, rate)
     return rank < size
 
 
@@ -324,12 +318,12 @@ def evaluate(
     )  # fmt: skip
     if rows_of(loops) > 0:
         find_loops(model, q, v, tree, loops)
-    count = list_closed(rows, modes, assembly.candidate, problem.bound)
+    count = list_closed(rows, modes, assembly.candidate, problem.first, problem.bound)
     write_candidates(
         count, assembly.candidate, model, tree, rows, problem.first, directions.leaf,
         directions.jacobian,
     )  # fmt: skip
-    total = append_loops(count, 2, loops, assembly)
+    total = append_loops(count, loops, assembly)
     forces.count = count
     saddle.needed = 0
     if total > 0:

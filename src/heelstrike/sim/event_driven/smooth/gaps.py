@@ -39,7 +39,7 @@ def gap_rows(
     entry: int, place: int, model: Model, tree: Workspace, rows: Rows, first: Integers,
     leaf: Integers, jacobian: Floats,
 ) -> None:  # fmt: skip
-    """Write the Jacobian rows (normal, tangent) of an entry as a candidate."""
+    """Write the Jacobian rows of an entry as a candidate: the normal, and the tangent if any."""
     kind, owner = rows.kind[entry], rows.owner[entry]
     if kind == STOP:
         write_unit_row(owner, place, 0, rows.side[entry], first, leaf, jacobian)
@@ -65,14 +65,14 @@ def write_candidates(
 
 @dissolved_kernel
 def free_gap_acceleration(
-    entry: int, place: int, model: Model, tree: Workspace, rows: Rows, face: Integers,
+    entry: int, row: int, model: Model, tree: Workspace, rows: Rows, face: Integers,
     curvature: Floats, rate: Floats, jacobian: Floats, free: Floats,
 ) -> None:  # fmt: skip
     """Acceleration b = J v̇ + J̇ v of an entry, under v̇ = `rate`.
 
     Of a contact point it is that of the gap and of the sliding velocity: for a rolling disc the
-    acceleration of its centre and not of the material point that touches the ground. The Jacobian
-    rows must be those of the candidates' `place`.
+    acceleration of its centre and not of the material point that touches the ground. Its Jacobian
+    rows are those from `row` on.
     """
     along_normal = 0.0
     along_tangent = 0.0
@@ -93,6 +93,21 @@ def free_gap_acceleration(
             _, along = into_frame(normal, velocity_at(tree.velocity, link, center))
             along_normal += here * along * along
     for j in range(model.nv):
-        along_normal += jacobian[2 * place, j] * rate[j]
-        along_tangent += jacobian[2 * place + 1, j] * rate[j]
-    free[2 * place], free[2 * place + 1] = along_normal, along_tangent
+        along_normal += jacobian[row, j] * rate[j]
+    free[row] = along_normal
+    if rows.components[entry] == 2:
+        for j in range(model.nv):
+            along_tangent += jacobian[row + 1, j] * rate[j]
+        free[row + 1] = along_tangent
+
+
+@dissolved_kernel
+def free_gap_accelerations(
+    count: int, candidate: Integers, first: Integers, model: Model, tree: Workspace, rows: Rows,
+    face: Integers, curvature: Floats, rate: Floats, jacobian: Floats, free: Floats,
+) -> None:  # fmt: skip
+    """Do :func:`free_gap_acceleration` for the first `count` candidates."""
+    for place in range(count):
+        free_gap_acceleration(
+            candidate[place], first[place], model, tree, rows, face, curvature, rate, jacobian, free
+        )

@@ -9,6 +9,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import mass_matrix
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.candidates import place_candidate
 from heelstrike.sim.contacts.faces import CURVE
 from heelstrike.sim.contacts.geometry import add_impulse, assemble_delassus, row_product, weigh
 from heelstrike.sim.contacts.loops import append_loops
@@ -64,10 +65,10 @@ def tangential_place(
 
 @kernel
 def displacement(
-    row: int, entry: int, model: Model, angle: Floats, q: Floats, rows: Rows, modes: Modes
+    component: int, entry: int, model: Model, angle: Floats, q: Floats, rows: Rows, modes: Modes
 ) -> float:
-    """How far a contact is along its row from where its constraint wants it."""
-    if row % 2 == 0:
+    """How far a contact is along one of its rows from where its constraint wants it."""
+    if component == 0:
         return rows.gap[entry]
     if modes.stuck[entry] == 1:
         place = tangential_place(entry, model, angle, q, rows, modes.face)
@@ -98,7 +99,9 @@ def move_by_saddle_point(
 
 
 @kernel
-def list_sunk(count: int, rows: Rows, modes: Modes, fired: Integers, candidate: Integers) -> int:
+def list_sunk(
+    count: int, rows: Rows, modes: Modes, fired: Integers, candidate: Integers, first: Integers
+) -> int:
     """Append the open contacts that are beyond the ground, or their range, by rounding.
 
     What reaches the ground in this instant is none of them: it is the instant that is corrected.
@@ -108,7 +111,7 @@ def list_sunk(count: int, rows: Rows, modes: Modes, fired: Integers, candidate: 
         if modes.closed[contact] == 1 or fired[2 * contact] == 1 or modes.passing[contact] == 1:
             continue
         if -DEEP < rows.gap[contact] < -SHALLOW:
-            candidate[count] = contact
+            place_candidate(contact, count, rows.components[contact], candidate, first)
             count += 1
     return count
 
@@ -129,29 +132,28 @@ def project(
     """
     modes, held = phase.modes, phase.held
     candidate, problem, directions = assembly.candidate, assembly.problem, assembly.directions
-    jacobian, impulse = directions.jacobian, assembly.answer.impulse
+    jacobian, impulse, first = directions.jacobian, assembly.answer.impulse, problem.first
     tree, q, v = equations.tree, state[: model.nq], state[model.nq :]
     system, row = held.system, held.row
     strayed, fastest = 0.0, 0.0
     for attempt in range(5):
         observe_rows(state, model, ground, tree, rows, modes, surface, loops)
         weigh(model, equations)
-        count = list_closed(rows, modes, candidate, problem.bound)
+        count = list_closed(rows, modes, candidate, first, problem.bound)
         if attempt < 4:
-            count = list_sunk(count, rows, modes, phase.watch.fired, candidate)
-        write_candidates(
-            count, candidate, model, tree, rows, problem.first, directions.leaf, jacobian
-        )
-        total = append_loops(count, 2, loops, assembly)
+            count = list_sunk(count, rows, modes, phase.watch.fired, candidate, first)
+        write_candidates(count, candidate, model, tree, rows, first, directions.leaf, jacobian)
+        total = append_loops(count, loops, assembly)
         if total == 0:
             return 0.0, strayed, 0.0
         assemble_delassus(model, total, equations, directions, problem)
-        size = list_unknowns(count, total, candidate, surface.friction, modes, held)
+        size = list_unknowns(count, total, candidate, first, surface.friction, modes, held)
         worst = 0.0
         for i in range(size):
-            place = row[i] // 2
+            place = held.place[i]
+            component, entry = row[i] - first[place], candidate[place]
             if place < count:
-                error = displacement(row[i], candidate[place], model, tree.angle, q, rows, modes)
+                error = displacement(component, entry, model, tree.angle, q, rows, modes)
             else:
                 error = loops.rows.displacement[place - count]
             system[i, size] = -error
@@ -173,11 +175,11 @@ def project(
                 size, model, jacobian, tree, equations.mass_matrix, held, phase.saddle, along
             )
         else:
-            for i in range(2 * total):
+            for i in range(first[total]):
                 impulse[i] = 0.0
             for i in range(size):
                 impulse[row[i]] = held.unknown[i]
-            add_impulse(model, 2 * total, impulse, directions, equations, along)
+            add_impulse(model, first[total], impulse, directions, equations, along)
         if not positions:
             return worst, strayed, fastest
     return math.inf, strayed, fastest

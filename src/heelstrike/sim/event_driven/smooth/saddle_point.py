@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.modes import (
     OPEN,
     SLIDING_BACKWARD,
@@ -36,12 +37,17 @@ from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import mass_matrix
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.candidates import part_of
 from heelstrike.sim.contacts.geometry import row_product
 from heelstrike.sim.contacts.loops import rows_of
 from heelstrike.sim.contacts.rows import Rows
 from heelstrike.sim.event_driven.phase import HeldRows, Phase, SaddlePoint
-from heelstrike.sim.event_driven.smooth.candidates import pose_problem, solve_candidates
-from heelstrike.sim.event_driven.smooth.gaps import free_gap_acceleration
+from heelstrike.sim.event_driven.smooth.candidates import (
+    hold_row,
+    pose_problem,
+    solve_candidates,
+)
+from heelstrike.sim.event_driven.smooth.gaps import free_gap_accelerations
 from heelstrike.sim.memory import Assembly, Memory
 
 SMALL_PIVOT = 1e-6
@@ -113,28 +119,27 @@ def write_equations(
 
 @kernel
 def state_accelerations(
-    count: int, total: int, candidate: Integers, model: Model, tree: Workspace, rows: Rows,
-    face: Integers, curvature: Floats, loop_bias: Floats, jacobian: Floats, bias: Floats,
+    count: int, total: int, candidate: Integers, first: Integers, model: Model, tree: Workspace,
+    rows: Rows, face: Integers, curvature: Floats, loop_bias: Floats, jacobian: Floats,
+    bias: Floats,
 ) -> None:  # fmt: skip
     """State the problem of accelerations: J̇ v of the candidates, up to `total` those of loops.
 
     No force is divided by an inertia.
     """
-    for place in range(count):
-        free_gap_acceleration(
-            candidate[place], place, model, tree, rows, face, curvature, tree.zero, jacobian, bias
-        )
+    free_gap_accelerations(
+        count, candidate, first, model, tree, rows, face, curvature, tree.zero, jacobian, bias
+    )
     for place in range(count, total):
-        bias[2 * place] = loop_bias[place - count]
-        bias[2 * place + 1] = 0.0
+        bias[first[place]] = loop_bias[place - count]
 
 
 @kernel
-def state_velocities(total: int, free: Floats, saddle: SaddlePoint) -> None:
-    """State the problem of an impact: no known impulse, and the free velocities of the rows."""
+def state_velocities(size: int, free: Floats, saddle: SaddlePoint) -> None:
+    """State the problem of an impact: no known impulse, and the free velocities of its rows."""
     for i in range(saddle.force.shape[0]):
         saddle.force[i] = 0.0
-    for row in range(2 * total):
+    for row in range(size):
         saddle.bias[row] = free[row]
 
 
@@ -168,68 +173,58 @@ def solve_saddle_point(size: int, saddle: SaddlePoint) -> int:
 
 
 @kernel
-def list_rows(
-    count: int, total: int, problem: ContactProblem, mode: Integers, held: HeldRows
-) -> int:
+def rubbing_ratio(mode: int, friction: float) -> float:
+    """Tangential over normal force of what slips or slides in a mode, zero of others."""
+    if mode in (SLIP_FORWARD, SLIDING_FORWARD):
+        return -friction
+    return friction if mode in (SLIP_BACKWARD, SLIDING_BACKWARD) else 0.0
+
+
+@kernel
+def list_rows(total: int, problem: ContactProblem, mode: Integers, held: HeldRows) -> int:
     """List the rows in which some modes allow no velocity; return how many."""
     size = 0
     for place in range(total):
-        does, friction = mode[place], problem.friction[place]
-        if problem.set[place] == INTERVAL:
-            if does == STICK:
-                held.row[size] = 2 * place + 1
-                held.friction_ratio[size] = 0.0
-                size += 1
-            continue
-        if does == OPEN:
-            continue
-        held.row[size] = 2 * place
-        held.friction_ratio[size] = 0.0
-        if does in (SLIP_FORWARD, SLIDING_FORWARD):
-            held.friction_ratio[size] = -friction
-        elif does in (SLIP_BACKWARD, SLIDING_BACKWARD):
-            held.friction_ratio[size] = friction
-        size += 1
-        if does == STICK and place < count and friction > 0.0:
-            held.row[size] = 2 * place + 1
-            held.friction_ratio[size] = 0.0
-            size += 1
+        does, friction, row = mode[place], problem.friction[place], problem.first[place]
+        if problem.set[place] != INTERVAL and does != OPEN:
+            size = hold_row(place, row, rubbing_ratio(does, friction), size, held)
+        if does == STICK and friction > 0.0:
+            size = hold_row(place, row + 1, 0.0, size, held)
     return size
 
 
 @kernel
 def begin_impulses(total: int, problem: ContactProblem, answer: ContactAnswer) -> None:
     """Put the impulses of the answer on what its modes allow: these are corrected then."""
-    mode, impulse = answer.mode, answer.impulse
+    mode, impulse, first = answer.mode, answer.impulse, problem.first
     for place in range(total):
-        does = mode[place]
-        limit = problem.friction[place] * impulse[2 * place]
+        does, normal = mode[place], first[place]
         if problem.set[place] == INTERVAL:
-            impulse[2 * place] = limit = problem.bound[place]
+            impulse[normal] = problem.bound[place]
         elif does == OPEN:
-            impulse[2 * place] = impulse[2 * place + 1] = 0.0
-        if does in (SLIP_FORWARD, SLIDING_FORWARD):
-            impulse[2 * place + 1] = -limit
-        elif does in (SLIP_BACKWARD, SLIDING_BACKWARD):
-            impulse[2 * place + 1] = limit
+            for row in range(normal, first[place + 1]):
+                impulse[row] = 0.0
+        if does not in (OPEN, STICK):
+            ratio = rubbing_ratio(does, problem.friction[place])
+            impulse[normal + 1] = ratio * impulse[normal]
 
 
 @kernel
 def solve_modes(
-    count: int, total: int, matrix: Floats, jacobian: Floats, problem: ContactProblem,
-    answer: ContactAnswer, held: HeldRows, saddle: SaddlePoint,
+    total: int, matrix: Floats, jacobian: Floats, problem: ContactProblem, answer: ContactAnswer,
+    held: HeldRows, saddle: SaddlePoint,
 ) -> int:  # fmt: skip
     """Correct the impulses of the answer, and find velocities, by the modes; return how many rows.
 
     The motion goes to ``saddle.unknown``, the units of coordinates and rows to ``saddle.scale``.
     """
-    nv, bias = matrix.shape[0], saddle.bias
+    nv, bias, rows = matrix.shape[0], saddle.bias, problem.first[total]
     begin_impulses(total, problem, answer)
-    size = list_rows(count, total, problem, answer.mode, held)
+    size = list_rows(total, problem, answer.mode, held)
     write_equations(size, nv, matrix, jacobian, held, saddle.system)
     for j in range(nv):
         pushed = saddle.force[j]
-        for row in range(2 * total):
+        for row in range(rows):
             pushed += jacobian[row, j] * answer.impulse[row]
         saddle.system[j, nv + size] = pushed
     for k in range(size):
@@ -240,11 +235,11 @@ def solve_modes(
         answer.impulse[row] += force
         if held.friction_ratio[k] != 0.0:
             answer.impulse[row + 1] += held.friction_ratio[k] * force
-    for row in range(2 * total):
+    for row in range(rows):
         answer.velocity[row] = bias[row] + row_product(jacobian, row, saddle.unknown[:nv])
     for place in range(total):
         if problem.set[place] == INTERVAL:
-            answer.velocity[2 * place] = 0.0
+            answer.velocity[problem.first[place]] = 0.0
     return size
 
 
@@ -263,9 +258,11 @@ def corrected_mode(
 ) -> int:
     """Mode of a candidate that does not contradict its impulse and velocity as the one it has does.
 
-    What closes goes on sliding as it did, by ``slide``, or sticks to begin with.
+    What closes goes on sliding as it did, by ``slide``, or sticks to begin with. What has one row
+    is open or sticks.
     """
-    problem, normal, tangent = assembly.problem, 2 * place, 2 * place + 1
+    problem, first = assembly.problem, assembly.problem.first
+    normal, tangent = first[place], first[place + 1] - 1
     jacobian = assembly.directions.jacobian
     impulse, velocity = assembly.answer.impulse, assembly.answer.velocity
     mode = assembly.answer.mode[place]
@@ -310,12 +307,12 @@ def correct_modes(
 
 
 @kernel
-def size_of_data(total: int, nv: int, jacobian: Floats, saddle: SaddlePoint) -> float:
+def size_of_data(rows: int, nv: int, jacobian: Floats, saddle: SaddlePoint) -> float:
     """Largest force on a coordinate, and velocity of a row that these can move, in their units."""
     largest = 0.0
     for i in range(nv):
         largest = max(largest, abs(saddle.force[i]) * saddle.scale[i])
-    for row in range(2 * total):
+    for row in range(rows):
         unit = unit_of(row, nv, jacobian, saddle.scale)
         if unit > 0.0:
             largest = max(largest, abs(saddle.bias[row]) / unit)
@@ -324,7 +321,7 @@ def size_of_data(total: int, nv: int, jacobian: Floats, saddle: SaddlePoint) -> 
 
 @kernel
 def is_proven(
-    size: int, total: int, data: float, matrix: Floats, held: Integers, saddle: SaddlePoint,
+    size: int, rows: int, data: float, matrix: Floats, held: Integers, saddle: SaddlePoint,
     assembly: Assembly,
 ) -> bool:  # fmt: skip
     """Certify the answer, whose modes agree with it; write its residuals.
@@ -340,7 +337,7 @@ def is_proven(
         left = -saddle.force[i]
         for j in range(nv):
             left += matrix[i, j] * saddle.unknown[j]
-        for row in range(2 * total):
+        for row in range(rows):
             left -= jacobian[row, i] * answer.impulse[row]
         worst = max(worst, abs(left) * saddle.scale[i])
         largest = max(largest, abs(saddle.unknown[i]) / saddle.scale[i])
@@ -354,8 +351,8 @@ def is_proven(
 
 @kernel
 def solve_by_saddle_point(
-    count: int, total: int, accelerations: bool, matrix: Floats, slide: Integers,
-    assembly: Assembly, held: HeldRows, saddle: SaddlePoint,
+    total: int, accelerations: bool, matrix: Floats, slide: Integers, assembly: Assembly,
+    held: HeldRows, saddle: SaddlePoint,
 ) -> bool:  # fmt: skip
     """Solve the contact problem of the candidates from the full equations; return whether proven.
 
@@ -364,45 +361,42 @@ def solve_by_saddle_point(
     of the coordinates, or what the impulses change of their velocities, to ``saddle.unknown``.
     """
     nv, scale, jacobian = matrix.shape[0], saddle.scale, assembly.directions.jacobian
+    rows = assembly.problem.first[total]
     for _ in range(ROUNDS):
-        size = solve_modes(
-            count, total, matrix, jacobian, assembly.problem, assembly.answer, held, saddle
-        )
-        data = size_of_data(total, nv, jacobian, saddle)
+        size = solve_modes(total, matrix, jacobian, assembly.problem, assembly.answer, held, saddle)
+        data = size_of_data(rows, nv, jacobian, saddle)
         if not correct_modes(total, accelerations, nv, data, slide, scale, assembly):
-            return is_proven(size, total, data, matrix, held.row, saddle, assembly)
+            return is_proven(size, rows, data, matrix, held.row, saddle, assembly)
     return False
 
 
 @kernel
-def copy_answer(
-    total: int, source: ContactAnswer | SaddlePoint, target: ContactAnswer | SaddlePoint
-) -> None:
+def copy_answer(source: ContactAnswer, target: ContactAnswer) -> None:
     """Copy an answer of the contact solvers to where it is kept, or back."""
-    for place in range(total):
-        target.mode[place] = source.mode[place]
-    for row in range(2 * total):
-        target.impulse[row] = source.impulse[row]
-        target.velocity[row] = source.velocity[row]
-    for i in range(3):
-        target.residual[i] = source.residual[i]
+    copy_words(source.mode, target.mode)
+    copy_words(source.impulse, target.impulse)
+    copy_words(source.velocity, target.velocity)
+    copy_words(source.residual, target.residual)
 
 
 @kernel
 def guess_modes(total: int, bias: Floats, assembly: Assembly) -> None:
     """Let the candidates of an impact slip as they would without it, and those open that leave."""
-    problem, answer, free = assembly.problem, assembly.answer, bias
+    problem, mode, first = assembly.problem, assembly.answer.mode, assembly.problem.first
     for place in range(total):
         if problem.set[place] == LINE:
             continue
-        answer.mode[place] = SLIP_FORWARD if free[2 * place + 1] > 0.0 else SLIP_BACKWARD
-        if problem.set[place] != INTERVAL and free[2 * place] > 0.0:
-            answer.mode[place] = OPEN
+        normal, tangent = part_of(place, first, bias)
+        mode[place] = STICK
+        if first[place + 1] > first[place] + 1:
+            mode[place] = SLIP_FORWARD if tangent > 0.0 else SLIP_BACKWARD
+        if problem.set[place] != INTERVAL and normal > 0.0:
+            mode[place] = OPEN
 
 
 @kernel
 def solve_once_more(
-    solved: bool, count: int, accelerations: bool, matrix: Floats, slide: Integers, tally: Tally,
+    solved: bool, accelerations: bool, matrix: Floats, slide: Integers, tally: Tally,
     assembly: Assembly, held: HeldRows, saddle: SaddlePoint,
 ) -> bool:  # fmt: skip
     """Solve again what the solvers left, or could not solve; return whether the answer is proven.
@@ -410,20 +404,19 @@ def solve_once_more(
     If not the answer is theirs.
     """
     answer, total = assembly.answer, assembly.problem.count
-    copy_answer(total, answer, saddle)
+    rows = assembly.problem.first[total]
+    copy_answer(answer, saddle.answer)
     for attempt in range(1 if solved or accelerations else 2):
         if attempt == 1:
             guess_modes(total, saddle.bias, assembly)
-        for row in range(0 if solved else 2 * total):
+        for row in range(0 if solved else rows):
             answer.impulse[row] = 0.0
-        if solve_by_saddle_point(
-            count, total, accelerations, matrix, slide, assembly, held, saddle
-        ):
+        if solve_by_saddle_point(total, accelerations, matrix, slide, assembly, held, saddle):
             if not solved:
                 tally.failures -= 1
                 tally.fallbacks += 1
             return True
-    copy_answer(total, saddle, answer)
+    copy_answer(saddle.answer, answer)
     return False
 
 
@@ -444,22 +437,23 @@ def solve_contacts(
     tree, matrix = memory.equations.tree, memory.equations.mass_matrix
     assembly, loops, rows = memory.assembly, memory.loops, memory.rows
     candidate, jacobian, bias = assembly.candidate, assembly.directions.jacobian, saddle.bias
+    first = assembly.problem.first
     friction, guess, tally = memory.surface.friction, memory.reaction.mode, memory.solver.tally
     total = count + rows_of(loops)
     saddle.used = 0
     if accelerations and saddle.needed == 1:
         state_accelerations(
-            count, total, candidate, model, tree, rows, face, curvature, loops.rows.bias, jacobian,
-            bias,
+            count, total, candidate, first, model, tree, rows, face, curvature, loops.rows.bias,
+            jacobian, bias,
         )  # fmt: skip
         mass_matrix(model, tree, matrix)
         pose_problem(
             count, total, True, rows.set, friction, guess, slide, rows.latch_stop, loops.held,
             assembly,
         )  # fmt: skip
-        for row in range(2 * total):
+        for row in range(first[total]):
             assembly.answer.impulse[row] = 0.0
-        if solve_by_saddle_point(count, total, True, matrix, slide, assembly, held, saddle):
+        if solve_by_saddle_point(total, True, matrix, slide, assembly, held, saddle):
             tally.solves += 1
             tally.shortcuts += 1
             saddle.used = 1
@@ -473,13 +467,13 @@ def solve_contacts(
         return status
     if accelerations:
         state_accelerations(
-            count, total, candidate, model, tree, rows, face, curvature, loops.rows.bias, jacobian,
-            bias,
+            count, total, candidate, first, model, tree, rows, face, curvature, loops.rows.bias,
+            jacobian, bias,
         )  # fmt: skip
     else:
-        state_velocities(total, assembly.problem.free, saddle)
+        state_velocities(first[total], assembly.problem.free, saddle)
     mass_matrix(model, tree, matrix)
-    if solve_once_more(solved, count, accelerations, matrix, slide, tally, assembly, held, saddle):
+    if solve_once_more(solved, accelerations, matrix, slide, tally, assembly, held, saddle):
         saddle.used = 1
         return SOLVED
     return status

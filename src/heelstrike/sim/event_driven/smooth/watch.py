@@ -25,7 +25,8 @@ def friction_limit(
     for place in range(first, count):
         contact = assembly.candidate[place]
         if group[contact] == leader:
-            limit += friction[contact] * assembly.answer.impulse[2 * place]
+            normal = assembly.answer.impulse[assembly.problem.first[place]]
+            limit += friction[contact] * normal
     return limit
 
 
@@ -97,20 +98,20 @@ def watch_forces(
     count: int, total: int, assembly: Assembly, friction: Floats, modes: Modes, watch: Watch
 ) -> None:
     """Event functions of closed points: normal forces, and what is left to the friction limit."""
-    delassus, free = assembly.problem.delassus, assembly.problem.free
+    delassus, free, first = assembly.problem.delassus, assembly.problem.free, assembly.problem.first
     impulse = assembly.answer.impulse
     for place in range(count):
-        contact = assembly.candidate[place]
+        contact, normal = assembly.candidate[place], first[place]
         watch.value[2 * contact] = 1.0
         if modes.carrier[contact] == 1:
-            watch.value[2 * contact] = impulse[2 * place]
+            watch.value[2 * contact] = impulse[normal]
         if modes.holder[contact] == 1:
             limit = friction_limit(contact, 0, count, assembly, friction, modes.group)
-            watch.value[2 * contact + 1] = limit - abs(impulse[2 * place + 1])
+            watch.value[2 * contact + 1] = limit - abs(impulse[normal + 1])
         elif modes.slide[contact] != 0 and modes.group[contact] == contact:
-            acceleration = free[2 * place + 1]
-            for column in range(2 * total):
-                acceleration += delassus[2 * place + 1, column] * impulse[column]
+            acceleration = free[normal + 1]
+            for column in range(first[total]):
+                acceleration += delassus[normal + 1, column] * impulse[column]
             watch.rate[2 * contact + 1] = modes.slide[contact] * acceleration
 
 
@@ -129,5 +130,5 @@ def watch_slips(count: int, assembly: Assembly, modes: Modes, rate: Floats) -> N
     for place in range(count):
         contact = assembly.candidate[place]
         if modes.slide[contact] != 0 and modes.group[contact] == contact:
-            acceleration = assembly.answer.velocity[2 * place + 1]
+            acceleration = assembly.answer.velocity[assembly.problem.first[place] + 1]
             rate[2 * contact + 1] = modes.slide[contact] * acceleration
