@@ -41,7 +41,7 @@ def force_on_link(work: SpatialWorkspace, i: int, acceleration: Spatial) -> Spat
 
 @kernel
 def gather_forces(
-    model: SpatialModel, work: SpatialWorkspace, acceleration: Floats, force: Floats
+    model: SpatialModel, acceleration: Floats, work: SpatialWorkspace, force: Floats
 ) -> None:
     """Generalised force of the forces on all links, each of which receives those beyond it.
 
@@ -73,7 +73,7 @@ def inverse_dynamics(
             a = plus(a, scaled(spatial(work.motion, k), acceleration[k]))
         write(i, a, work.acceleration)
         write(i, force_on_link(work, i, a), work.force)
-    gather_forces(model, work, acceleration, force)
+    gather_forces(model, acceleration, work, force)
 
 
 @kernel
@@ -83,7 +83,7 @@ def bias_force(model: SpatialModel, work: SpatialWorkspace, force: Floats) -> No
     free_fall = (0.0, 0.0, 0.0, -gravity[0], -gravity[1], -gravity[2])
     for i in range(model.nl):
         write(i, force_on_link(work, i, free_fall), work.force)
-    gather_forces(model, work, work.zero, force)
+    gather_forces(model, work.zero, work, force)
 
 
 @kernel
