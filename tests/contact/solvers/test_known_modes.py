@@ -139,8 +139,16 @@ def test_what_comes_to_rest_sticks_at_the_next_try() -> None:
     assert not held
 
 
-def test_slipping_rows_that_depend_on_each_other_are_left_to_the_general_way() -> None:
-    """Two points at one place: how they share what presses is a question of least norm."""
+def test_slipping_rows_that_depend_on_each_other_share_evenly() -> None:
+    """Two points at one place: each has half, which has the least norm."""
     twice = np.kron(np.ones((2, 2)), np.eye(2))
-    held, _ = asked(twice, np.array([-1.0, 2.0] * 2), np.full(2, 0.5), [SLIP_FORWARD] * 2)
+    held, answer = asked(twice, np.array([-1.0, 2.0] * 2), np.full(2, 0.5), [SLIP_FORWARD] * 2)
+    assert held
+    np.testing.assert_allclose(answer.impulse, [0.5, -0.25, 0.5, -0.25], rtol=1e-14)
+
+
+def test_how_fast_something_slips_is_no_question_of_least_norm() -> None:
+    """The same where one of them rubs more: the more it carries, the slower they slip."""
+    twice, friction = np.kron(np.ones((2, 2)), np.eye(2)), np.array([0.5, 0.4])
+    held, _ = asked(twice, np.array([-1.0, 2.0] * 2), friction, [SLIP_FORWARD] * 2)
     assert not held

@@ -142,16 +142,18 @@ def solve_slipping(size: int, problem: ContactProblem, rows: StickingRows) -> in
         for j in range(i + 1, size):
             x[i] -= matrix[i, j] * x[j]
         x[i] *= inverse[i]
-    if rank < size:
-        leave_out_idle_slips(size, rows)
+    if rank < size and not leave_out_idle_slips(size, problem, rows):
+        return -1
     return rank
 
 
 @kernel
-def leave_out_idle_slips(size: int, rows: StickingRows) -> None:
-    """Take from a solution what lies along directions that change no velocity, U n = 0.
+def leave_out_idle_slips(size: int, problem: ContactProblem, rows: StickingRows) -> bool:
+    """Take from a solution what lies along directions that change no velocity; return success.
 
-    The norm is that of the impulses, friction included.
+    The norm is that of the impulses, friction included. A direction that changes no velocity of the
+    equations, U n = 0, may change how fast something slips, where friction differs: then there are
+    many motions.
     """
     matrix, x, basis, inverse, share = rows.factor, rows.x, rows.square, rows.pivot, rows.spare
     for i in range(size):
@@ -168,10 +170,36 @@ def leave_out_idle_slips(size: int, rows: StickingRows) -> None:
             for j in range(i + 1, row + 1):
                 direction[i] -= matrix[i, j] * direction[j]
             direction[i] *= inverse[i]
+        if changes_slips(size, direction, problem, rows):
+            return False
         for earlier in range(found):
             remove_part(size, basis[earlier], share, direction)
         remove_part(size, direction, share, x)
         found += 1
+    return True
+
+
+@kernel
+def changes_slips(
+    size: int, direction: Floats, problem: ContactProblem, rows: StickingRows
+) -> bool:
+    """Whether impulses along a direction change how fast anything slips."""
+    delassus, source, edge = problem.delassus, rows.row, rows.edge
+    for i in range(size):
+        if edge[i] == 0.0:
+            continue
+        tangent = row_of(i, source) + 1
+        change, terms = 0.0, 0.0
+        for j in range(size):
+            column = row_of(j, source)
+            felt = delassus[tangent, column]
+            if edge[j] != 0.0:
+                felt += edge[j] * delassus[tangent, column + 1]
+            change += felt * direction[j]
+            terms += abs(felt * direction[j])
+        if abs(change) > NO_PIVOT * terms:
+            return True
+    return False
 
 
 @dissolved_kernel

@@ -1,8 +1,7 @@
 """Feet that stand: impulses of few contacts that all stick, as straight-line code.
 
-Vertices of one flat foot share their tangential row. There is a program for each way in which up to
-four neighbours, two feet at the most, share them, and for each number of joint stops beside them,
-for all robots.
+Vertices of one flat foot share their tangential row. There are programs for one foot and for two,
+flat or points, and for each number of joint stops beside them, for all robots.
 """
 
 from __future__ import annotations
@@ -28,8 +27,8 @@ CODES = 2**MOST_STANDING
 """Ways in which up to so many contacts share rows: 1 for one contact, and with each contact more
 twice that, and one if its tangent is shared with the contact before."""
 
-BESIDE_STOPS = (0b10, 0b11, 0b1101)
-"""Codes that have programs with stops: two point feet, one flat foot, and two."""
+PROGRAMS = (0b1, 0b10, 0b11, 0b1101)
+"""Codes that have programs: one point foot and two, one flat foot and two."""
 
 SHARED_ROW = 1e-14
 """Two rows are one if the inverse mass along their difference is less than this, relative."""
@@ -152,18 +151,16 @@ def standing_programs() -> NDArray[np.int64]:
 
     Read-only: all workspaces share them.
     """
-    alone = [(code, 0) for code in range(1, CODES) if _is_of_two_feet(code)]
-    beside = [(code, k) for code in BESIDE_STOPS for k in range(1, MOST_STOPS + 1)]
-    numbers = alone + [(code, k) for code, k in beside if has_stops(code.bit_length(), k)]
+    numbers = [
+        (code, stops)
+        for code in PROGRAMS
+        for stops in range(MOST_STOPS + 1)
+        if stops == 0 or has_stops(code.bit_length(), stops)
+    ]
     programs = np.zeros((CODES, MOST_STOPS + 1), dtype=np.int64)
     programs[tuple(np.transpose(numbers))] = straight_line_code([_program(*n) for n in numbers])
     programs.flags.writeable = False
     return programs
-
-
-def _is_of_two_feet(code: int) -> bool:
-    """Whether there is a program: for one contact, or feet of two."""
-    return code in (1, 2, 3) or (code >= 8 and code & 2 == 0)
 
 
 def _program(code: int, stops: int) -> Program:

@@ -1,0 +1,153 @@
+"""Feet that stand, solved by programs: impulses of least norm that leave them no velocity."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from heelstrike.contact.cone_certificate import MOST_STOPS, has_stops
+from heelstrike.contact.modes import OPEN, STICK
+from heelstrike.contact.sets import CONE, HALF_LINE
+from heelstrike.contact.solvers.certified_solve import contact_workspace
+from heelstrike.contact.solvers.known_modes import repeat, stand
+from heelstrike.contact.solvers.standing import PROGRAMS, sharing
+from heelstrike.contact.workspace import PROGRAM_ROWS, ContactAnswer, contact_problem
+
+FEET = 2
+HEIGHT = 0.07
+"""How far a sole is below its ankle (m)."""
+
+
+def standing(
+    draw: Any, code: int, stops: int, *, rigid: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Delassus matrix and free velocities of a walker whose vertices share rows as a code says.
+
+    Its vertices press, half of its stops do, and the others part.
+
+    Its coordinates are the places of two ankles, the angles of the feet, and its joints; all hang
+    together by their mass matrix. In a rigid one feet do not turn, as under straight legs.
+    """
+    shared = [digit == "1" for digit in f"{code:b}"]
+    shared[0] = False
+    size = 3 * FEET + stops
+    rows, foot = [], -3
+    for same in shared:
+        foot += 0 if same else 3
+        lever, height = draw.uniform(0.3, 0.5) * (-1 if same else 1), HEIGHT
+        normal, tangent = np.zeros(size), np.zeros(size)
+        normal[foot + 1], normal[foot + 2] = 1.0, 0.0 if rigid else lever
+        tangent[foot], tangent[foot + 2] = 1.0, height
+        rows += [normal, tangent]
+    for stop in range(stops):
+        rows.append(np.eye(size)[3 * FEET + stop])
+    root = np.eye(size) + 0.2 * draw.standard_normal((size, size))
+    jacobian = np.array(rows)
+    delassus = jacobian @ np.linalg.inv(root @ root.T) @ jacobian.T
+    cones = len(shared)
+    impulse = np.concatenate([np.ravel([[draw.uniform(1.0, 2.0), 0.1]] * cones), np.zeros(stops)])
+    left = np.zeros(len(rows))
+    pressed = draw.random(stops) < 0.5
+    impulse[2 * cones :][pressed] = draw.uniform(0.5, 1.0, pressed.sum())
+    left[2 * cones :][~pressed] = draw.uniform(0.1, 1.0, stops - pressed.sum())
+    return delassus, left - delassus @ impulse
+
+
+def problem_of(delassus: Any, free: Any, stops: int, room: int = PROGRAM_ROWS) -> Any:
+    rows = len(free)
+    cones = (rows - stops) // 2
+    problem = contact_problem(cones + stops, count=cones + stops, room=room)
+    problem.first[cones:] = np.arange(2 * cones, rows + 1)
+    problem.set[:cones], problem.set[cones:] = CONE, HALF_LINE
+    problem.friction[:cones] = 5.0
+    problem.delassus[:] = np.nan  # nobody may read the rest
+    problem.delassus[:rows, :rows], problem.free[:rows] = delassus, free
+    return problem
+
+
+def solved(problem: Any, modes: list[int], way: Any = stand) -> tuple[bool, ContactAnswer]:
+    work = contact_workspace(problem.count)
+    answer = ContactAnswer.allocate(capacity=len(problem.set), mode=np.array(modes, np.int64))
+    return way(problem, work.settings, work.sticking, work.scaling, answer), answer
+
+
+@pytest.mark.parametrize("code", PROGRAMS)
+@pytest.mark.parametrize("rigid", [False, True])
+def test_impulses_have_the_least_norm_of_those_that_leave_no_velocity(
+    code: int, rigid: bool
+) -> None:
+    """Against the pseudo-inverse of all rows."""
+    succeeded = 0
+    for seed in range(10):
+        delassus, free = standing(np.random.default_rng([code, seed]), code, 0, rigid=rigid)
+        problem = problem_of(delassus, free, 0)
+        held, answer = solved(problem, [STICK] * problem.count)
+        expected = -np.linalg.pinv(delassus, rcond=1e-9) @ free
+        if np.any(np.abs(expected[1::2]) > 5.0 * expected[::2]):
+            assert not held
+            continue
+        assert held
+        succeeded += 1
+        np.testing.assert_allclose(answer.impulse[: len(free)], expected, atol=1e-10)
+        assert np.abs(answer.velocity[: len(free)]).max() <= 1e-12
+    assert succeeded >= 5
+
+
+@pytest.mark.parametrize("code", PROGRAMS)
+@pytest.mark.parametrize("stops", range(1, MOST_STOPS + 1))
+def test_stops_beside_feet(code: int, stops: int) -> None:
+    """Those that press are held, the others part; whatever was guessed of them, and as by loops."""
+    if not has_stops(code.bit_length(), stops):
+        return
+    seen, named = 0, set()
+    for seed in range(12):
+        draw = np.random.default_rng([code, stops, seed])
+        delassus, free = standing(draw, code, stops)
+        cones = code.bit_length()
+        guess = [STICK] * cones + [STICK] * stops
+        problem = problem_of(delassus, free, stops)
+        held, answer = solved(problem, guess)
+        if not held:
+            continue
+        seen += 1
+        rows = len(free)
+        impulse, velocity = answer.impulse[:rows], answer.velocity[:rows]
+        np.testing.assert_allclose(velocity, delassus @ impulse + free, atol=1e-12)
+        assert np.abs(velocity[: 2 * cones]).max() <= 1e-12
+        for stop in range(stops):
+            row, mode = 2 * cones + stop, answer.mode[cones + stop]
+            named.add(int(mode))
+            assert (impulse[row] == 0.0 and velocity[row] > 0.0) == (mode == OPEN)
+            assert mode == OPEN or (impulse[row] >= 0.0 and abs(velocity[row]) <= 1e-12)
+        loops, other = solved(problem_of(delassus, free, stops, room=20), guess, repeat)
+        assert loops
+        np.testing.assert_allclose(other.impulse[:rows], impulse, atol=1e-11)
+        np.testing.assert_array_equal(other.mode, answer.mode)
+    assert seen >= 6
+    assert named == {OPEN, STICK}
+
+
+def test_what_cannot_stand_keeps_its_modes() -> None:
+    """A foot that is drawn up, one that is to slip, and a stop that was let go but presses."""
+    delassus, free = standing(np.random.default_rng(0), 3, 1)
+    up = free.copy()
+    up[::2] = 1.0
+    pressed = free.copy()
+    pressed[4] = -3.0
+    for data, modes in (
+        (up, [STICK, STICK, STICK]),
+        (free, [STICK, 2, STICK]),
+        (pressed, [STICK, STICK, OPEN]),
+    ):
+        held, answer = solved(problem_of(delassus, data, 1), modes)
+        assert not held
+        assert answer.mode.tolist() == modes
+
+
+def test_codes_tell_which_vertices_share_their_row() -> None:
+    shared = sharing(0b1101)
+    assert shared.source.tolist() == [0, 1, 2, 4, 5, 6]
+    assert shared.equation.tolist() == [0, 1, 2, 1, 3, 4, 5, 4]
+    assert shared.sharers.tolist() == [1, 2, 1, 1, 2, 1]
