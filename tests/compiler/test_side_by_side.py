@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -56,6 +57,19 @@ def what_is_needed_twice(a: Any, b: Any, c: Any, out: Any) -> None:
         out[i] = out[i] / (out[0] + out[WIDTH - 1]) + inverse_above(b[i], c[1]) * out[i - 1]
 
 
+def of_angles(a: Any, b: Any, c: Any, out: Any) -> None:
+    for i in range(WIDTH):
+        out[i] = math.sin(a[i]) * b[i] - math.cos(a[i])
+
+
+def deep(a: Any, b: Any, c: Any, out: Any) -> None:
+    for i in range(WIDTH):
+        out[i] = a[i]
+    for _ in range(600):
+        for i in range(WIDTH):
+            out[i] = out[i] * b[0] + c[1]
+
+
 def different_things(a: Any, b: Any, c: Any, out: Any) -> None:
     for i in range(WIDTH):
         out[i] = (a[i] if i % 3 else 0.5) * (b[i] if i % 2 else c[i % 4])
@@ -73,6 +87,26 @@ def different_things(a: Any, b: Any, c: Any, out: Any) -> None:
 )
 def test_it_computes_what_the_kernel_does(function: Callable[..., None]) -> None:
     check(function, function.__name__)
+
+
+def test_all_is_read_before_anything_is_written() -> None:
+    """What stands alone is read before a vector is written over it; arrays may be the same."""
+
+    def over(a: Any, out: Any) -> None:
+        first = a[0]
+        for i in range(8):
+            a[i] = 2.0 * a[i]
+        out[8] = first + 1.0
+
+    a, out = np.arange(1.0, 10.0), np.zeros(9)
+    (address,) = straight_line_code(
+        [Program(over, {"a": a, "out": out}, name="over", side_by_side=True)]
+    )
+    called(address, a, out)
+    assert out[8] == 2.0
+    both = np.arange(1.0, 10.0)
+    called(address, both, both)
+    assert both.tolist() == [*2.0 * np.arange(1.0, 9.0), 2.0]
 
 
 @pytest.mark.parametrize("seed", range(12))

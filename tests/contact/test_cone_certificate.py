@@ -10,7 +10,7 @@ import pytest
 
 from heelstrike.contact import solve_contact
 from heelstrike.contact.certificate import certify, certify_at_once, cones_of
-from heelstrike.contact.cone_certificate import MOST_CONES, MOST_STOPS, has_stops
+from heelstrike.contact.cone_certificate import FASTEST, LEAST, MOST_CONES, MOST_STOPS, has_stops
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import (
@@ -61,9 +61,16 @@ def certified(work: ContactWorkspace, problem: ContactProblem, impulse: Any) -> 
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("room", [PROGRAM_ROWS, 20])
-@pytest.mark.parametrize("stops", range(MOST_STOPS + 1))
-@pytest.mark.parametrize("cones", range(1, MOST_CONES + 1))
+@pytest.mark.parametrize(
+    ("cones", "stops", "room"),
+    [
+        (cones, stops, room)
+        for room in (PROGRAM_ROWS, 20)
+        for cones in range(1, MOST_CONES + 1)
+        for stops in range(MOST_STOPS + 1)
+        if 2 * cones + stops <= room
+    ],
+)
 @pytest.mark.parametrize(
     "change", [lambda p, w: None, lambda p, w: setattr(w.settings, "floor", 9)]
 )
@@ -72,8 +79,6 @@ def test_it_says_what_loops_say(
 ) -> None:
     """In memory of that size; loops say it where there is more, or too many take part."""
     draw = np.random.default_rng([cones, stops, room])
-    if 2 * cones + stops > room:
-        return
     for _ in range(5):
         problem = random_problem(draw, cones, stops, room)
         rows = 2 * cones + stops
@@ -91,6 +96,27 @@ def test_it_says_what_loops_say(
             # What is left of sums that cancel is as exact as their terms, all else as it is itself.
             left = 1e-13 * size if place < CANCELS else 0.0
             np.testing.assert_allclose(one, other, rtol=1e-12, atol=left)
+
+
+@pytest.mark.parametrize(("cones", "stops"), [(1, 0), (2, 6), (4, 3)])
+def test_what_programs_measure_besides(cones: int, stops: int) -> None:
+    """The fastest of contacts and of the stops that are held, either way; the least diagonal."""
+    draw = np.random.default_rng([7, cones, stops])
+    for _ in range(30):
+        problem = random_problem(draw, cones, stops, PROGRAM_ROWS)
+        rows = 2 * cones + stops
+        work = contact_workspace(cones + stops)
+        answer = ContactAnswer.allocate(capacity=cones + stops)
+        answer.impulse[:rows] = draw.standard_normal(rows)
+        held = (draw.random(stops) < 0.5).astype(float)
+        work.scaling.held[:stops] = held
+        certify_at_once(cones, problem, work.settings, work.scaling, answer)
+        diagonal = np.diag(problem.delassus)[:rows]
+        speed = np.abs(answer.velocity[:rows]) / np.sqrt(diagonal)
+        counted = np.concatenate([np.ones(2 * cones), held]) > 0.0
+        size = work.scaling.size
+        assert size[FASTEST] == pytest.approx(speed[counted].max(), rel=1e-14)
+        assert size[LEAST] == diagonal.min()
 
 
 def test_rows_that_nothing_moves_are_left_to_loops() -> None:

@@ -21,6 +21,8 @@ MOST_LANES = 8
 """Numbers in the widest vector."""
 
 SUMS = (Operation.ADD, Operation.SUBTRACT)
+ANGLES = (Operation.SINE, Operation.COSINE)
+"""SUMS, ANGLES: An instruction and its twin; what is computed of all angles before all else."""
 
 Lanes = tuple[Any, ...]
 """Values of a tape and numbers, one for each lane of a vector."""
@@ -38,19 +40,28 @@ class Shapes:
 
     def of(self, value: Any) -> int:
         """Return the number of a shape."""
-        if value not in self._known:
-            if isinstance(value, Result) and value.operation is Operation.NEGATE:
-                self._known[value] = self.of(value.operands[0])
-            else:
-                self._known[value] = self._names.setdefault(self._name(value), len(self._names))
+        waiting = [value]
+        while waiting:  # trees may be deep
+            each = waiting[-1]
+            operands = each.operands if isinstance(each, Result) else ()
+            missing = [operand for operand in operands if operand not in self._known]
+            if missing:
+                waiting += missing
+                continue
+            self._known[waiting.pop()] = self._named(each)
         return self._known[value]
+
+    def _named(self, value: Any) -> int:
+        if isinstance(value, Result) and value.operation is Operation.NEGATE:
+            return self._known[value.operands[0]]
+        return self._names.setdefault(self._name(value), len(self._names))
 
     def _name(self, value: Any) -> Any:
         if isinstance(value, Entry):
             return value.array
         if not isinstance(value, Result):
             return float(value)
-        operands = [self.of(each) for each in value.operands]
+        operands = [self._known[each] for each in value.operands]
         if value.operation in SUMS or value.operation in COMMUTATIVE:
             operands.sort()
         return "sum" if value.operation in SUMS else value.operation, *operands
@@ -163,7 +174,8 @@ class Lay:
     def _are_alike(self, lanes: Lanes) -> bool:
         """Whether one instruction computes all, or one and its twin."""
         kinds = {self._kind(value) for value in lanes}
-        return len(kinds) == 1 and all(isinstance(value, Result) for value in lanes)
+        results = all(isinstance(value, Result) for value in lanes)
+        return len(kinds) == 1 and results and lanes[0].operation not in ANGLES
 
     def _kind(self, value: Any) -> Any:
         """What has to be the same of values that one instruction computes, or one and its twin."""

@@ -24,7 +24,7 @@ from heelstrike.compiler.machine_code import addresses
 from heelstrike.compiler.recordings.recording import CONSTANT, Program, Recording
 from heelstrike.compiler.recordings.tape import Entry, Operation, Result, Symbols, Value, needed
 from heelstrike.compiler.recordings.trigonometry import sine_and_cosine
-from heelstrike.compiler.side_by_side import Lay, Shapes, runs
+from heelstrike.compiler.side_by_side import ANGLES, Lay, Shapes, runs
 
 _DOUBLE = ir.DoubleType()
 _DOUBLE_BYTES = 8
@@ -245,7 +245,7 @@ class _Writer:
 
     def _angles(self, results: list[Result]) -> None:
         """Sines and cosines, of many angles at once; no angle depends on another's."""
-        waiting = [v for v in results if v.operation in (Operation.SINE, Operation.COSINE)]
+        waiting = [v for v in results if v.operation in ANGLES]
         angles = list(dict.fromkeys(value.operands[0] for value in waiting))
         found: dict[Any, Any] = {}
         for begin in range(0, len(angles), _ANGLES_AT_ONCE):
@@ -283,14 +283,17 @@ class _SideBySide(_Writer):
             beside = self._lay.vector(lanes) if len(lanes) > 1 else lanes[0]
             if not unread(array):
                 found.append((array, index, beside))
+        found = [(array, index, self._read_or_made(each)) for array, index, each in found]
         for array, index, value in found:
             slot = self._slot(array, index)
-            if isinstance(value, Entry | Result | float | int):
-                self.builder.store(self._emitted(value), slot)
-            else:
+            if isinstance(value.type, ir.VectorType):
                 slot = self.builder.bitcast(slot, value.type.as_pointer())
-                self.builder.store(value, slot, align=_DOUBLE_BYTES)
+            self.builder.store(value, slot, align=_DOUBLE_BYTES)
         self.builder.ret_void()
+
+    def _read_or_made(self, value: Any) -> Any:
+        """Return a vector, or the number that a value of the tape is."""
+        return self._emitted(value) if isinstance(value, Value | float | int) else value
 
     def _computed(self, result: Result) -> Any:
         """Emit all that it is made of, one after the other: trees may be deep."""

@@ -23,7 +23,7 @@ import numpy as np
 from heelstrike.compiler.compilation import dissolved_kernel, kernel, rare_kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
-from heelstrike.contact.cone_certificate import EFFORT, FASTEST, LEAST, UNIT
+from heelstrike.contact.cone_certificate import EFFORT, LEAST, UNIT
 from heelstrike.contact.modes import Solver, SolveStatus
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE, is_empty, room, row_of
 from heelstrike.contact.workspace import (
@@ -120,7 +120,6 @@ def certify(
         worst = certify_at_once(cones, problem, settings, scaling, answer)
         if worst < math.inf:
             return worst
-    scaling.size[FASTEST] = math.inf  # nobody looks
     weigh(problem, settings, impulse, scaling)
     unit = scaling.unit
     rounding = rounding_of(count, scaling.effort)
@@ -239,7 +238,7 @@ def rounding_of(count: int, effort: float) -> float:
 def cones_of(problem: ContactProblem, settings: Settings, scaling: Scaling) -> int:
     """How many contacts a problem has for which there is a program, 0 if there is none.
 
-    There is for few of them with stops behind.
+    There is for few of them with stops behind, each cone of two rows and each half-line of one.
     """
     count = problem.count
     cones = row_of(count, problem.first) - count

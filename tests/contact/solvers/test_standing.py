@@ -12,7 +12,7 @@ from heelstrike.contact.modes import OPEN, STICK
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.solvers.known_modes import repeat, stand
-from heelstrike.contact.solvers.standing import PROGRAMS, sharing
+from heelstrike.contact.solvers.standing import MOST_EQUATIONS, PROGRAMS, sharing
 from heelstrike.contact.workspace import PROGRAM_ROWS, ContactAnswer, contact_problem
 
 FEET = 2
@@ -95,16 +95,22 @@ def test_impulses_have_the_least_norm_of_those_that_leave_no_velocity(
     assert succeeded >= 5
 
 
-@pytest.mark.parametrize("code", PROGRAMS)
-@pytest.mark.parametrize("stops", range(1, MOST_STOPS + 1))
-def test_stops_beside_feet(code: int, stops: int) -> None:
+@pytest.mark.parametrize("rigid", [False, True])
+@pytest.mark.parametrize(
+    ("code", "stops"),
+    [
+        (code, stops)
+        for code in PROGRAMS
+        for stops in range(1, MOST_STOPS + 1)
+        if has_stops(code.bit_length(), stops)
+    ],
+)
+def test_stops_beside_feet(code: int, stops: int, rigid: bool) -> None:
     """Those that press are held, the others part; whatever was guessed of them, and as by loops."""
-    if not has_stops(code.bit_length(), stops):
-        return
     seen, named = 0, set()
     for seed in range(12):
         draw = np.random.default_rng([code, stops, seed])
-        delassus, free = standing(draw, code, stops)
+        delassus, free = standing(draw, code, stops, rigid=rigid)
         cones = code.bit_length()
         guess = [STICK] * cones + [STICK] * stops
         problem = problem_of(delassus, free, stops)
@@ -127,6 +133,49 @@ def test_stops_beside_feet(code: int, stops: int) -> None:
         np.testing.assert_array_equal(other.mode, answer.mode)
     assert seen >= 6
     assert named == {OPEN, STICK}
+
+
+def test_a_stop_at_rest_that_nobody_holds_is_left_to_the_loops() -> None:
+    """Whether it bears anything is a question of least norm; of one that is held it is none."""
+    delassus, free = standing(np.random.default_rng(1), 3, 1)
+    row = 4
+    impulse = -np.linalg.pinv(delassus[:row, :row], rcond=1e-9) @ free[:row]
+    free[row] = -delassus[row, :row] @ impulse
+    assert not solved(problem_of(delassus, free, 1), [STICK, STICK, OPEN])[0]
+    held, answer = solved(problem_of(delassus, free, 1), [STICK, STICK, STICK])
+    assert held
+    assert abs(answer.impulse[row]) <= 1e-12
+    assert answer.mode[2] == STICK
+
+
+def test_stops_are_let_go_one_after_the_other() -> None:
+    """The second pulls only when the first no longer holds."""
+    delassus = np.eye(6)
+    delassus[4, 5] = delassus[5, 4] = 0.5
+    free = np.array([-1.0, 0.0, -1.0, 0.0, 1.0, -0.8])
+    held, answer = solved(problem_of(delassus, free, 2), [STICK] * 4)
+    assert held
+    assert answer.mode.tolist() == [STICK, STICK, OPEN, STICK]
+    np.testing.assert_allclose(answer.impulse[4:6], [0.0, 0.8])
+    delassus[4, 5] = delassus[5, 4] = 0.9
+    free[4:6] = [0.5, 0.1]
+    held, answer = solved(problem_of(delassus, free, 2), [STICK] * 4)
+    assert held
+    assert answer.mode.tolist() == [STICK, STICK, OPEN, OPEN]
+    np.testing.assert_array_equal(answer.impulse[4:6], [0.0, 0.0])
+
+
+def test_memory_has_room_for_the_largest_program() -> None:
+    """Whatever is too large for a matrix of its own would be written behind it."""
+    sizes = [
+        len(sharing(code).source) + stops
+        for code in PROGRAMS
+        for stops in range(MOST_STOPS + 1)
+        if stops == 0 or has_stops(code.bit_length(), stops)
+    ]
+    assert max(sizes) == MOST_EQUATIONS
+    half = contact_workspace(8).sticking.lower_half
+    assert len(half) >= MOST_EQUATIONS * (MOST_EQUATIONS + 1) // 2
 
 
 def test_what_cannot_stand_keeps_its_modes() -> None:

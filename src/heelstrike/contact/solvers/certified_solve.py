@@ -38,7 +38,7 @@ from heelstrike.contact.solvers.gauss_seidel import gauss_seidel
 from heelstrike.contact.solvers.known_modes import AS_GOOD, CLEAN
 from heelstrike.contact.solvers.lemke import lemke
 from heelstrike.contact.solvers.reduction import reduce_problem, scale_matrix
-from heelstrike.contact.solvers.standing import CODES, standing_programs
+from heelstrike.contact.solvers.standing import CODES, MOST_EQUATIONS, standing_programs
 from heelstrike.contact.workspace import (
     Combinations,
     ContactAnswer,
@@ -334,13 +334,14 @@ def contact_workspace(
         try_solvers.finish()
     contacts = max(int(capacity), 1)
     rows = 2 * contacts
+    most = max(LARGEST, MOST_EQUATIONS)
     certificates = certificate_programs() if symmetric else np.zeros((1, MOST_STOPS + 1), np.int64)
     work = ContactWorkspace.allocate(
         capacity=contacts,
         scaling=Scaling.allocate(capacity=contacts, most_stops=MOST_STOPS, programs=certificates),
         sticking=StickingRows.allocate(
             capacity=contacts,
-            half=LARGEST * (LARGEST + 1) // 2,
+            half=most * (most + 1) // 2,
             programs=elimination_programs(),
             standing=standing_programs()
             if symmetric

@@ -577,7 +577,7 @@ def play_standing(
     rows: StickingRows, answer: ContactAnswer,
 ) -> bool:  # fmt: skip
     """Find the impulses of contacts that stick and of the stops that are held; return success."""
-    play(
+    play(  # which rows share equations is part of the program, the first three are not read
         program,
         (
             rows.row, rows.equation, rows.order, problem.delassus, problem.free, scaling.held,

@@ -30,6 +30,9 @@ twice that, and one if its tangent is shared with the contact before."""
 PROGRAMS = (0b1, 0b10, 0b11, 0b1101)
 """Codes that have programs: one point foot and two, one flat foot and two."""
 
+MOST_EQUATIONS = PROGRAM_ROWS - 2
+"""Equations of the largest program: vertices of two flat feet share a tangent each."""
+
 SHARED_ROW = 1e-14
 """Two rows are one if the inverse mass along their difference is less than this, relative."""
 

@@ -693,7 +693,7 @@ def push_candidates(
     candidate: Integers, first: Integers, impulse: Floats, jacobian: Floats, equations: Equations,
     point_impulse: Floats, v: Floats,
 ) -> None:  # fmt: skip
-    """Add what the impulses of the candidates do to a velocity, after `gather_points`.
+    """Add what the impulses of the candidates do to a velocity, after `pick_points`.
 
     The rows of the Jacobian are A⁻¹ Jᵀ but for those of points, whose impulses the program takes.
     """
