@@ -152,9 +152,27 @@ def _recorded(program: Any) -> int:
     return len(_by_number) - 1
 
 
+_machine_code = straight_line.straight_line_code
+
+
+def _differentiated(program: Any, known: Any) -> int:
+    """Derivatives are found on the tape alone: such a program stays machine code."""
+    (address,) = _machine_code([program], known)
+    parameters = [ctypes.c_void_p] * len(program.arguments)
+    function = ctypes.CFUNCTYPE(None, *parameters)(address)
+
+    def run(*arguments: Any) -> None:
+        function(*(a.ctypes.data if isinstance(a, np.ndarray) else a.address for a in arguments))
+
+    _by_number.append(run)
+    return len(_by_number) - 1
+
+
 def _straight_line_code(programs: Sequence[Any], known: Any = None) -> tuple[int, ...]:
-    del known
-    return tuple(map(_recorded, programs))
+    return tuple(
+        _differentiated(program, known) if program.derivatives else _recorded(program)
+        for program in programs
+    )
 
 
 straight_line.straight_line_code = _straight_line_code
