@@ -28,6 +28,7 @@ from heelstrike.sim.contacts.rows import (
     SECOND_FACE,
     STOP,
     is_of_ground,
+    lay_out_rows,
     second_of,
 )
 from heelstrike.sim.contacts.writers import rate_of
@@ -286,8 +287,9 @@ def test_the_table_tells_points_their_second_faces_and_sizes() -> None:
     assert [uncompiled(second_of)(point, ROWS) for point in range(2)] == ground[2:]
     side = np.ones(len(ROWS.kind))
     side[[STOPS[2], STOPS[3]]] = -1.0
-    np.testing.assert_array_equal(ROWS.side, side)
-    assert np.isposinf(ROWS.gap).all()
-    np.testing.assert_array_equal(ROWS.components, np.where(np.isin(ROWS.set, [0, 3]), 2, 1))
-    np.testing.assert_array_equal(np.delete(ROWS.limit, STOPS), 0.0)
+    rows = lay_out_rows(ROBOT)
+    np.testing.assert_array_equal(rows.side, side)
+    assert np.isposinf(rows.gap).all()
+    np.testing.assert_array_equal(rows.components, np.where(np.isin(rows.set, [0, 3]), 2, 1))
+    np.testing.assert_array_equal(np.delete(rows.limit, STOPS), 0.0)
     assert [int(ROWS.end[kind] - ROWS.first[kind]) for kind in (COUPLING, BRAKE)] == [1, 2]
