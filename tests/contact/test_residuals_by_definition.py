@@ -200,6 +200,17 @@ def test_where_impulses_cancel_velocities_are_summed_with_their_errors() -> None
         assert worst == pytest.approx(answer.residual.max() + scaling.rounding, rel=1e-12)
 
 
+def test_of_impulses_that_cancel_exactly_rounding_is_of_the_second_order() -> None:
+    """Two rows that are one, pressed by 1e8 and −1e8: (2 · (2 n + 1) · 2⁻⁵³)² of what cancels."""
+    case = Case(
+        np.ones((2, 2)), np.zeros(2), np.array([1e8, -1e8]), [LINE, LINE], [0.0] * 2, [0.0] * 2,
+        [0.0] * 2, floor=1.0,
+    )  # fmt: skip
+    worst, answer = case.certified()
+    assert not answer.velocity.any()
+    assert worst == pytest.approx((2.0 * 5.0 * EPSILON) ** 2 * 2e8, rel=1e-12)
+
+
 def one(free: float, impulse: float, kind: int = HALF_LINE, delassus: float = 0.5) -> Case:
     """One row."""
     return Case(

@@ -493,3 +493,12 @@ def test_friction_of_constraints_is_that_of_cones_and_one_of_intervals() -> None
     ]  # fmt: skip
     assert [friction_of(each) for each in kinds] == [0.4, 0.0, 0.0, 1.0, 0.0]
     assert line_rows(SimpleNamespace(constraints=kinds)) == 3  # type: ignore[arg-type]
+
+
+def test_what_loops_call_gives_a_kernel_its_numbers_and_places_to_write_to() -> None:
+    asked: list[Any] = []
+    write = Constraint._entry(lambda address: f"at {address}", lambda *given: asked.append(given))
+    assert write(7, "model", "tree", "q", "v", "gap", "jacobian", "bias") == 0
+    assert asked == [("at 7", "model", "tree", "q", "v", "gap", "jacobian", "bias")]
+    numbers = type("Cable", (Held,), {"__dataclass_fields__": {}})().numbers(mechanisms.point())
+    assert numbers == {}

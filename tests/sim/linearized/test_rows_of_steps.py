@@ -399,3 +399,23 @@ def test_masses_act_beside_torques_as_they_do_in_closed_form() -> None:
     by_mass = np.diag([-STEP * 3.0 / 4.0, STEP * 4.0 / 25.0])
     np.testing.assert_allclose(found.numbers["mass"][2:], by_mass)
     np.testing.assert_allclose(found.numbers["mass"][:2], STEP * by_mass)
+
+
+def test_pushes_are_looked_at_where_the_step_begins() -> None:
+    asked: list[tuple[Any, ...]] = []
+
+    def slopes(model: Any, tree: Any, pushes: Any, by_q: Any) -> None:
+        assert not by_q.any()
+        asked.append((model, tree, pushes))
+        by_q += 2.0
+
+    found = np.full((2, 3), 9.0)
+    uncompiled(
+        its.find_pushes,
+        replace={
+            its.forward_kinematics: lambda *given: asked.append(given),
+            its.add_push_slopes: slopes,
+        },
+    )("model", "q", "pushes", "tree", found)
+    assert asked == [("model", "q", "tree"), ("model", "tree", "pushes")]
+    assert np.all(found == 2.0)

@@ -208,7 +208,7 @@ def test_stops_of_other_schemes_go_by_the_gap() -> None:
 
 
 def cornered(
-    scheme: Scheme, gap: float, after: float, before: float = 0.0, **options: Any
+    scheme: Scheme, gap: float, after: float, before: float = 0.0, far: float = 0.9, **options: Any
 ) -> tuple[list[int], list[float], list[float]]:
     """Which of the second faces of two points, entries 5 and 6, take part; the first is far."""
     places, row = listing(8), np.array([[3.0, 0.0], [0.0, 4.0], [1.0, 0.0], [0.0, 1.0]])
@@ -222,13 +222,13 @@ def cornered(
         to.jacobian[first[place] : first[place] + 2] = row[2 * point : 2 * point + 2]
 
     bounce, gaps = np.full(4, 77.0), np.full(8, np.nan)
-    gaps[5:7] = 1.0 + 1e-9, gap
+    gaps[5:7] = far, gap
     found = uncompiled(its.select_corners, replace={its.contact_rows: rows})(
         SimpleNamespace(nc=2), rule(scheme, **options), 1, 5, np.array([before, 0.0]),
         np.array([after, 0.7]), None, "faces", gaps, np.full(8, 0.5), directions, bounce, places,
     )  # fmt: skip
     if found > 1:
-        assert places.problem.free[3] == 0.7
+        assert places.problem.free[2 * found - 1] == 0.7
     return (
         places.candidate[1:found].tolist(), places.problem.free[2 : 2 * found : 2].tolist(),
         bounce[1:found].tolist(),
@@ -249,6 +249,8 @@ def test_second_faces_take_part_as_first_ones_do() -> None:
     assert cornered(Scheme.MOREAU_JEAN, 0.02, 2.0, -3.9, activation=0.001)[0] == [6]
     assert cornered(Scheme.PAPER_EXPLICIT, 0.001, 2.0, activation=0.001) == ([6], [2.0], [77.0])
     assert cornered(Scheme.PAPER_EXPLICIT, 0.0011, 2.0, activation=0.001)[0] == []
+    for far, found in ((1.0, [5, 6]), (1.0 + 1e-9, [6])):  # beyond 100 m/s none is looked at
+        assert cornered(Scheme.IMPACT_RESOLVED, 0.0, -50.0, far=far)[0] == found
 
 
 def constrained(
@@ -262,16 +264,17 @@ def constrained(
     jacobian = np.zeros((3, 2, 2))
     jacobian[2] = np.eye(2)
     rows = SimpleNamespace(
-        first=np.zeros(9, int), end=np.zeros(9, int), owner=np.array([9, 9, 9, 9, 2]),
-        set=np.full(5, sets), components=np.full(5, 2 if sets in (CONE, INTERVAL) else 1),
+        first=np.zeros(9, int), end=np.zeros(9, int), owner=np.array([9, 9, 9, 1, 2]),
+        set=np.array([9, 9, 9, CONE, sets]),
+        components=np.full(5, 2 if sets in (CONE, INTERVAL) else 1),
         limit=np.full(5, 30.0),
         outside=SimpleNamespace(
-            jacobian=jacobian, gap=np.array([[9.0] * 2] * 2 + [[gap, 9.0]]),
-            bias=np.array([[9.0] * 2] * 2 + [[bias, 9.0]]),
+            jacobian=jacobian, gap=np.array([[9.0, 9.0], [0.9, 9.0], [gap, 9.0]]),
+            bias=np.array([[9.0, 9.0], [0.0, 9.0], [bias, 9.0]]),
         ),
     )  # fmt: skip
-    rows.first[CONSTRAINT], rows.end[CONSTRAINT] = 4, 5
-    bounce, calls = np.full(4, 77.0), np.array([1, 1, 1, 1, called])
+    rows.first[CONSTRAINT], rows.end[CONSTRAINT] = 3, 5  # the first is far
+    bounce, calls = np.full(4, 77.0), np.array([1, 1, 1, 0, called])
     found = uncompiled(its.select_constraints)(
         1, rule(scheme, **options), np.array([before, 0.0]), np.array([after, 0.7]),
         np.full(5, 0.5), calls, rows, bounce, places,
