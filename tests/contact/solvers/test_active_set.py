@@ -273,6 +273,8 @@ def test_friction_beyond_its_cone_slips_against_it() -> None:
         # Within rounding, 1e-11 of the largest impulse, it is on the edge.
         point = [1.0, side * (0.5 + 5e-12), 1.0, 1.0, side * 0.79, 1.0, side * 0.29]
         assert corrected(mode, STILL, point) == (UNCERTIFIED, mode)
+        point = [1.0, side * (0.5 + 1.5e-11), 1.0, 1.0, side * 0.79, 1.0, side * 0.29]
+        assert corrected(mode, STILL, point)[1] == [slip, STICK, STICK, STICK]
 
 
 def test_slip_against_its_friction_sticks() -> None:
