@@ -13,11 +13,13 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
+from heelstrike.contact.linearized.motion import ActiveContacts
 from heelstrike.errors import SimulationError
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.linearized import derivatives as its
 from heelstrike.sim.linearized import law
 from heelstrike.sim.linearized.derivatives import RunDerivatives, StepDerivatives
+from heelstrike.sim.linearized.flow import Variation
 from heelstrike.sim.linearized.inputs import LAW, TORQUE, Inputs
 from heelstrike.sim.linearized.law import AskedAlong, Instant
 
@@ -340,3 +342,33 @@ def test_masses_and_torques_act_on_compliant_ground_as_in_closed_form() -> None:
 def push(torque: Any) -> None:
     """Ask for 3 N."""
     torque[0] = 3.0
+
+
+def test_a_law_answers_along_a_motion_unless_it_is_told_not_to() -> None:
+    """A spring k on a slide m: errors turn at √(k / m); held, they move evenly."""
+    build = hs.RobotBuilder("slide", gravity=0.0)
+    build.slide("one", None, mass=2.0, inertia=0.1, direction=(1.0, 0.0), torque=1e3)
+    robot, t = build.build(), 0.004
+
+    def simulated() -> hs.Simulation:
+        return hs.Simulation(
+            robot, spring(), state=hs.State([0.01], [0.0]), method=hs.EventDriven(),
+            stop_when_fallen=False,
+        )  # fmt: skip
+
+    rate = np.sqrt(800.0 / 2.0)
+    turns = [[np.cos(rate * t), np.sin(rate * t) / rate],
+             [-rate * np.sin(rate * t), np.cos(rate * t)]]  # fmt: skip
+    simulation = simulated()
+    for given, expected in (({}, turns), ({"answers": False}, [[1.0, t], [0.0, 1.0]])):
+        variation = Variation(simulated(), simulation.controller, **given)
+        found = variation.flow(0.0, t, ActiveContacts())
+        np.testing.assert_allclose(found, expected, atol=1e-7)
+    found = hs.step_derivatives(simulated(), until=t)
+    np.testing.assert_allclose(found.state, turns, atol=1e-7)
+
+
+@hs.controller
+def spring(state: Any, torque: Any) -> None:
+    """Pull back with 800 N/m."""
+    torque[0] = -800.0 * state.joint_position[0]

@@ -325,7 +325,11 @@ def test_a_step_is_decided_and_told() -> None:
     told = played.of("note_events")[0]
     assert told[1] == 2.04
     assert told[2] == pytest.approx(2.05)
-    assert told[3:5] == (STEP, 5)
+    assert told[3:9] == (STEP, 5, "q", "v", "next v", "breakaway")
+    assert told[9:12] == ("tree", memory.contacts, memory.reaction)
+    assert told[12:] == ("forces", "rows", told[14], "reported")
+    assert played.of("note_extremes")[0][:2] == ("gap", "residual")
+    assert played.of("share_friction")[0] == ("model", "breakaway", "friction", "brakes")
     assert played.of("react")[0][1] == 6
     assert played.of("note_brakes")[0][1:4] == (2.04, STEP, "brakes")
     for name in ("log_event", "note_wedge", "note_event"):

@@ -417,6 +417,12 @@ def test_a_point_stays_above_the_ground_if_the_known_matrix_says_so() -> None:
     assert not stays(STEP, 1, 9.0, 2, assembly, usual)  # the other is not known
     assert not stays(STEP, 2, 9.0, 1, assembly, usual)
     assert stays(STEP, 1, STEP * 1.01, 0, assembly, usual)
+    usual.usual_place[2] = 1  # another that is known pushes, too
+    whole[2, 2:4] = 5.0, 7.0
+    assembly.answer.impulse = np.array([0.1, -0.2, 0.3, 0.4])
+    speed += 1.5 + 2.8
+    assert stays(STEP, 1, -STEP * speed, 2, assembly, usual)
+    assert not stays(STEP, 1, -STEP * speed - 1e-9, 2, assembly, usual)
     usual.programs[its.DELASSUS] = 0
     assert not stays(STEP, 1, 9.0, 1, assembly, usual)
 
@@ -679,8 +685,9 @@ def test_other_ground_is_touched_by_nothing_yet(stops: bool) -> None:
 def test_restitution_is_refused_where_a_scheme_does_not_bounce() -> None:
     for scheme in Scheme:
         method = hs.TimeStepping(scheme=scheme)
-        for bounce in (0.0, 0.5):
-            setting: Any = SimpleNamespace(ground=hs.Ground(restitution=bounce))
+        for bounce in (0.0, 0.5, [0.0, 0.5]):
+            profile = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.5)]
+            setting: Any = SimpleNamespace(ground=hs.Ground(restitution=bounce, profile=profile))
             if bounce and scheme not in (Scheme.IMPACT_RESOLVED, Scheme.MOREAU_JEAN):
                 with pytest.raises(SimulationError, match=r"IMPACT_RESOLVED or Scheme.MOREAU_JEAN"):
                     method.check(setting)
