@@ -168,12 +168,12 @@ def test_residuals_are_what_their_definitions_say(skewed: bool) -> None:
         np.testing.assert_allclose(answer.residual, told, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(answer.velocity[:size], exact_velocities(case), atol=1e-12)
         np.testing.assert_allclose(scaling.root[:size], weights(case), rtol=1e-14)
-        assert scaling.unit == pytest.approx(beta, rel=1e-14)
-        assert scaling.effort == pytest.approx(effort, rel=1e-12)
-        assert answer.rest == pytest.approx(rest, rel=1e-12)
+        assert scaling.unit == pytest.approx(beta, rel=1e-14, abs=0.0)
+        assert scaling.effort == pytest.approx(effort, rel=1e-12, abs=0.0)
+        assert answer.rest == pytest.approx(rest, rel=1e-12, abs=0.0)
         rounding = (2.0 * len(case.sets) + 2.0) * EPSILON * (1.0 + effort)
-        assert scaling.rounding == pytest.approx(rounding, rel=1e-12)
-        assert worst == pytest.approx(told.max() + rounding, rel=1e-9)
+        assert scaling.rounding == pytest.approx(rounding, rel=1e-12, abs=0.0)
+        assert worst == pytest.approx(told.max() + rounding, rel=1e-9, abs=0.0)
 
 
 def test_where_impulses_cancel_velocities_are_summed_with_their_errors() -> None:
@@ -193,11 +193,11 @@ def test_where_impulses_cancel_velocities_are_summed_with_their_errors() -> None
         told = by_definition(case)[0]
         np.testing.assert_allclose(answer.residual, told, rtol=1e-6, atol=1e-12)
         scaling = case.work.scaling
-        assert scaling.effort == pytest.approx(np.max(sums / (g * beta)), rel=1e-12)
+        assert scaling.effort == pytest.approx(np.max(sums / (g * beta)), rel=1e-12, abs=0.0)
         terms = 2.0 * len(case.sets) + 1.0
         left = EPSILON * np.abs(velocity) + (2.0 * terms * EPSILON) ** 2 * sums
-        assert scaling.rounding == pytest.approx(np.max(left / (g * beta)), rel=1e-9)
-        assert worst == pytest.approx(answer.residual.max() + scaling.rounding, rel=1e-12)
+        assert scaling.rounding == pytest.approx(np.max(left / (g * beta)), rel=1e-9, abs=0.0)
+        assert worst == pytest.approx(answer.residual.max() + scaling.rounding, rel=1e-12, abs=0.0)
 
 
 def test_of_impulses_that_cancel_exactly_rounding_is_of_the_second_order() -> None:
@@ -208,7 +208,7 @@ def test_of_impulses_that_cancel_exactly_rounding_is_of_the_second_order() -> No
     )  # fmt: skip
     worst, answer = case.certified()
     assert not answer.velocity.any()
-    assert worst == pytest.approx((2.0 * 5.0 * EPSILON) ** 2 * 2e8, rel=1e-12)
+    assert worst == pytest.approx((2.0 * 5.0 * EPSILON) ** 2 * 2e8, rel=1e-12, abs=0.0)
 
 
 def one(free: float, impulse: float, kind: int = HALF_LINE, delassus: float = 0.5) -> Case:
@@ -242,7 +242,7 @@ def test_where_there_is_no_program_the_kernels_weigh(monkeypatch: pytest.MonkeyP
 def test_nothing_asks_for_nothing() -> None:
     worst, answer = one(0.0, 0.0).certified()
     assert answer.residual.tolist() == [0.0, 0.0, 0.0]
-    assert worst == pytest.approx(4.0 * EPSILON)
+    assert worst == pytest.approx(4.0 * EPSILON, abs=0.0)
     assert answer.rest == 0.0
 
 
@@ -275,6 +275,24 @@ def test_friction_that_moves_nothing_counts_in_units_of_what_presses() -> None:
     case = Case(delassus, np.array([-1.0, 0.0]), np.array([2.0, 1.2]), [CONE], [0.5], [0.0], [0.0])
     # λ_n counts in units of 2 N s, the friction in units of 0.5 · 2: an excess of 0.2.
     assert case.certified()[1].residual.tolist() == pytest.approx([0.0, 0.2, 0.0])
+
+
+def test_a_stop_with_an_empty_tangent_does_not_excuse_the_contacts_after_it() -> None:
+    """Its second row is zero, whatever friction stands there; the cone behind it is 0.2 beyond."""
+    G = np.diag([0.5, 0.0, 0.5, 0.5])
+    case = Case(
+        G, np.array([-1.0, 0.0, -1.0, 0.6]), np.array([2.0, 0.0, 2.0, -1.2]), [HALF_LINE, CONE],
+        [0.0, 0.5], [0.0, 0.0], [0.0, 0.0],
+    )  # fmt: skip
+    count, work = 2, case.work
+    problem = contact_problem(
+        count, count=count, friction=np.array(case.friction), set=np.array(case.sets),
+        delassus=G, free=case.free,
+    )  # fmt: skip
+    work.scaling.slope[:2], work.settings.floor, work.settings.skewed = 0.0, 0.0, 0
+    answer = ContactAnswer.allocate(capacity=count, impulse=case.impulse)
+    plainly(problem, work.settings, work.scaling, answer)
+    assert answer.residual.tolist() == pytest.approx([0.0, 0.1, 0.0])
 
 
 def test_signs_and_speeds() -> None:

@@ -88,7 +88,7 @@ def test_covering_vectors_are_positive_and_different() -> None:
         for row in range(6):
             share = (golden * path * (row + 1)) % 1.0
             expected = 1.0 + share if path < 3 else 10.0 ** (6.0 * share)
-            assert covering(path, row) == pytest.approx(expected, rel=1e-12)
+            assert covering(path, row) == pytest.approx(expected, rel=1e-12, abs=0.0)
 
 
 def asked_of_lemke(
@@ -232,12 +232,12 @@ def test_steps_are_proposed_where_they_change_modes_and_shortened_where_they_fai
     assert run.sizes == [4.0, 4.0]  # the largest free velocity
     assert np.all(run.at[0] == 0.0)
     assert np.all(run.at[1] == 1.0)
-    assert run.dampings == pytest.approx([1e-15 + 1e-12 * 0.5], rel=1e-12)
+    assert run.dampings == pytest.approx([1e-15 + 1e-12 * 0.5], rel=1e-12, abs=0.0)
     # Twice too much: a quarter of the step is left.
     run.merits, run.changes = [2.0, 2.0 * 3.99991, 2.0 * 3.99996, 2.0 * 3.99996], [True]
     assert run(1) == SOLVED
     np.testing.assert_allclose([each[0] for each in run.at[2:]], [1.0, 2.0, 1.5, 1.25])
-    assert run.dampings[1] == pytest.approx(1e-15 + 1e-12, rel=1e-12)
+    assert run.dampings[1] == pytest.approx(1e-15 + 1e-12, rel=1e-12, abs=0.0)
     assert run.work.iteration.number == run.work.tally.iterations == 2
     # What changes no mode goes on by itself.
     run.merits, run.changes = [0.3, 0.2] * 4, [False, False, False, True]
@@ -267,7 +267,9 @@ def test_what_is_stuck_or_solved_begins_elsewhere() -> None:
             at[second] = share * cone * at[second - 1]
         first = run.at[-29] if len(run.merits) == 0 else run.at[-29 + len(run.merits)]
         np.testing.assert_allclose(first, at, rtol=1e-12)
-        assert run.dampings[-1] == pytest.approx(1e-15 + 10.0 ** (-12 + start % 10), rel=1e-12)
+        assert run.dampings[-1] == pytest.approx(
+            1e-15 + 10.0 ** (-12 + start % 10), rel=1e-12, abs=0.0
+        )
     run.work.iteration.number = 30 * 40
     assert run(5) == ITERATION_LIMIT
 

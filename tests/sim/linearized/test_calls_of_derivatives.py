@@ -336,6 +336,11 @@ def test_masses_and_torques_act_on_compliant_ground_as_in_closed_form() -> None:
     np.testing.assert_allclose(found.numbers["mass"], expected, rtol=1e-9)
     np.testing.assert_allclose(found.torque, [[t**2 / 2.0 / m], [t / m]], rtol=1e-9)
     np.testing.assert_allclose(found.state, [[1.0, t], [0.0, 1.0]], atol=1e-12)
+    step = simulation.method.step_length
+    assert step is not None
+    after = hs.step_derivatives(simulation)  # one step
+    assert after.end - after.begin == pytest.approx(step)
+    np.testing.assert_allclose(after.state, [[1.0, step], [0.0, 1.0]], atol=1e-12)
 
 
 @hs.controller

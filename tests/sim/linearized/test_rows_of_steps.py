@@ -8,6 +8,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import mechanisms
 import numpy as np
 import pytest
 
@@ -218,6 +219,17 @@ def test_positions_follow_the_velocity_of_the_scheme(
     expected[:NQ, :NQ] += np.eye(NQ)
     expected[:NQ, NQ : NQ + NV] += before * STEP * np.eye(NQ)
     np.testing.assert_allclose(state, expected)
+
+
+def test_there_is_room_for_the_numbers_that_are_asked_for() -> None:
+    """Columns of position, velocity, torques, numbers of the robot, and of friction at last."""
+    robot = mechanisms.block()
+    for numbers, friction in (((), False), (("mass",), True)):
+        slopes = its.allocate_slopes(robot, numbers, friction=friction)
+        count = sum(getattr(robot.model, name).size for name in numbers)
+        assert slopes.state.shape == (6, 6 + count + friction)
+        assert (slopes.rubs, slopes.turning) == (int(friction), 0.5)
+    assert its.allocate_slopes(robot).rubs == 0
 
 
 def test_the_equations_of_a_step_are_posed_at_its_beginning() -> None:
