@@ -221,7 +221,7 @@ def test_a_line_never_opens() -> None:
 
 def corrected(
     mode: list[int], velocity: list[float], point: list[float], sets: list[int] | None = None,
-    friction: list[float] | None = None,
+    friction: list[float] | None = None, root: list[float] | None = None,
 ) -> tuple[int, list[int]]:  # fmt: skip
     """Modes after one correction, where velocities of 0.1 of a row's weight, 2, are rest."""
     problem, work = posed([STICK] * 4, sets, friction)
@@ -230,7 +230,8 @@ def corrected(
     equations.point[: len(point)] = point
     trial = ContactAnswer.allocate(capacity=4, mode=np.array(mode), rest=0.1)
     trial.velocity[:7] = velocity
-    found = correct_modes(problem, work.reduced.tangent, np.full(8, 2.0), equations, trial)
+    weight = np.array(root or [2.0] * 7)
+    found = correct_modes(problem, work.reduced.tangent, weight, equations, trial)
     return found, trial.mode.tolist()
 
 
@@ -281,5 +282,8 @@ def test_slip_against_its_friction_sticks() -> None:
     mode, velocity = [OPEN, STICK, SLIP_FORWARD, SLIP_BACKWARD], [0, 0, 0, 0, -0.3, 0, 0.3]
     point = [1.0, 1.0, 1.0]
     assert corrected(mode, velocity, point) == (SOLVED, [OPEN, STICK, STICK, STICK])
+    root = [9.0, 9.0, 9.0, 9.0, 2.0, 9.0, 2.0]  # those of the tangents count
+    found = corrected(mode, velocity, point, root=root)
+    assert found == (SOLVED, [OPEN, STICK, STICK, STICK])
     velocity = [0, 0, 0, 0, 0.3, 0, -0.3]
     assert corrected(mode, velocity, point) == (UNCERTIFIED, mode)

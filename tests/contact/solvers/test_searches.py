@@ -513,3 +513,57 @@ def test_a_workspace_has_the_documented_tolerance_and_room_for_its_contacts() ->
     assert work.equations.dual.tableau.shape == (6, 8)
     assert work.sticking.lower_half.shape == (55,)
     assert contact_workspace(0, ready=False).trial.mode.shape == (1,)
+
+
+def tried(
+    ends: list[tuple[int, float]], *, patient: int = 0, settled: bool = True,
+    order: tuple[int, ...] = (LEMKE, GAUSS_SEIDEL),
+) -> tuple[int, list[int], ContactWorkspace]:  # fmt: skip
+    """How a solve ends whose solvers end with such residuals; who was asked; its counts."""
+    work, asked = contact_workspace(1, ready=False, symmetric=False), []
+    work.settings.patient = patient
+    problem, answer = contact_problem(1, count=1), ContactAnswer.allocate(capacity=1)
+
+    def seek(solver: int, _: Any, best: float, __: Any, ___: Any) -> tuple[int, float]:
+        asked.append(solver)
+        outcome, residual = ends.pop(0)
+        return outcome, min(best, residual)
+
+    parts = {
+        cs.seek: seek, cs.release: lambda _, best, *__: (settled, best),
+        cs.scale_matrix: lambda *_: None, cs.certify: lambda *_: 1.0,
+        cs.nearly_singular: lambda *_: False,
+    }  # fmt: skip
+    run = uncompiled(cs.try_solvers._function, replace=parts)
+    status = run(problem, np.array(order), work, answer)
+    return int(status), asked, work
+
+
+def test_solvers_are_asked_in_turn_until_one_is_believed() -> None:
+    """A guess first; combinations at last. Patience asks on where nobody was sure."""
+    status, asked, work = tried([(SOLVED, 1e-12)])
+    assert (status, asked) == (SOLVED, [WARM_START])
+    assert (work.tally.shortcuts, work.tally.solver, work.tally.fallbacks) == (1, WARM_START, 0)
+    status, asked, work = tried([(UNCERTIFIED, 0.1), (SOLVED, 1e-10)])
+    assert (status, asked, work.tally.solver) == (SOLVED, [WARM_START, LEMKE], LEMKE)
+    assert (work.tally.shortcuts, work.tally.fallbacks) == (0, 0)
+    # A residual within the tolerance will do, however the search has ended; not if patient.
+    unsure = [(UNCERTIFIED, 0.1), (ITERATION_LIMIT, 1e-10), (SOLVED, 1e-12)]
+    status, asked, _ = tried(unsure.copy())
+    assert (status, asked) == (SOLVED, [WARM_START, LEMKE])
+    status, asked, work = tried(unsure.copy(), patient=1)
+    assert (status, asked) == (SOLVED, [WARM_START, LEMKE, GAUSS_SEIDEL])
+    assert work.tally.fallbacks == 0  # it was solved before
+    status, asked, _ = tried([(UNCERTIFIED, 0.1), (SOLVED, 1e-10)], patient=1)
+    assert (status, asked) == (SOLVED, [WARM_START, LEMKE])
+    every = [(UNCERTIFIED, 0.1), (RAY, 0.1), (ITERATION_LIMIT, 0.1), (UNCERTIFIED, 0.1)]
+    status, asked, work = tried(every.copy())
+    assert (status, asked) == (RAY, [WARM_START, LEMKE, GAUSS_SEIDEL, COMBINATIONS])
+    assert (work.tally.fallbacks, work.tally.failures, work.tally.combinations) == (2, 1, 1)
+    status, asked, work = tried(every.copy(), order=(LEMKE,))
+    assert (status, asked, work.tally.combinations) == (RAY, [WARM_START, LEMKE], 0)
+    # A guess that is not settled is left to the solvers; one that agrees with itself is taken.
+    status, asked, _ = tried([(SOLVED, 1e-12), (SOLVED, 1e-12)], settled=False)
+    assert asked == [WARM_START, LEMKE]
+    status, asked, _ = tried([(UNCERTIFIED, 5e-10)])
+    assert (status, asked) == (SOLVED, [WARM_START])
