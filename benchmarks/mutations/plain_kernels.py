@@ -4,7 +4,8 @@ A pytest plugin for the mutation campaign (``-p plain_kernels``). It must be loa
 of heelstrike is. Loops, kernels compiled apart and straight-line programs become the twins of
 :func:`heelstrike.compiler.compilation.uncompiled`; in place of addresses stand numbers under which
 they are kept here. A step of a biped takes a millisecond or more, and an index out of range is an
-error.
+error. Programs that differentiate stay machine code: what they record of kernels is as it was when
+they were first made.
 """
 
 from __future__ import annotations
