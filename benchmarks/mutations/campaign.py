@@ -185,7 +185,8 @@ class Reached:
         for line in range(mutant.line, last + 1):
             there |= self.lines.get((mutant.file, line), set())
         around = self.functions.get((mutant.file, mutant.function), set())
-        if not mutant.function and not there:  # of the module: whatever uses it, and its own tests
+        if not mutant.function:  # of the module: whatever uses it, and its own tests
+            there = set()  # who happened to import it first
             folder, _, name = mutant.file.rpartition("/")
             mirrored = f"tests/{folder}/test_{name.removesuffix('.py')}"
             around = self.files.get(mutant.file, set())

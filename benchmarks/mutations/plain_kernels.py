@@ -4,7 +4,8 @@ A pytest plugin for the mutation campaign (``-p plain_kernels``). It must be loa
 of heelstrike is. Loops, kernels compiled apart and straight-line programs become the twins of
 :func:`heelstrike.compiler.compilation.uncompiled`; in place of addresses stand numbers under which
 they are kept here. A step of a biped takes a millisecond or more, and an index out of range is an
-error.
+error. Programs that differentiate stay machine code: what they record of kernels is as it was when
+they were first made.
 """
 
 from __future__ import annotations
@@ -152,9 +153,27 @@ def _recorded(program: Any) -> int:
     return len(_by_number) - 1
 
 
+_machine_code = straight_line.straight_line_code
+
+
+def _differentiated(program: Any, known: Any) -> int:
+    """Derivatives are found on the tape alone: such a program stays machine code."""
+    (address,) = _machine_code([program], known)
+    parameters = [ctypes.c_void_p] * len(program.arguments)
+    function = ctypes.CFUNCTYPE(None, *parameters)(address)
+
+    def run(*arguments: Any) -> None:
+        function(*(a.ctypes.data if isinstance(a, np.ndarray) else a.address for a in arguments))
+
+    _by_number.append(run)
+    return len(_by_number) - 1
+
+
 def _straight_line_code(programs: Sequence[Any], known: Any = None) -> tuple[int, ...]:
-    del known
-    return tuple(map(_recorded, programs))
+    return tuple(
+        _differentiated(program, known) if program.derivatives else _recorded(program)
+        for program in programs
+    )
 
 
 straight_line.straight_line_code = _straight_line_code

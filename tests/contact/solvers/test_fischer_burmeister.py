@@ -85,3 +85,18 @@ def test_newton_step(damping: float) -> None:
     normal = slope.T @ slope + damping * np.eye(5)
     expected = np.linalg.solve(normal, -slope.T @ value)
     np.testing.assert_allclose(work.iteration.step[:5], expected, rtol=1e-7)
+
+
+def test_derivatives_at_a_kink_are_those_of_one_side() -> None:
+    """Where all vanishes φ has none; 1 − 1/√2, that of equal arguments, stands in its place."""
+    kink, work = 0.3, contact_workspace(1)
+    work.reduced.unknowns = 2
+    work.reduced.matrix[:2, :2] = [[1.0, 0.25], [0.25, 1.0]]
+    work.reduced.offset[:2], work.iteration.x[:2] = 0.0, 0.0
+    work.reduced.normal[0], work.reduced.tangent[0], work.reduced.cone[0] = 0, 1, 0.5
+    assert equations(1, SIZE, work.reduced, work.iteration) == 0.0
+    # φ(a, b): both partial derivatives are the kink's; the inner one is −φ(upper, −speed).
+    by_upper, by_speed = -kink * kink, kink * kink
+    first = kink * np.array([1.0, 0.25]) + [kink, 0.0]
+    second = by_speed * np.array([0.25, 1.0]) + [0.0, kink - by_upper]
+    np.testing.assert_allclose(work.iteration.slope[:2, :2], [first, second], rtol=1e-14)

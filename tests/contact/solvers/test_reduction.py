@@ -53,3 +53,12 @@ def test_prescribed_sliding_is_part_of_the_matrix(mode: int, lean: float) -> Non
     assert reduced.unknowns == 1
     assert reduced.matrix[0, 0] == pytest.approx((4.0 + lean) / 4.0)
     assert reduced.offset[0] == pytest.approx(-1.5)
+
+
+def test_rows_without_a_diagonal_are_scaled_by_their_largest_entry() -> None:
+    """Of the row or the column, whichever is larger; by one where there is none."""
+    delassus = np.array([[0.0, 2.0, 0.0], [9.0, -1.0, 0.0], [0.0, 0.0, 0.0]])
+    matrix = np.zeros((6, 6))
+    matrix[::2, ::2] = delassus
+    reduced = reduced_to(matrix, np.ones(6), np.zeros(3), np.full(3, OPEN, np.int64))
+    np.testing.assert_allclose(reduced.scale[:3], [1.0 / 3.0, 1.0 / 3.0, 1.0])

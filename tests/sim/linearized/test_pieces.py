@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from types import SimpleNamespace
 
+import mechanisms
 import numpy as np
 import pytest
 from numpy.polynomial import legendre
@@ -21,7 +22,7 @@ from heelstrike.sim.linearized.collocation import collocation
 from heelstrike.sim.linearized.flow import MATRIX, NODES, STAGES, WEIGHTS
 from heelstrike.sim.linearized.inputs import LAW, NONE, TORQUE, Inputs, inputs_of
 from heelstrike.sim.linearized.mode_changes import _others, other_modes
-from heelstrike.sim.linearized.pushed import switches
+from heelstrike.sim.linearized.pushed import pushed, switches
 from heelstrike.sim.linearized.refusals import refuse_inputs, refuse_step
 
 OPEN, STICK, FORWARD, BACKWARD = (
@@ -61,6 +62,29 @@ def test_stretches_end_where_pushes_switch() -> None:
     assert switches(pushes, 0.0, 0.375) == [0.0, 0.125, 0.25, 0.375]
     assert switches(pushes, 0.125, 0.25) == [0.125, 0.25]
     assert switches((), 0.2, 0.7) == [0.2, 0.7]
+
+
+def test_a_push_is_a_force_whose_lever_turns_with_the_block() -> None:
+    """Generalised force (F, M) of a free block, M = z F_x − x F_z of the lever; ∂M/∂θ of that."""
+    robot, angle = mechanisms.block(width=0.4, height=0.2), 0.3
+    force, lever = np.array([30.0, -40.0]), np.array([0.1, 0.2])
+    q = np.array([0.5, 0.7, angle])
+    block = robot.link_names[-1]
+    push = hs.Push(block, force=(30.0, -40.0), start=0.2, duration=0.3, point=(0.1, 0.2))
+
+    def turned(at: float) -> float:
+        x = np.cos(at) * lever[0] + np.sin(at) * lever[1]
+        z = -np.sin(at) * lever[0] + np.cos(at) * lever[1]
+        return float(z * force[0] - x * force[1])
+
+    assert pushed(robot, q, (), 0.3) == {}
+    found = pushed(robot, q, (push,), 0.3)
+    np.testing.assert_allclose(found["force"], [30.0, -40.0, turned(angle)], rtol=1e-12)
+    slope = np.zeros((3, 3))
+    slope[2, 2] = (turned(angle + 1e-6) - turned(angle - 1e-6)) / 2e-6
+    np.testing.assert_allclose(found["force_by_q"], slope, atol=1e-7)
+    for time, acts in ((0.2, True), (0.19, False), (0.5, False)):
+        assert pushed(robot, q, (push,), time)["force"].any() == acts
 
 
 # Columns.

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
+from heelstrike.sim.time_stepping.doubts import stiffest
 from heelstrike.view.page.verdict import judge
 
 
@@ -189,3 +190,12 @@ def test_a_link_with_next_to_no_inertia_fails_in_words_and_what_to_do_helps() ->
     other = drops(1e-9, hs.EventDriven())
     assert other.completed
     assert np.abs(other.final_state.q[1:]).max() <= 1e-9
+
+
+def test_what_has_no_spring_names_no_joint() -> None:
+    """Whose spring is stiff is told with how stiff it is for the step."""
+    robot = sprung()
+    assert stiffest(robot, robot.reference_state().q, 1e-3) == (0.0, "")
+    value, joint = stiffest(sprung(4e3), robot.reference_state().q, 1e-3)
+    assert joint == "ankle"
+    assert value > 0.0

@@ -234,7 +234,8 @@ class Yielding:
             time = bound if step == bound - time else time + step
             x, error, now = panel.x, panel.change, panel.last
             if time < bound < span:  # half of what is left, up to the change of mode
-                step = 0.5 * (bound - time)
+                left = bound - time  # halves of the last digit would come to no end
+                step = 0.5 * left if left > AT_A_SWITCH else left
             else:
                 bound, step = span, step * min(factor, GROW)
                 self._proposed = step
