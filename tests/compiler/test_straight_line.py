@@ -26,6 +26,7 @@ from heelstrike.dynamics.workspace import Workspace
 from heelstrike.sim.contacts.straight_line import (
     KERNELS,
     MOST_COORDINATES,
+    room_of,
     straight_line_programs,
     usual_points,
 )
@@ -55,8 +56,8 @@ def arguments(case: RobotCase, seed: int) -> list[tuple[Any, ...]]:
     impulse = rng.uniform(-1.0, 1.0, (nc, 2))
     x, w = rng.uniform(-1.0, 1.0, (2, nv))
     points = usual_points(case.robot())
-    size = 2 * len(points)
-    rows, delassus = np.zeros((size, nv)), np.zeros((size, size))
+    room = room_of(len(points))
+    rows, delassus = np.zeros((2 * len(points), nv)), np.zeros((room, room))
     torque, bias = rng.uniform(-9.0, 9.0, case.robot().nu), np.zeros(nv)
     ground = Ground(slope=rng.uniform(-0.5, 0.5), friction=0.7, restitution=0.2).model()
     located = Contacts.allocate(model.extents, components=2)

@@ -16,6 +16,7 @@ from every_row import ROBOT
 import heelstrike as hs
 from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.modes import RAY, SOLVED
+from heelstrike.contact.workspace import PROGRAM_ROWS
 from heelstrike.sim import Scheme
 from heelstrike.sim.contacts.rows import CONSTRAINT, DRY_JOINT, LOOP, POINT, SECOND_FACE, STOP
 from heelstrike.sim.time_stepping import method as its
@@ -194,7 +195,7 @@ def test_candidates_are_listed_kind_by_kind_and_solved_once() -> None:
     assert "close_gaps" not in names
     assert step.played.of("free_loops")[0][0] == 7
     assert step.played.of("free_loops")[0][2:4] == ("next v", 0.5 * STEP)
-    assert step.played.of("append_loops")[0][1] == 1
+    assert step.played.of("append_loops")[0][1] is step.memory.loops
     assert step.played.of("solve_candidates")[0][1:3] == (2, 7)
     assert step.memory.assembly.answer.residual.tolist() == [0.0, 0.0, 0.0]
     assert (step.impact.happens, step.impact.gains, step.impact.relaxed) == (0, 0, 0)
@@ -534,6 +535,8 @@ class Solve:
         relaxed: int = 0,
         members: tuple[int, ...] = (),
         finishes: bool = True,
+        room: int = PROGRAM_ROWS,
+        rows: int = 6,
     ) -> None:
         def find(*given: Any) -> int:
             given[-1][: len(members)] = members
@@ -549,7 +552,7 @@ class Solve:
                 "rows_of": 1,
                 "are_usual": usual,
                 "play": None,
-                "gather_points": None,
+                "pick_points": None,
                 "solve_mass_matrix": lambda model, equations, x: x.__imul__(2.0),
                 "find_velocities": None,
                 "couple": couple,
@@ -570,7 +573,7 @@ class Solve:
             }
         )
         self.problem = SimpleNamespace(
-            first=np.array([0, 2, 4, 5, 6]), delassus="delassus", count=9
+            first=np.array([0, 2, 4, 5, rows]), delassus="delassus", count=9
         )
         answer = SimpleNamespace(impulse="impulse", mode="mode")
         self.impact = SimpleNamespace(
@@ -582,9 +585,10 @@ class Solve:
             bounce=np.full(4, 7.0),
             problem="members",
         )
-        self.jacobian = np.full((8, 2), 9.0)
+        self.jacobian = np.full((16, 2), 9.0)
         self.jacobian[5] = 0.5, 0.25
-        self.usual_problem = SimpleNamespace(delassus="whole", count=8)
+        self.usual_problem = SimpleNamespace(delassus=np.zeros((room, room)), count=8)
+        self.small_problem = SimpleNamespace(delassus="small", count=7)
         self.memory = SimpleNamespace(
             assembly=SimpleNamespace(
                 problem=self.problem,
@@ -593,6 +597,7 @@ class Solve:
                 directions=SimpleNamespace(jacobian=self.jacobian),
             ),
             contacts="contacts",
+            small_problem=self.small_problem,
             second_faces="faces",
             next_v=np.array([3.0, 4.0]),
             v="v",
@@ -622,10 +627,10 @@ def test_usual_points_alone_are_one_program() -> None:
     step = Solve(count=2)
     assert step.solved
     assert [given[0] for given in step.played.of("play")] == [its.DELASSUS]
-    assert step.usual_problem.count == 2
-    assert step.problem.count == 9
+    assert step.usual_problem.count == step.problem.count == 2
+    assert step.small_problem.count == 7
     assert step.played.of("solve_contact_kernel")[0][1] is step.usual_problem
-    for name in ("gather_points", "write_joint_rows", "couple"):
+    for name in ("pick_points", "write_joint_rows", "couple"):
         assert name not in step.played.names()
     (push,) = step.played.of("push_all")
     assert push[1:4] == (2, 2, True)
@@ -634,17 +639,32 @@ def test_usual_points_alone_are_one_program() -> None:
 
 def test_stops_and_loops_beside_usual_points_are_coupled_to_them() -> None:
     step = Solve()
-    assert step.problem.count == 4
-    assert step.played.of("gather_points")[0][4] == 2
+    assert step.usual_problem.count == step.problem.count == 4
+    assert not step.played.of("pick_points")
     assert step.changes == [[0.0, -2.0], [1.0, 0.5]]  # a unit of the stop, the loop's own row
     assert [given[2] for given in step.played.of("couple")] == [2, 3]
     assert [given[1] for given in step.played.of("couple")] == [3, 3]
+    assert all(given[-1] is step.usual_problem.delassus for given in step.played.of("couple"))
     assert len(step.played.of("find_velocities")) == 2
     assert step.played.of("find_velocities")[0][3] is True
+
+
+def test_some_of_the_usual_points_have_a_smaller_problem() -> None:
     step = Solve(near=0, count=2)
-    assert not step.played.of("find_velocities")
+    assert not step.played.of("find_velocities") + step.played.of("play")
+    assert step.small_problem.count == step.problem.count == 2
     step = Solve(near=1, count=1)  # one of two
-    assert len(step.played.of("gather_points")) == 1
+    ((near, _, _, delassus),) = step.played.of("pick_points")
+    assert (near, delassus) == (1, "small")
+    assert step.played.of("solve_contact_kernel")[0][1] is step.small_problem
+
+
+def test_more_rows_than_there_is_room_for_have_the_problem_of_all() -> None:
+    step = Solve(room=5)
+    assert step.played.of("pick_points")[0][3] == "small"
+    step = Solve(room=5, rows=PROGRAM_ROWS + 1)
+    assert step.played.of("pick_points")[0][3] == "delassus"
+    assert step.played.of("solve_contact_kernel")[0][1] is step.problem
 
 
 @pytest.mark.parametrize("how", ["unusual", "corners", "outside"])
@@ -655,7 +675,7 @@ def test_others_are_assembled_from_their_rows(how: str) -> None:
     assert [given[3] for given in step.played.of("write_contact_rows")] == ["contacts", "faces"]
     assert step.played.of("assemble_delassus")[0][1] == 4
     assert step.played.of("push_all")[0][3] is False
-    assert not step.played.of("gather_points")
+    assert not step.played.of("pick_points")
 
 
 def test_moreau_and_jean_bounce_in_the_solve_and_have_no_other_impact() -> None:
@@ -681,12 +701,12 @@ def test_an_impact_is_solved_after_the_positions() -> None:
     assert step.impact.bounce.tolist() == [0.5 * -1.0, 0.25 * -3.0, 7.0, 7.0]
     assert step.played.of("leave_others_out")[0][0] == 2
     assert step.played.of("pose_impact")[0][-1] == "members"
-    assert step.played.of("solve_impact")[0][1:3] == (step.problem, "members")
+    assert step.played.of("solve_impact")[0][1:3] == (step.usual_problem, "members")
     assert not step.played.of("push_out")
     step = Solve(falls=True, members=(0, 1, 2, 3), relaxed=1)
     assert step.impact.bounce.tolist() == [0.0] * 4
     assert not step.played.of("leave_others_out") + step.played.of("speed_before")
-    assert step.played.of("pose_impact")[0][-1] is step.problem
+    assert step.played.of("pose_impact")[0][-1] is step.usual_problem
     assert len(step.played.of("push_out")) == 1
     assert not Solve(falls=True, members=(0,), finishes=False).solved
     step = Solve(falls=True, status=RAY)

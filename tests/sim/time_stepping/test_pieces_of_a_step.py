@@ -331,20 +331,14 @@ def test_the_matrix_of_the_points_that_are_near_is_part_of_that_of_all(
 ) -> None:
     whole, near = np.arange(36.0).reshape(6, 6), len(candidate)
     usual = SimpleNamespace(
-        programs=np.arange(9), usual_points=np.array([0, 2, 3]), point_rows=None,
-        usual_place=np.array([0, -1, 1, 2]), usual_problem=SimpleNamespace(delassus=whole),
-    )  # fmt: skip
-    played: list[Any] = []
-    delassus = np.full((8, 8), 77.0)
-    gather = uncompiled(
-        its.gather_points, replace={its.play: lambda program, _: played.append(program)}
+        usual_place=np.array([0, -1, 1, 2]), usual_problem=SimpleNamespace(delassus=whole)
     )
-    gather(None, None, None, None, near, np.array([*candidate, 77]), usual, delassus)
+    delassus = np.full((8, 8), 77.0)
+    uncompiled(its.pick_points)(near, np.array([*candidate, 77]), usual, delassus)
     rows = [2 * [0, -1, 1, 2][point] + i for point in candidate for i in range(2)]
     size = 2 * near
     np.testing.assert_array_equal(delassus[:size, :size], whole[np.ix_(rows, rows)])
     assert np.all(delassus[size:] == 77.0)
-    assert played == ([its.DELASSUS] if near else [])
 
 
 def test_what_is_no_point_is_coupled_to_all_before_it() -> None:
