@@ -23,6 +23,7 @@ from heelstrike.contact.certificate import (
     sign,
     velocity_error,
 )
+from heelstrike.contact.cone_certificate import MOST_STOPS
 from heelstrike.contact.modes import Solver
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
 from heelstrike.contact.solvers import certified_solve
@@ -228,9 +229,10 @@ def test_an_impulse_without_a_cause_or_that_is_no_number_is_never_certified() ->
 
 def test_where_there_is_no_program_the_kernels_weigh(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same numbers, whether the list of programs ends before or has none."""
-    monkeypatch.setattr(certified_solve, "weighing_programs", lambda: np.zeros(9, np.int64))
+    none = np.zeros((2, MOST_STOPS + 1), np.int64)
+    monkeypatch.setattr(certified_solve, "certificate_programs", lambda: none)
     work = contact_workspace(4, ready=False)
-    assert len(work.scaling.programs) == 9
+    assert len(work.scaling.programs) == 2
     for seed in range(6):
         worst, answer = replace(drawn(seed), work=work).certified()
         other, wanted = drawn(seed).certified()

@@ -353,29 +353,23 @@ def test_of_rows_that_are_multiples_the_shorter_goes(turned: bool) -> None:
             np.testing.assert_array_equal(each, expected)
 
 
-@pytest.mark.parametrize("components", [1, 2])
-def test_rows_of_loops_are_appended_and_say_what_they_ask(components: int) -> None:
+def test_rows_of_loops_are_appended_and_say_what_they_ask() -> None:
     """They stick, on a line, without friction; free terms are J x + t J̇ v."""
     memory = memory_of()
     its, assembly = memory.loops, memory.assembly
     draw = np.random.default_rng(3)
     its.rows.jacobian[:3], its.rows.bias[:3] = draw.normal(size=(3, ROBOT.nv)), [1.0, 2.0, 3.0]
     assembly.problem.first[:2] = 0, 2
-    count = uncompiled(loops.append_loops)(1, components, its, assembly)
+    count = uncompiled(loops.append_loops)(1, its, assembly)
     assert count == 4
-    first, size = assembly.problem.first, 3 * components
-    assert np.diff(first[1:5]).tolist() == [components] * 3
-    np.testing.assert_array_equal(
-        assembly.directions.jacobian[2 : 2 + size : components], its.rows.jacobian[:3]
-    )
+    first = assembly.problem.first
+    assert np.diff(first[1:5]).tolist() == [1] * 3
+    np.testing.assert_array_equal(assembly.directions.jacobian[2:5], its.rows.jacobian[:3])
     assert assembly.problem.set[1:4].tolist() == [LINE] * 3
     assert assembly.problem.friction[1:4].tolist() == [0.0] * 3
     assert assembly.directions.leaf[1:4].tolist() == [-1] * 3
     assert assembly.answer.mode[1:4].tolist() == [STICK] * 3
     assert assembly.candidate[1:4].tolist() == its.entry[:3].tolist()
-    if components == 2:
-        assert assembly.problem.free[3:8:2].tolist() == [0.0] * 3
-        assert not assembly.directions.jacobian[3:8:2].any()
     rate = draw.normal(size=ROBOT.nv)
     uncompiled(loops.free_loops)(4, its, rate, 0.5, assembly)
     expected = its.rows.jacobian[:3] @ rate + 0.5 * its.rows.bias[:3]

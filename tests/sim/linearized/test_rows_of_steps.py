@@ -40,6 +40,11 @@ MODEL: Any = SimpleNamespace(
 )  # fmt: skip
 
 
+def copy(source: np.ndarray, target: np.ndarray) -> None:
+    """Copy an array, as kernels do by words."""
+    target[:] = source
+
+
 @pytest.mark.parametrize("bounces", [False, True])
 @pytest.mark.parametrize("rate", [0.0, 100.0])
 def test_rows_of_points_are_normals_and_the_tangents_of_what_sticks(
@@ -236,7 +241,7 @@ def test_the_equations_of_a_step_are_posed_at_its_beginning() -> None:
     balance = SimpleNamespace(
         q=np.zeros(3), v=np.zeros(2), added=np.zeros(2), normal=np.zeros((2, 2))
     )
-    uncompiled(its.pose_balance)(
+    uncompiled(its.pose_balance, replace={its.copy_words: copy})(
         np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0]), np.array([6.0, 7.0]),
         np.array([[0.0, 1.0], [0.6, 0.8]]), balance,
     )  # fmt: skip
@@ -362,7 +367,7 @@ def test_a_step_is_one_problem_or_two(
     parts = {
         its.pose_balance: play("pose"), its.find_pushes: play("pushes"),
         its.evaluate: play("evaluate"), its.differentiate_problem: play("problem"),
-        its.write_state: play("state"),
+        its.write_state: play("state"), its.copy_words: copy,
     }  # fmt: skip
     uncompiled(its.differentiate_step, replace=parts)(
         SimpleNamespace(nq=NQ), STEP, int(scheme), "stiffness", "next v", "added", "normal",
