@@ -10,7 +10,7 @@ import numpy as np
 
 from heelstrike.experiments.engines import Engine, InvalidRunError, Peer, Scenario, check_flight
 from heelstrike.sim import TimeStepping
-from speed.stopwatch import Work, best_of, steps_in_slot, timed
+from speed.stopwatch import TURN, Work, best_of, steps_in_slot, timed
 
 STEP = 1e-3
 BEGIN = 0.2
@@ -110,7 +110,7 @@ def race(
             steps["pinocchio_part"], first["pinocchio_part"] = 1, 0
         except Exception as error:
             row["pinocchio_part_invalid"] = reason(error)
-    best = best_of(works, seconds=seconds, least=least, in_a_row=2)
+    best = best_of(works, seconds=seconds, least=least, turn=TURN)
     for name, count in steps.items():
         if name in best:
             span = best[name] - best.get(f"{name}, begin", 0.0)
