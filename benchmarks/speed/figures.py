@@ -63,7 +63,7 @@ def _steps(part: dict[str, Any]) -> Figure:
             )
     axes.set_xscale("log")
     label_powers(axes.xaxis)
-    axes.set_xlim(0.5)
+    axes.set_xlim(0.1)
     axes.margins(x=0.15)
     axes.set_yticks(place, [row["scenario"] for row in rows])
     axes.grid(False, axis="y")
