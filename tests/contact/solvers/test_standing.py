@@ -21,14 +21,15 @@ HEIGHT = 0.07
 
 
 def standing(
-    draw: Any, code: int, stops: int, *, rigid: bool = False
+    draw: Any, code: int, stops: int, *, turns: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Delassus matrix and free velocities of a walker whose vertices share rows as a code says.
 
     Its vertices press, half of its stops do, and the others part.
 
     Its coordinates are the places of two ankles, the angles of the feet, and its joints; all hang
-    together by their mass matrix. In a rigid one feet do not turn, as under straight legs.
+    together by their mass matrix. Feet that turn less are those under legs that are nearly
+    straight, or straight.
     """
     shared = [digit == "1" for digit in f"{code:b}"]
     shared[0] = False
@@ -38,7 +39,7 @@ def standing(
         foot += 0 if same else 3
         lever, height = draw.uniform(0.3, 0.5) * (-1 if same else 1), HEIGHT
         normal, tangent = np.zeros(size), np.zeros(size)
-        normal[foot + 1], normal[foot + 2] = 1.0, 0.0 if rigid else lever
+        normal[foot + 1], normal[foot + 2] = 1.0, turns * lever
         tangent[foot], tangent[foot + 2] = 1.0, height
         rows += [normal, tangent]
     for stop in range(stops):
@@ -74,14 +75,14 @@ def solved(problem: Any, modes: list[int], way: Any = stand) -> tuple[bool, Cont
 
 
 @pytest.mark.parametrize("code", PROGRAMS)
-@pytest.mark.parametrize("rigid", [False, True])
+@pytest.mark.parametrize("turns", [1.0, 0.1, 0.03, 0.0])
 def test_impulses_have_the_least_norm_of_those_that_leave_no_velocity(
-    code: int, rigid: bool
+    code: int, turns: float
 ) -> None:
     """Against the pseudo-inverse of all rows."""
     succeeded = 0
     for seed in range(10):
-        delassus, free = standing(np.random.default_rng([code, seed]), code, 0, rigid=rigid)
+        delassus, free = standing(np.random.default_rng([code, seed]), code, 0, turns=turns)
         problem = problem_of(delassus, free, 0)
         held, answer = solved(problem, [STICK] * problem.count)
         expected = -np.linalg.pinv(delassus, rcond=1e-9) @ free
@@ -95,7 +96,7 @@ def test_impulses_have_the_least_norm_of_those_that_leave_no_velocity(
     assert succeeded >= 5
 
 
-@pytest.mark.parametrize("rigid", [False, True])
+@pytest.mark.parametrize("turns", [1.0, 0.05, 0.0])
 @pytest.mark.parametrize(
     ("code", "stops"),
     [
@@ -105,12 +106,12 @@ def test_impulses_have_the_least_norm_of_those_that_leave_no_velocity(
         if has_stops(code.bit_length(), stops)
     ],
 )
-def test_stops_beside_feet(code: int, stops: int, rigid: bool) -> None:
+def test_stops_beside_feet(code: int, stops: int, turns: float) -> None:
     """Those that press are held, the others part; whatever was guessed of them, and as by loops."""
     seen, named = 0, set()
     for seed in range(12):
         draw = np.random.default_rng([code, stops, seed])
-        delassus, free = standing(draw, code, stops, rigid=rigid)
+        delassus, free = standing(draw, code, stops, turns=turns)
         cones = code.bit_length()
         guess = [STICK] * cones + [STICK] * stops
         problem = problem_of(delassus, free, stops)
@@ -120,13 +121,14 @@ def test_stops_beside_feet(code: int, stops: int, rigid: bool) -> None:
         seen += 1
         rows = len(free)
         impulse, velocity = answer.impulse[:rows], answer.velocity[:rows]
-        np.testing.assert_allclose(velocity, delassus @ impulse + free, atol=1e-12)
-        assert np.abs(velocity[: 2 * cones]).max() <= 1e-12
+        rounding = 1e-12 * max(1.0, np.abs(impulse).max())  # what velocities are summed from
+        np.testing.assert_allclose(velocity, delassus @ impulse + free, atol=rounding)
+        assert np.abs(velocity[: 2 * cones]).max() <= rounding
         for stop in range(stops):
             row, mode = 2 * cones + stop, answer.mode[cones + stop]
             named.add(int(mode))
             assert (impulse[row] == 0.0 and velocity[row] > 0.0) == (mode == OPEN)
-            assert mode == OPEN or (impulse[row] >= 0.0 and abs(velocity[row]) <= 1e-12)
+            assert mode == OPEN or (impulse[row] >= 0.0 and abs(velocity[row]) <= rounding)
         loops, other = solved(problem_of(delassus, free, stops, room=20), guess, repeat)
         assert loops
         np.testing.assert_allclose(other.impulse[:rows], impulse, atol=1e-11)

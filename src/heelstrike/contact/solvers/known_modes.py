@@ -649,7 +649,7 @@ def share_standing(
 ) -> bool:  # fmt: skip
     """Share impulses to the least norm where rows depend on others, as under straight legs.
 
-    False is returned where it is not clear whether one does.
+    False is returned where it is not clear whether one does, or where a pivot has cost digits.
     """
     x, sharers, edge = rows.x, rows.sharers, 2 * cones
     stops = problem.count - cones
@@ -670,7 +670,7 @@ def share_standing(
     for i in range(size):
         row, pivot = rows.row[i], rows.pivot[i]
         diagonal = 1.0 if i < stops and scaling.held[i] == 0.0 else problem.delassus[row, row]
-        if not pivot > EARLY_PIVOT * diagonal and not abs(pivot) <= NO_PIVOT * diagonal:
+        if not pivot > COSTLY_PIVOT * diagonal and not abs(pivot) <= NO_PIVOT * diagonal:
             return False
     leave_out_idle(size, rows)
     for row in range(edge + stops):
