@@ -24,7 +24,7 @@ from heelstrike.compiler.machine_code import addresses
 from heelstrike.compiler.recordings.recording import CONSTANT, Program, Recording
 from heelstrike.compiler.recordings.tape import Entry, Operation, Result, Symbols, Value, needed
 from heelstrike.compiler.recordings.trigonometry import sine_and_cosine
-from heelstrike.compiler.side_by_side import ANGLES, Lay, Shapes, runs
+from heelstrike.compiler.side_by_side import ANGLES, Shapes, Vectors, runs
 
 _DOUBLE = ir.DoubleType()
 _DOUBLE_BYTES = 8
@@ -268,7 +268,7 @@ class _SideBySide(_Writer):
     def __init__(self, builder: ir.IRBuilder, recording: Recording) -> None:
         super().__init__(builder, recording)
         self._shapes = Shapes()
-        self._lay = Lay(self, self._shapes)
+        self._vectors = Vectors(self, self._shapes)
 
     def write(self) -> None:
         """Read all that is read before anything is written.
@@ -280,7 +280,7 @@ class _SideBySide(_Writer):
         found = []
         changed = sorted(self.recording.changed(), key=lambda each: unread(each[0]))
         for array, index, lanes in runs(changed, self._shapes):
-            beside = self._lay.vector(lanes) if len(lanes) > 1 else lanes[0]
+            beside = self._vectors.vector(lanes) if len(lanes) > 1 else lanes[0]
             if not unread(array):
                 found.append((array, index, beside))
         found = [(array, index, self._read_or_made(each)) for array, index, each in found]
@@ -300,7 +300,7 @@ class _SideBySide(_Writer):
         waiting = [result]
         while waiting:
             value = waiting[-1]
-            beside = self._lay.lane(value)
+            beside = self._vectors.lane(value)
             operands = [each for each in value.operands if isinstance(each, Result)]
             missing = [each for each in operands if each not in self._values]
             if beside is None and missing:
