@@ -145,7 +145,7 @@ def test_the_table_says_who_walks_and_why_others_do_not(
             raise InvalidRunError("its process was ended by SIGABRT")
         return compass_table._told(cycle[0])
 
-    versions = dict.fromkeys(compass_table.PACKAGES, "1.0") | {"ode": "not installed"}
+    versions = dict.fromkeys(PACKAGES, "1.0") | {"ode": "not installed"}
     monkeypatch.setattr(compass_table, "peers", lambda load: versions)
     monkeypatch.setattr(compass_table, "_in_engine", in_engine)
     for _ in range(2):

@@ -397,7 +397,7 @@ def test_a_delay_of_the_motors_is_found() -> None:
     assert "delay of the motors: 4" in str(found)
 
 
-@pytest.mark.parametrize("friction", [0.18, 0.2])
+@pytest.mark.parametrize("friction", [0.1, 0.15])
 def test_friction_shows_where_a_foot_slides(friction: float) -> None:
     """A walk on ground that is too slippery for it."""
     run = hs.simulate(
