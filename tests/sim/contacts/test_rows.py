@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from every_row import every_kind
 
 import heelstrike as hs
 from heelstrike.contact.sets import CONE, HALF_LINE, INTERVAL, LINE
-from heelstrike.robot import Robot, RobotBuilder
+from heelstrike.robot import RobotBuilder
 from heelstrike.sim.contacts.rows import (
     BRAKE,
     COUPLING,
@@ -37,30 +38,13 @@ KERNELS = ("kernel", "dissolved_kernel")
 NAMES = ("POINT", "STOP", "DRY_JOINT", "SECOND_FACE", "LOOP", "COUPLING", "BRAKE")
 
 
-def robot_of_every_kind() -> Robot:
-    build = RobotBuilder("every kind")
-    build.floating_base("trunk", mass=1.0, inertia=0.1)
-    build.hinge("hip", "trunk", mass=1.0, inertia=0.1, limits=(-1.0, np.inf))
-    build.hinge("knee", "hip", at=(0.0, -0.5), mass=1.0, inertia=0.1, limits=(-2.0, 0.5))
-    build.hinge("arm", "trunk", mass=1.0, inertia=0.1, dry_friction=0.3, limits=(-np.inf, 3.0))
-    build.hinge("hand", "arm", at=(0.5, 0.0), mass=1.0, inertia=0.1)
-    build.contact("knee", (0.0, -1.0))
-    build.contact("trunk", (0.0, 0.2))
-    build.loop("hand", "trunk", at=(0.5, 0.0))
-    build.couple("hand", "arm")
-    build.latch("knee", "upper")
-    build.brake("hip")
-    build.brake("hand", limit=2.0)
-    return build.build()
-
-
 def entries(kind: int) -> slice:
-    rows = lay_out_rows(robot_of_every_kind())
+    rows = lay_out_rows(every_kind())
     return slice(int(rows.first[kind]), int(rows.end[kind]))
 
 
 def test_entries_go_kind_by_kind_without_a_gap() -> None:
-    rows = lay_out_rows(robot_of_every_kind())
+    rows = lay_out_rows(every_kind())
     assert [int(n) for n in rows.end - rows.first] == [2, 4, 0, 2, 2, 2, 1, 0, 2]
     assert rows.first[POINT] == 0  # points have the numbers of `Contacts`
     np.testing.assert_array_equal(rows.first[1:], rows.end[:-1])
@@ -70,7 +54,7 @@ def test_entries_go_kind_by_kind_without_a_gap() -> None:
 
 
 def test_each_entry_says_of_what_it_is() -> None:
-    robot = robot_of_every_kind()
+    robot = every_kind()
     rows = lay_out_rows(robot)
     hip, knee, arm, hand = (robot.joint_index(name) for name in ("hip", "knee", "arm", "hand"))
     owners = {
@@ -87,7 +71,7 @@ def test_each_entry_says_of_what_it_is() -> None:
 
 
 def test_entries_have_the_sets_of_their_kinds() -> None:
-    rows = lay_out_rows(robot_of_every_kind())
+    rows = lay_out_rows(every_kind())
     sets = {POINT: CONE, STOP: HALF_LINE, DRY_JOINT: INTERVAL, SECOND_FACE: CONE, LOOP: LINE}
     for kind, its in (sets | {COUPLING: LINE, BRAKE: LINE}).items():
         assert (rows.set[entries(kind)] == its).all(), KINDS[kind].name
@@ -103,7 +87,7 @@ def test_kinds_that_a_robot_does_not_have_are_not_there() -> None:
 
 def test_places_of_points_on_both_faces_are_those_of_the_table() -> None:
     """What finds the contact points writes the table's gaps, places and normals."""
-    memory = allocate_memory(robot_of_every_kind())
+    memory = allocate_memory(every_kind())
     rows = memory.rows
     assert np.isposinf(rows.gap).all()
     memory.contacts.gap[:] = 1.0, 2.0
@@ -119,7 +103,7 @@ def test_places_of_points_on_both_faces_are_those_of_the_table() -> None:
 
 
 def test_the_kinds_of_friction_and_loops_are_numbered_by_the_table() -> None:
-    memory = allocate_memory(robot_of_every_kind())
+    memory = allocate_memory(every_kind())
     friction = np.zeros(len(memory.rows.kind))
     friction[entries(DRY_JOINT)] = 1.0
     np.testing.assert_array_equal(memory.surface.friction, friction)

@@ -45,7 +45,9 @@ def point_delassus(
     model: Model, points: Integers, tree: Workspace, contacts: Contacts, factor: Floats,
     rows: Floats, delassus: Floats,
 ) -> None:  # fmt: skip
-    """Delassus matrix G = J A⁻¹ Jᵀ of the points, (2 k, 2 k); `rows` (2 k, nv) is scratch.
+    """Delassus matrix G = J A⁻¹ Jᵀ of the points; `rows` (2 k, nv) is scratch.
+
+    It is written into the first 2 k rows and columns of a matrix that may have room for more.
 
     With A = Lᵀ D L it is Z Zᵀ, where Z = J L⁻¹ D^(-1/2): symmetric to the last digit.
     """
